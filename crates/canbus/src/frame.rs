@@ -1,0 +1,46 @@
+//! A classic CAN frame.
+
+pub use embedded_can::{ExtendedId, Id, StandardId};
+
+/// A data or remote frame. Only valid frames can be built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Frame {
+    id: Id,
+    remote: bool,
+    len: u8,
+    data: [u8; 8],
+}
+
+impl Frame {
+    /// A data frame; `None` for more than eight bytes.
+    pub fn data(id: impl Into<Id>, bytes: &[u8]) -> Option<Frame> {
+        let mut data = [0; 8];
+        data.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        Some(Frame { id: id.into(), remote: false, len: bytes.len() as u8, data })
+    }
+
+    /// A remote frame with a data length code; `None` above eight.
+    pub fn remote(id: impl Into<Id>, dlc: u8) -> Option<Frame> {
+        (dlc <= 8).then(|| Frame { id: id.into(), remote: true, len: dlc, data: [0; 8] })
+    }
+
+    /// The identifier.
+    pub fn id(&self) -> Id {
+        self.id
+    }
+
+    /// Whether this is a remote frame.
+    pub fn is_remote(&self) -> bool {
+        self.remote
+    }
+
+    /// The data length code.
+    pub fn dlc(&self) -> u8 {
+        self.len
+    }
+
+    /// The data; empty for a remote frame.
+    pub fn bytes(&self) -> &[u8] {
+        if self.remote { &[] } else { &self.data[..usize::from(self.len)] }
+    }
+}

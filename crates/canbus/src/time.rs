@@ -1,0 +1,85 @@
+//! Virtual time shared by the bus, the emulated boards and the clients.
+
+use core::fmt;
+use core::ops::{Add, AddAssign, Sub};
+
+/// An instant, or a span, of virtual time: a count of 1/10080 microseconds since power-on.
+///
+/// The unit is the least one in which a cycle of every clock in the system is a whole number: 168 MHz is 60,
+/// 144 MHz is 70, the 16 MHz HSI is 630, the 32 kHz LSI is 315000, a bit at 1 Mbit/s is 10080. So boards with
+/// different clocks and the bus never drift apart by rounding. 64 bits last 58 years.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Time(pub u64);
+
+impl Time {
+    /// Power-on.
+    pub const ZERO: Time = Time(0);
+    /// Later than anything that happens.
+    pub const NEVER: Time = Time(u64::MAX);
+    /// Units in a microsecond.
+    pub const PER_MICRO: u64 = 10_080;
+    /// Units in a second.
+    pub const PER_SECOND: u64 = Self::PER_MICRO * 1_000_000;
+
+    /// The span of `n` microseconds.
+    pub const fn from_micros(n: u64) -> Time {
+        Time(n * Self::PER_MICRO)
+    }
+
+    /// The span of `n` milliseconds.
+    pub const fn from_millis(n: u64) -> Time {
+        Time(n * Self::PER_MICRO * 1_000)
+    }
+
+    /// The span of one cycle of a clock of `hertz`, rounded to the nearest unit (exact for the clocks above).
+    ///
+    /// # Panics
+    /// When `hertz` is zero.
+    pub const fn of_cycle(hertz: u64) -> Time {
+        Time((Self::PER_SECOND + hertz / 2) / hertz)
+    }
+
+    /// Whole microseconds.
+    pub const fn as_micros(self) -> u64 {
+        self.0 / Self::PER_MICRO
+    }
+
+    /// Seconds, for people.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn as_secs_f64(self) -> f64 {
+        self.0 as f64 / Self::PER_SECOND as f64
+    }
+
+    /// The span from `earlier` to `self`, zero when `earlier` is later.
+    pub const fn since(self, earlier: Time) -> Time {
+        Time(self.0.saturating_sub(earlier.0))
+    }
+}
+
+impl Add for Time {
+    type Output = Time;
+    fn add(self, span: Time) -> Time {
+        Time(self.0.saturating_add(span.0))
+    }
+}
+
+impl AddAssign for Time {
+    fn add_assign(&mut self, span: Time) {
+        *self = *self + span;
+    }
+}
+
+impl Sub for Time {
+    type Output = Time;
+    fn sub(self, other: Time) -> Time {
+        self.since(other)
+    }
+}
+
+impl fmt::Display for Time {
+    /// Seconds with microseconds, as candump prints them.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let micros = self.as_micros();
+        write!(f, "{}.{:06}", micros / 1_000_000, micros % 1_000_000)
+    }
+}

@@ -1,0 +1,31 @@
+//! Time as the caller tells it: microseconds, never read from a clock.
+
+use core::ops::Add;
+
+/// A span in microseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Duration(pub u64);
+
+impl Duration {
+    /// `n` milliseconds.
+    #[must_use]
+    pub const fn from_millis(n: u64) -> Duration {
+        Duration(n * 1_000)
+    }
+}
+
+/// Microseconds since start-up. 64 bits do not wrap in the life of a machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Instant(pub u64);
+
+impl Instant {
+    /// Later than anything: no deadline.
+    pub const NEVER: Instant = Instant(u64::MAX);
+}
+
+impl Add<Duration> for Instant {
+    type Output = Instant;
+    fn add(self, span: Duration) -> Instant {
+        Instant(self.0.saturating_add(span.0))
+    }
+}

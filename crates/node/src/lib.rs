@@ -1,0 +1,4 @@
+//! node
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(clippy::pedantic)]

@@ -1,0 +1,4 @@
+//! profiles
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(clippy::pedantic)]

@@ -1,0 +1,4 @@
+//! storage
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(clippy::pedantic)]

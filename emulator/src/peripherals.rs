@@ -1,0 +1,83 @@
+//! The seam between the core (CPU, NVIC, system control space) and the chip around it.
+
+use std::ops::Range;
+
+use canbus::Time;
+
+/// Levels of the chip's interrupt lines: bit `n` is IRQ `n` of the vector table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct IrqLines(pub u128);
+
+impl IrqLines {
+    /// Sets or clears one line.
+    pub fn set(&mut self, irq: u8, level: bool) {
+        self.0 = self.0 & !(1 << irq) | u128::from(level) << irq;
+    }
+}
+
+/// The bus answered an access with an error: the core raises a BusFault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BusFault;
+
+/// What the chip wants done outside of itself, in order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// Write bytes to RAM (a DMA transfer) or to the flash array (programming, erase).
+    Store {
+        /// Absolute address.
+        address: u32,
+        /// The bytes.
+        bytes: Vec<u8>,
+    },
+    /// Fill flash (an erase).
+    Fill {
+        /// Absolute addresses.
+        range: Range<u32>,
+        /// The value of every byte.
+        byte: u8,
+    },
+    /// Code fetch and reads from flash wait until this instant.
+    StallFlash(Time),
+    /// The core clock (HCLK) is now this, in hertz.
+    CoreClock(u64),
+    /// A reset that the chip itself asks for (watchdog); RCC already holds its cause.
+    Reset,
+    /// Power is gone: RAM is lost, flash keeps what it had.
+    PowerCut,
+    /// The world must look at the bus before the core runs on: a transmit request, a bit-rate change.
+    Poke,
+}
+
+/// Reads memory for a DMA transfer out of it.
+pub trait Memory {
+    /// Reads `bytes.len()` bytes at an absolute address of RAM or flash.
+    fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault>;
+}
+
+/// Everything of the chip outside the core. All calls come in the order of virtual time.
+pub trait Peripherals {
+    /// A read of 1, 2 or 4 bytes at an absolute address.
+    fn read(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault>;
+
+    /// A write of 1, 2 or 4 bytes at an absolute address.
+    fn write(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault>;
+
+    /// A store by the core into the flash array: programming, when the controller allows it. `old` is what the
+    /// array holds at `address`, as many bytes as are written.
+    fn program(&mut self, address: u32, old: &[u8], new: &[u8], now: Time) -> Result<(), BusFault>;
+
+    /// The next instant at which something happens without the core.
+    fn deadline(&self) -> Time;
+
+    /// Lets everything due up to `now` happen.
+    fn advance(&mut self, now: Time, memory: &dyn Memory);
+
+    /// The interrupt lines now.
+    fn lines(&self) -> IrqLines;
+
+    /// Takes the next effect that earlier calls asked for.
+    fn effect(&mut self) -> Option<Effect>;
+
+    /// A system reset by the core (SYSRESETREQ) or, with `power`, by the supply.
+    fn reset(&mut self, power: bool, now: Time);
+}
