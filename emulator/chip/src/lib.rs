@@ -1,4 +1,4 @@
-//! A register-level STM32F4 that runs the node's ELF files in virtual time.
+//! Register-level models of the STM32F4 peripherals that the node uses.
 
 mod peripherals;
 
