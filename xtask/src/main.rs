@@ -1,1 +1,54 @@
-fn main() {}
+//! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
+
+mod command;
+mod images;
+mod native;
+mod python;
+mod sim;
+mod steps;
+mod target;
+mod test;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Everything that needs more than `cargo test`.
+#[derive(Parser)]
+#[command(name = "cargo xtask", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Build the firmware, the bootloader and the test images for the Cortex-M4
+    Images,
+    /// Build both images and run them on the emulated board (all flags go to the simulator; `cargo sim --help`)
+    #[command(disable_help_flag = true)]
+    Sim {
+        /// Flags of the simulator
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        flags: Vec<OsString>,
+    },
+    /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
+    Test {
+        /// Run only the steps whose name contains this text
+        #[arg(long)]
+        only: Option<String>,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Images => images::build().map(|_| ExitCode::SUCCESS),
+        Command::Sim { flags } => sim::run(&flags),
+        Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(2)
+    })
+}

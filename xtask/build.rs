@@ -1,0 +1,6 @@
+//! Tells xtask the triple of the machine it runs on.
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-env=XTASK_HOST={}", std::env::var("HOST").expect("cargo sets HOST"));
+}

@@ -1,0 +1,102 @@
+//! The Rust of the embedded target: which compiler builds the images on this machine.
+//!
+//! An installed target comes first. Where rustup must not download (`RUSTUP_AUTO_INSTALL=0`) Debian's packages
+//! build the core library from its source. Everywhere else rustup adds the target.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use crate::command::{cargo, output, root, run};
+use crate::native;
+
+/// The target of both images: Cortex-M4 with its FPU.
+pub(crate) const TRIPLE: &str = "thumbv7em-none-eabihf";
+
+const DEBIAN_PACKAGES: [&str; 5] = ["rustc-web", "rust-web-src", "cargo-web", "rust-web-clippy", "lld-22"];
+
+/// A toolchain that can build for [`TRIPLE`].
+pub(crate) enum Toolchain {
+    /// The cargo that runs us has the target.
+    Installed,
+    /// Debian's compiler with the source of its core library.
+    Debian {
+        /// A linker for the target.
+        linker: PathBuf,
+    },
+}
+
+impl Toolchain {
+    /// Finds one, or installs it, or says what to type.
+    pub(crate) fn ensure() -> Result<Toolchain> {
+        if has_target() {
+            return Ok(Toolchain::Installed);
+        }
+        if std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0") {
+            return debian();
+        }
+        eprintln!("adding the Rust target {TRIPLE}");
+        run(Command::new("rustup").args(["target", "add", TRIPLE]).current_dir(root())).with_context(
+            || format!("the Rust target {TRIPLE} is missing; with rustup: rustup target add {TRIPLE}"),
+        )?;
+        Ok(Toolchain::Installed)
+    }
+
+    /// A cargo call for the target, `cargo <verb> --target ... <args>`.
+    pub(crate) fn cargo(&self, verb: &str, args: &[&str]) -> Command {
+        let mut command = match self {
+            Toolchain::Installed => cargo(),
+            Toolchain::Debian { .. } => Command::new("/usr/bin/cargo"),
+        };
+        command.current_dir(root()).arg(verb).args(["--target", TRIPLE]).args(args);
+        if let Toolchain::Debian { linker } = self {
+            command
+                .arg("-Zbuild-std=core")
+                .env("RUSTC_BOOTSTRAP", "1")
+                .env("RUSTC", "/usr/bin/rustc")
+                .env("RUSTDOC", "/usr/bin/rustdoc")
+                .env("PATH", debian_first())
+                .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
+                .env_remove("RUSTUP_TOOLCHAIN")
+                .env_remove("CARGO");
+        }
+        command
+    }
+}
+
+/// Whether the compiler at hand has a core library for the target.
+fn has_target() -> bool {
+    let Some(libdir) = output("rustc", &["--print", "target-libdir", "--target", TRIPLE]) else {
+        return false;
+    };
+    let Ok(entries) = Path::new(&libdir).read_dir() else { return false };
+    entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore"))
+}
+
+fn debian() -> Result<Toolchain> {
+    native::ensure_packages(
+        &native::missing_packages(&DEBIAN_PACKAGES),
+        &format!("they build for {TRIPLE}, because RUSTUP_AUTO_INSTALL=0 keeps rustup from adding it"),
+    )?;
+    Ok(Toolchain::Debian { linker: linker()? })
+}
+
+/// rustup's own lld, else the one that Debian's package links to.
+fn linker() -> Result<PathBuf> {
+    let sysroot = output("rustc", &["--print", "sysroot"]).unwrap_or_default();
+    let host = env!("XTASK_HOST");
+    let bundled = Path::new(&sysroot).join("lib/rustlib").join(host).join("bin/rust-lld");
+    let debian = PathBuf::from("/usr/lib/llvm-22/bin/ld.lld");
+    match [bundled, debian].into_iter().find(|path| path.exists()) {
+        Some(path) => Ok(path),
+        None => bail!("no linker for {TRIPLE}: neither rustup's rust-lld nor Debian's lld-22 is there"),
+    }
+}
+
+/// Debian's cargo must find Debian's clippy-driver before rustup's proxies.
+fn debian_first() -> std::ffi::OsString {
+    let mut path = std::ffi::OsString::from("/usr/bin:");
+    path.push(std::env::var_os("PATH").unwrap_or_default());
+    path
+}

@@ -1,0 +1,72 @@
+//! `cargo xtask test`: every check of the project, the cheapest first.
+
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::command::{cargo, root, run};
+use crate::steps::Steps;
+use crate::target::Toolchain;
+use crate::{images, native, python, sim};
+
+/// The packages that only build for the embedded target.
+const IMAGES: [&str; 3] = ["firmware", "bootloader", "mechanics-images"];
+
+/// Runs the steps.
+fn run_all(steps: &mut Steps) -> Result<()> {
+    steps.run("format", || run(cargo().args(["fmt", "--all", "--check"])))?;
+    steps.run("native tools", native::ensure_emulator_tools)?;
+    steps.run("embedded target", || Toolchain::ensure().map(|_| ()))?;
+    steps.run("lint host", || run(host("clippy").args(["--all-targets", "--", "-D", "warnings"])))?;
+    steps.run("documentation", || run(host("doc").arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings")))?;
+    steps.run("images", || images::build().map(|_| ()))?;
+    steps.run("lint images", lint_images)?;
+    steps.run("other chips", other_chips)?;
+    steps.run("test host", || run(&mut host("test")))?;
+    steps.run("test python", test_python)
+}
+
+/// The whole command.
+pub(crate) fn run_tests(only: Option<&str>) -> Result<()> {
+    let mut steps = Steps::new(only);
+    run_all(&mut steps)?;
+    steps.finish()
+}
+
+/// A cargo call over everything that runs on the host, the emulated board included.
+fn host(verb: &str) -> Command {
+    let mut command = cargo();
+    command.args([verb, "--quiet", "--workspace", "--profile", "sim", "--features", "host-tests/board"]);
+    for package in IMAGES {
+        command.args(["--exclude", package]);
+    }
+    command
+}
+
+fn lint_images() -> Result<()> {
+    let toolchain = Toolchain::ensure()?;
+    let packages = ["--release", "-p", "firmware", "-p", "bootloader", "-p", "mechanics-images", "-p", "bsp"];
+    run(toolchain.cargo("clippy", &packages).args(["--", "-D", "warnings"]))?;
+    run(toolchain.cargo("doc", &packages).arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+fn other_chips() -> Result<()> {
+    let toolchain = Toolchain::ensure()?;
+    for chip in ["stm32f405", "stm32f407"] {
+        let features = ["--release", "--no-default-features", "--features", chip];
+        for package in ["firmware", "bootloader"] {
+            run(toolchain.cargo("check", &features).args(["-p", package]))?;
+        }
+    }
+    Ok(())
+}
+
+fn test_python() -> Result<()> {
+    let sim = sim::build()?;
+    let python = python::ensure()?;
+    run(Command::new(python)
+        .args(["-m", "pytest", "-q", "host-tests/python"])
+        .current_dir(root())
+        .env("SIM_COMMAND", sim)
+        .env("NODE_IMAGES", images::dir()))
+}
