@@ -1,0 +1,105 @@
+//! memory.x against the sectors of the chip: a region that straddles a sector it does not own would be erased
+//! with its neighbour.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+const KIB: u32 = 1024;
+const FLASH: u32 = 0x0800_0000;
+const RAM: Range<u32> = 0x2000_0000..0x2000_0000 + 128 * KIB;
+
+/// Sector sizes of the STM32F446RE in KiB (RM0390, 3.3); the STM32F405 and F407 begin with the same eight.
+const SECTORS: [u32; 8] = [16, 16, 16, 16, 64, 128, 128, 128];
+
+fn regions() -> BTreeMap<String, Range<u32>> {
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../memory.x")).unwrap();
+    text.lines().filter_map(region).collect()
+}
+
+/// `NAME (attributes) : ORIGIN = 0x.., LENGTH = 16K`
+fn region(line: &str) -> Option<(String, Range<u32>)> {
+    let (name, rest) = line.split_once('(')?;
+    let origin = number(rest.split_once("ORIGIN =")?.1);
+    let length = number(rest.split_once("LENGTH =")?.1);
+    Some((name.trim().to_owned(), origin..origin + length))
+}
+
+fn number(text: &str) -> u32 {
+    let text = text.trim_start();
+    let end = text.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(text.len());
+    let word = &text[..end];
+    match (word.strip_prefix("0x"), word.strip_suffix('K')) {
+        (Some(hex), _) => u32::from_str_radix(hex, 16).unwrap(),
+        (None, Some(kib)) => kib.parse::<u32>().unwrap() * KIB,
+        (None, None) => word.parse().unwrap(),
+    }
+}
+
+fn sector_starts() -> Vec<u32> {
+    SECTORS
+        .iter()
+        .scan(FLASH, |next, kib| {
+            let start = *next;
+            *next += kib * KIB;
+            Some(start)
+        })
+        .collect()
+}
+
+#[test]
+fn every_part_of_flash_that_is_erased_on_its_own_is_made_of_whole_sectors() {
+    let regions = regions();
+    let application = regions["IMAGE_HEADER"].start..regions["APPLICATION"].end;
+    let starts = sector_starts();
+    let end = FLASH + SECTORS.iter().sum::<u32>() * KIB;
+    for range in [
+        regions["BOOTLOADER"].clone(),
+        regions["PARAMETERS"].clone(),
+        application,
+        regions["STAGING"].clone(),
+    ] {
+        assert!(starts.contains(&range.start), "{:#x} is no sector's start", range.start);
+        assert!(starts.contains(&range.end) || range.end == end, "{:#x} is no sector's end", range.end);
+    }
+}
+
+#[test]
+fn flash_is_used_without_gap_or_overlap() {
+    let regions = regions();
+    let order = ["BOOTLOADER", "PARAMETERS", "IMAGE_HEADER", "APPLICATION", "STAGING"];
+    let mut next = FLASH;
+    for name in order {
+        assert_eq!(regions[name].start, next, "{name}");
+        next = regions[name].end;
+    }
+    assert_eq!(next, FLASH + 512 * KIB);
+}
+
+#[test]
+fn the_staging_slot_holds_any_image_of_the_application_slot() {
+    let regions = regions();
+    assert!(regions["STAGING"].len() >= regions["IMAGE_HEADER"].len() + regions["APPLICATION"].len());
+}
+
+#[test]
+fn the_parameter_store_has_two_pages_of_one_size() {
+    let pages = regions()["PARAMETERS"].clone();
+    let inside: Vec<u32> = sector_starts().into_iter().filter(|start| pages.contains(start)).collect();
+    assert_eq!(inside, [pages.start, pages.start + 16 * KIB]);
+}
+
+/// VTOR must be aligned to the table's size rounded up to a power of two (PM0214, 4.4.4): 16 + 97 vectors.
+#[test]
+fn the_application_starts_where_vtor_may_point() {
+    let table = ((16 + 97) * 4_u32).next_power_of_two();
+    assert_eq!(regions()["APPLICATION"].start % table, 0);
+}
+
+/// An overflow must leave RAM instead of reaching data.
+#[test]
+fn the_stack_is_at_the_very_start_of_ram() {
+    let regions = regions();
+    assert_eq!(regions["STACK"].start, RAM.start);
+    assert_eq!(regions["STACK"].end, regions["RAM"].start);
+    assert_eq!(regions["RAM"].end, RAM.end);
+}
