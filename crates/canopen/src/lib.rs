@@ -4,7 +4,11 @@
 #![warn(clippy::pedantic)]
 
 mod frame;
+mod node_id;
 mod time;
+mod transmit;
 
 pub use frame::Frame;
+pub use node_id::NodeId;
 pub use time::{Duration, Instant};
+pub use transmit::{QueueFull, Transmit};

@@ -1,0 +1,29 @@
+//! The node-ID and the identifiers that follow from it.
+
+use core::num::NonZeroU8;
+
+/// A node-ID, 1 to 127 (CiA 301, 7.3.5). 0 addresses all nodes and is never a node's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(NonZeroU8);
+
+impl NodeId {
+    /// `None` outside 1 to 127.
+    #[must_use]
+    pub const fn new(id: u8) -> Option<NodeId> {
+        match NonZeroU8::new(id) {
+            Some(id) if id.get() <= 127 => Some(NodeId(id)),
+            _ => None,
+        }
+    }
+
+    /// The number, 1 to 127.
+    #[must_use]
+    pub const fn get(self) -> u8 {
+        self.0.get()
+    }
+
+    /// The CAN-ID of a service of the pre-defined connection set: `base` (a multiple of 80h) plus the node-ID.
+    pub(crate) const fn on(self, base: u16) -> u16 {
+        base | self.get() as u16
+    }
+}

@@ -1,0 +1,19 @@
+//! Where frames go: the driver's transmit queue as the protocol sees it.
+
+use crate::Frame;
+
+/// The queue has no room; the sender keeps what it wanted to send and tries again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct QueueFull;
+
+/// A transmit queue. It never blocks.
+pub trait Transmit {
+    /// Queues one frame.
+    ///
+    /// # Errors
+    /// `QueueFull` when there is no room; the frame is then not queued.
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull>;
+
+    /// How many frames `send` would take now.
+    fn room(&self) -> usize;
+}

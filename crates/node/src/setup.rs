@@ -1,0 +1,43 @@
+//! What a node must know before it starts.
+
+use canopen::NodeId;
+
+/// Vendor-ID of object 1018h:1. 0 is no vendor: put the one CiA assigned to you here.
+pub const VENDOR_ID: u32 = 0;
+/// Revision number of object 1018h:3: major in the high word, minor in the low word.
+pub const REVISION: u32 = 0x0001_0000;
+
+/// Which device the node is: its dictionary, its default parameters and its profile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Personality {
+    /// Pressure and temperature transmitter, CiA 404.
+    #[default]
+    Pressure,
+}
+
+impl Personality {
+    /// Product code of object 1018h:2.
+    #[must_use]
+    pub const fn product_code(self) -> u32 {
+        match self {
+            Personality::Pressure => 1,
+        }
+    }
+}
+
+/// Everything that comes from outside the dictionary: configuration of the board and of the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    /// The device to be.
+    pub personality: Personality,
+    /// Own node-ID.
+    pub node_id: NodeId,
+    /// Bit rate in kbit/s at which the node runs.
+    pub bit_rate: u16,
+    /// Serial number, object 1018h:4.
+    pub serial_number: u32,
+    /// Object 1009h: at most 32 ASCII characters, the rest is cut off.
+    pub hardware_version: &'static str,
+    /// Object 100Ah: at most 50 ASCII characters, the rest is cut off.
+    pub software_version: &'static str,
+}
