@@ -123,6 +123,7 @@ fn low_word(remainder: u64) -> u32 {
 }
 
 #[cfg(test)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]
 mod tests {
     use proptest::prelude::*;
 

@@ -2,12 +2,13 @@
 //!
 //! The difference of two positions over a window. A fast shaft is measured over one or a few milliseconds, so the
 //! value follows at once; a slow one over up to 128 ms, so a single step still counts. The window is the shortest
-//! power of two in which the shaft moved [`ENOUGH`] steps: the value is then exact to better than 1 in `ENOUGH`.
+//! one in which the shaft moved [`ENOUGH`] steps: the value is then exact to 1 in `ENOUGH`, and after a stop it falls
+//! steadily to zero.
 
 use core::num::NonZeroU64;
 
-/// Longest window in samples; a power of two.
-const WINDOW: usize = 128;
+/// Longest window in samples.
+const WINDOW: u32 = 128;
 
 /// Steps in a window that make it long enough.
 const ENOUGH: u32 = 64;
@@ -24,22 +25,22 @@ pub struct Ratio {
 /// Remembers the last 128 positions, one a millisecond.
 #[derive(Clone, Debug)]
 pub struct Speedometer {
-    positions: [u32; WINDOW],
-    next: usize,
+    positions: [u32; WINDOW as usize],
+    next: u32,
 }
 
 impl Speedometer {
     /// A shaft that has stood at `position`.
     #[must_use]
     pub fn new(position: u32) -> Speedometer {
-        Speedometer { positions: [position; WINDOW], next: 0 }
+        Speedometer { positions: [position; WINDOW as usize], next: 0 }
     }
 
     /// Takes the position in native steps, counted modulo 2^32 without end, and returns the speed in units,
     /// saturated to INTEGER16.
     pub fn update(&mut self, position: u32, ratio: Ratio) -> i16 {
         let (moved, millis) = self.window(position);
-        if let Some(oldest) = self.positions.get_mut(self.next) {
+        if let Some(oldest) = self.positions.get_mut(self.next as usize) {
             *oldest = position;
         }
         self.next = (self.next + 1) % WINDOW;
@@ -48,20 +49,15 @@ impl Speedometer {
 
     /// The movement in the shortest window that is long enough, and its length in milliseconds.
     fn window(&self, position: u32) -> (i32, u32) {
-        let mut millis = 1;
-        loop {
-            let moved = position.wrapping_sub(self.ago(millis)).cast_signed();
-            if moved.unsigned_abs() >= ENOUGH || millis as usize >= WINDOW {
-                return (moved, millis);
-            }
-            millis *= 2;
-        }
+        let moved = |millis| position.wrapping_sub(self.ago(millis)).cast_signed();
+        let millis = (1..WINDOW).find(|millis| moved(*millis).unsigned_abs() >= ENOUGH).unwrap_or(WINDOW);
+        (moved(millis), millis)
     }
 
     /// The position `millis` samples before the one that comes next.
     fn ago(&self, millis: u32) -> u32 {
-        let index = (self.next + WINDOW - millis as usize) % WINDOW;
-        self.positions.get(index).copied().unwrap_or(0)
+        let index = (self.next + WINDOW - millis) % WINDOW;
+        self.positions.get(index as usize).copied().unwrap_or(0)
     }
 }
 
