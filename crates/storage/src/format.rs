@@ -1,0 +1,91 @@
+//! The words of a page; the picture is in the documentation of the crate. All numbers are little-endian.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+
+/// The unit of programming: 32 bits, x32 parallelism of the STM32F4 (RM0390, 3.5.2).
+pub(crate) const WORD: u32 = 4;
+/// A word that was not programmed since the page was erased.
+pub(crate) const ERASED: u32 = u32::MAX;
+/// The value of a word that says something by being programmed at all. All bits are programmed, so doing it
+/// once more after a cut that left the word half programmed but reading as erased is sound.
+pub(crate) const MARK: u32 = 0;
+/// First word of a page whose erase has run to its end; the digit is the version of this format.
+pub(crate) const CLEAN: u32 = u32::from_le_bytes(*b"PRM1");
+/// Where the mark of a page is that the store has moved away from.
+pub(crate) const LEFT_AT: u32 = WORD;
+/// Where the first transaction of a page begins.
+pub(crate) const FIRST: u32 = 2 * WORD;
+/// Size of what precedes the records of a transaction: begin mark, generation, length.
+pub(crate) const HEAD: u32 = 3 * WORD;
+/// Size of what follows the records: commit word, closing mark.
+pub(crate) const TAIL: u32 = 2 * WORD;
+/// Size of what precedes the value of a record: group, kind and version; length.
+pub(crate) const RECORD_HEAD: u32 = 2 * WORD;
+
+/// The kinds of a record.
+pub(crate) const KIND_VALUE: u8 = 1;
+pub(crate) const KIND_RESTORED: u8 = 2;
+
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// A number beside its complement. A torn word has some zeros of the target missing, in one half or the other, so
+/// it is never another valid number; nor is a word with an odd count of flipped bits.
+pub(crate) fn guarded(value: u16) -> u32 {
+    u32::from(value) | u32::from(!value) << 16
+}
+
+/// The number in a guarded word.
+pub(crate) fn unguarded(word: u32) -> Option<u16> {
+    let [low, high, ..] = word.to_le_bytes();
+    let value = u16::from_le_bytes([low, high]);
+    (guarded(value) == word).then_some(value)
+}
+
+/// Bytes that a value takes up: whole words.
+pub(crate) fn padded(len: u32) -> u32 {
+    len.next_multiple_of(WORD)
+}
+
+/// The running check of a transaction.
+pub(crate) struct Check(Digest<'static, u32>);
+
+impl Check {
+    /// Begins with the place in the page, so that a transaction found elsewhere, as a copy in a value, is none.
+    pub(crate) fn new(at: u32) -> Check {
+        let mut check = Check(CRC.digest());
+        check.add(at);
+        check
+    }
+
+    pub(crate) fn add(&mut self, word: u32) {
+        self.0.update(&word.to_le_bytes());
+    }
+
+    /// The commit word: the CRC, but never the value of an erased word.
+    pub(crate) fn commit_word(self) -> u32 {
+        match self.0.finalize() {
+            ERASED => !ERASED,
+            crc => crc,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_guarded_word_that_is_torn_is_never_another_number() {
+        for value in [0, 1, 0x5A5A, 0x7FFF, u16::MAX] {
+            let word = guarded(value);
+            assert_eq!(unguarded(word), Some(value));
+            for first in 0..32 {
+                for second in 0..32 {
+                    let missing = (1 << first | 1 << second) & !word;
+                    assert_eq!(unguarded(word | missing), (missing == 0).then_some(value));
+                }
+            }
+        }
+        assert_eq!(unguarded(ERASED), None);
+    }
+}

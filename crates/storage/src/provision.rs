@@ -1,0 +1,76 @@
+//! What the factory and `cargo sim` do before a node runs for the first time.
+
+use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
+
+use crate::device::DeviceRecord;
+use crate::error::Error;
+use crate::group::{Change, Group, Loaded};
+use crate::memory::Memory;
+use crate::page::Pages;
+use crate::store::Store;
+use crate::view::View;
+
+/// Erases both pages, whatever they hold, and stores a device record.
+///
+/// # Errors
+/// As [`Store::open`], [`Store::prepare`] and [`Store::save`].
+pub fn provision<F: NorFlash>(
+    mut flash: F,
+    pages: Pages,
+    record: &DeviceRecord,
+) -> Result<(), Error<F::Error>> {
+    let erase_size = u32::try_from(F::ERASE_SIZE).map_err(|_| Error::Geometry)?;
+    for page in pages.split::<F::Error>(flash.capacity(), erase_size)? {
+        flash.erase(page.start, page.start + page.size)?;
+    }
+    let mut store = Store::open(flash, pages)?;
+    store.prepare()?;
+    let value = &record.encode();
+    store.save(&[Change::Set { group: Group::Device, version: DeviceRecord::VERSION, value }])
+}
+
+/// Reads one group from a dump of the flash. To read several, or their health, use a [`View`] of a [`Memory`].
+///
+/// # Errors
+/// As [`View::open`] and [`View::load`].
+pub fn read(
+    flash: &[u8],
+    pages: Pages,
+    group: Group,
+    buf: &mut [u8],
+) -> Result<Option<Loaded>, Error<NorFlashErrorKind>> {
+    View::open(Memory(flash), pages)?.load(group, buf)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGES: Pages = Pages::new(1024, 512);
+
+    #[test]
+    fn a_provisioned_flash_holds_the_record_and_nothing_else() {
+        let record = DeviceRecord::new(5, 800, 2).unwrap();
+        let mut flash = std::vec![0x55; 2048];
+        provision(Memory(flash.as_mut_slice()), PAGES, &record).unwrap();
+        assert!(flash[..1024].iter().all(|&byte| byte == 0x55), "only the pages are touched");
+        let mut view = View::open(Memory(flash.as_slice()), PAGES).unwrap();
+        assert_eq!(view.device(), Ok(Some(record)));
+        let loaded = read(&flash, PAGES, Group::Device, &mut [0; 16]).unwrap();
+        assert_eq!(loaded, Some(Loaded { version: DeviceRecord::VERSION, len: DeviceRecord::LEN }));
+        assert_eq!(read(&flash, PAGES, Group::Application, &mut []), Ok(None));
+    }
+
+    #[test]
+    fn pages_outside_the_flash_are_refused() {
+        let record = DeviceRecord::new(5, 800, 2).unwrap();
+        let mut flash = [0; 1024];
+        for pages in
+            [Pages::new(4, 512), Pages::new(u32::MAX - 3, 512), Pages::new(0, 32), Pages::new(2, 256)]
+        {
+            assert_eq!(provision(Memory(&mut flash[..]), pages, &record), Err(Error::Geometry));
+            assert_eq!(View::open(Memory(&flash[..]), pages).err(), Some(Error::Geometry));
+        }
+        assert_eq!(flash, [0; 1024]);
+    }
+}

@@ -1,0 +1,155 @@
+//! One pass over a page: which transactions it holds and what may follow.
+
+use embedded_storage::nor_flash::ReadNorFlash;
+
+use crate::format::{CLEAN, FIRST, HEAD, KIND_VALUE, LEFT_AT, MARK, RECORD_HEAD, WORD, padded};
+use crate::group::{Group, Health, PerGroup};
+use crate::page::{Page, Transaction};
+
+/// Where a stored value is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Slot {
+    pub(crate) page: Page,
+    /// The transaction that holds it.
+    pub(crate) transaction: u32,
+    /// Its first byte.
+    pub(crate) data: u32,
+    pub(crate) version: u16,
+    pub(crate) len: u32,
+}
+
+/// What the records say of a group; the last one counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Content {
+    #[default]
+    Unnamed,
+    Restored,
+    Value(Slot),
+}
+
+/// A group as read.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Entry {
+    pub(crate) content: Content,
+    /// A damaged transaction came later and may have named the group.
+    pub(crate) suspect: bool,
+}
+
+impl Entry {
+    pub(crate) fn health(&self) -> Health {
+        match (self.suspect, self.content) {
+            (false, _) => Health::Good,
+            (true, Content::Unnamed) => Health::Lost,
+            (true, _) => Health::FellBack,
+        }
+    }
+}
+
+/// A page as read.
+#[derive(Clone, Copy, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "independent facts about a page, not states of one")]
+pub(crate) struct Scan {
+    pub(crate) page: Page,
+    /// Which use of a page this is, counted over both; `None` when it holds no complete transaction.
+    pub(crate) generation: Option<u16>,
+    /// One of the transactions is closed, so the page was certainly taken into use.
+    pub(crate) established: bool,
+    /// The store has moved on to the other page.
+    pub(crate) left: bool,
+    /// Erased to the end and not written since.
+    pub(crate) clean: bool,
+    /// Nothing but closed transactions and erased words: the page may be appended to.
+    pub(crate) tidy: bool,
+    /// Where the last complete transaction ends.
+    pub(crate) end: u32,
+    pub(crate) groups: PerGroup<Entry>,
+}
+
+impl Scan {
+    pub(crate) fn of<F: ReadNorFlash>(flash: &mut F, page: Page) -> Result<Scan, F::Error> {
+        let mut scan = Scan {
+            page,
+            generation: None,
+            established: false,
+            left: page.word(flash, LEFT_AT)? == MARK,
+            clean: page.word(flash, 0)? == CLEAN && page.erased_from(flash, WORD)?,
+            tidy: true,
+            end: FIRST,
+            groups: PerGroup::default(),
+        };
+        scan.transactions(flash)?;
+        scan.rest(flash)?;
+        Ok(scan)
+    }
+
+    /// Takes every complete transaction. Transactions are contiguous, so one that does not begin where the last ended
+    /// has something damaged before it.
+    fn transactions<F: ReadNorFlash>(&mut self, flash: &mut F) -> Result<(), F::Error> {
+        let mut at = FIRST;
+        while at < self.page.size {
+            let Some(transaction) = self.page.transaction(flash, at)? else {
+                at += WORD;
+                continue;
+            };
+            if at != self.end {
+                self.damaged();
+            }
+            self.take(flash, &transaction)?;
+            at = transaction.end();
+        }
+        Ok(())
+    }
+
+    fn take<F: ReadNorFlash>(&mut self, flash: &mut F, transaction: &Transaction) -> Result<(), F::Error> {
+        self.generation = Some(transaction.generation);
+        self.established |= transaction.closed;
+        self.tidy &= transaction.closed;
+        self.end = transaction.end();
+        let mut at = transaction.at + HEAD;
+        while at + RECORD_HEAD <= transaction.records_end {
+            at = self.take_record(flash, transaction, at)?;
+        }
+        Ok(())
+    }
+
+    /// Takes the record at `at` and returns where the next one is.
+    fn take_record<F: ReadNorFlash>(
+        &mut self,
+        flash: &mut F,
+        transaction: &Transaction,
+        at: u32,
+    ) -> Result<u32, F::Error> {
+        let [id, kind, low, high] = self.page.word(flash, at)?.to_le_bytes();
+        let len = self.page.word(flash, at + WORD)?;
+        let (data, version) = (at + RECORD_HEAD, u16::from_le_bytes([low, high]));
+        if len > transaction.records_end - data {
+            return Ok(transaction.records_end);
+        }
+        let slot = Slot { page: self.page, transaction: transaction.at, data, version, len };
+        let content = if kind == KIND_VALUE { Content::Value(slot) } else { Content::Restored };
+        if let Some(group) = Group::from_id(id) {
+            *self.groups.get_mut(group) = Entry { content, suspect: false };
+        }
+        Ok(data + padded(len))
+    }
+
+    /// Judges what follows the last complete transaction: erased, a save that was cut, or damage.
+    fn rest<F: ReadNorFlash>(&mut self, flash: &mut F) -> Result<(), F::Error> {
+        if self.page.erased_from(flash, self.end)? {
+            return Ok(());
+        }
+        self.tidy = false;
+        let reach = self.page.reach_of_a_cut(flash, self.end)?;
+        let foreign = self.generation.is_none() && self.page.word(flash, 0)? != CLEAN;
+        if foreign || !self.page.erased_from(flash, reach)? {
+            self.damaged();
+        }
+        Ok(())
+    }
+
+    /// Notes that a transaction at this place cannot be read: any group may have been in it.
+    fn damaged(&mut self) {
+        self.tidy = false;
+        self.groups.iter_mut().for_each(|entry| entry.suspect = true);
+    }
+}

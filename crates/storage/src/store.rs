@@ -1,0 +1,186 @@
+//! Saving: transactions, the move to the other page, and the erase at start-up.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use crate::device::DeviceRecord;
+use crate::error::Error;
+use crate::format::{CLEAN, FIRST, LEFT_AT, MARK, WORD};
+use crate::group::{Change, Group, Health, Loaded, PerGroup};
+use crate::page::{Page, Pages};
+use crate::scan::Scan;
+use crate::view::View;
+use crate::writer::{Record, Records, Writer, size};
+
+/// The longest value of a group in bytes. Four of them fit a page of 16 KiB.
+pub const MAX_VALUE: usize = 2048;
+
+/// The parameter store. One owner; every call leaves the flash in a state that survives a power cut.
+#[derive(Debug)]
+pub struct Store<F> {
+    view: View<F>,
+}
+
+impl<F: NorFlash> Store<F> {
+    /// Reads both pages; nothing is written or erased.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`], [`Error::Flash`].
+    pub fn open(flash: F, pages: Pages) -> Result<Store<F>, Error<F::Error>> {
+        const { assert!((WORD as usize).is_multiple_of(F::WRITE_SIZE), "the store programs words of 32 bits") };
+        let erase_size = u32::try_from(F::ERASE_SIZE).map_err(|_| Error::Geometry)?;
+        pages.split::<F::Error>(flash.capacity(), erase_size)?;
+        Ok(Store { view: View::open(flash, pages)? })
+    }
+
+    /// Erases whatever page is not in use and not erased yet. Where the page in use has been cut or damaged, first
+    /// moves what can be read to the other page, so that nothing is ever appended to doubtful words.
+    ///
+    /// To be called at start-up, before the node goes on the bus: an erase stops a single-bank flash for 0.25 s a page,
+    /// and there can be two. Most starts erase nothing.
+    ///
+    /// # Errors
+    /// [`Error::Flash`]; [`Error::Corrupt`] when a page does not erase or does not take what is programmed.
+    pub fn prepare(&mut self) -> Result<(), Error<F::Error>> {
+        let Scan { page, generation, clean, .. } = *self.current();
+        if generation.is_none() && !clean {
+            self.erase(page)?;
+        }
+        if !self.other().clean {
+            self.erase(self.other().page)?;
+        }
+        if generation.is_some() && (!self.current().tidy || self.current().left) {
+            self.move_on(&self.kept())?;
+            self.erase(self.other().page)?;
+        }
+        Ok(())
+    }
+
+    /// Makes all `changes` or none. Of several changes to one group the last counts. Only programs words, about 16 us
+    /// each, and never erases.
+    ///
+    /// # Errors
+    /// [`Error::TooLong`] and [`Error::RestartNeeded`]: nothing was changed. [`Error::Flash`] and [`Error::Corrupt`]: the
+    /// flash did not do what it was told; the groups are as [`Store::load`] says, all old or all new.
+    pub fn save(&mut self, changes: &[Change<'_>]) -> Result<(), Error<F::Error>> {
+        if changes.is_empty() {
+            return Ok(());
+        }
+        let too_long =
+            |change: &Change<'_>| matches!(change, Change::Set { value, .. } if value.len() > MAX_VALUE);
+        let new = PerGroup::from_fn(|group| last_change(changes, group));
+        let whole = PerGroup::from_fn(|group| new.get(group).or(*self.kept().get(group)));
+        // What a page could not hold alone could never be moved, so it is refused while there is still room for it.
+        if changes.iter().any(too_long) || size(&whole) > self.current().page.room() {
+            return Err(Error::TooLong);
+        }
+        if self.can_append(size(&new)) {
+            self.append(&new)
+        } else if self.other().clean {
+            self.move_on(&whole)
+        } else {
+            Err(Error::RestartNeeded)
+        }
+    }
+
+    /// As [`View::load`].
+    ///
+    /// # Errors
+    /// As [`View::load`].
+    pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+        self.view.load(group, buf)
+    }
+
+    /// As [`View::device`].
+    ///
+    /// # Errors
+    /// As [`View::load`].
+    pub fn device(&mut self) -> Result<Option<DeviceRecord>, Error<F::Error>> {
+        self.view.device()
+    }
+
+    /// As [`View::health`]: what `open` found, also after `prepare` has mended it.
+    #[must_use]
+    pub fn health(&self, group: Group) -> Health {
+        self.view.health(group)
+    }
+
+    /// Gives the flash back.
+    #[must_use]
+    pub fn into_flash(self) -> F {
+        self.view.into_flash()
+    }
+
+    fn current(&self) -> &Scan {
+        &self.view.state.current
+    }
+
+    fn other(&self) -> &Scan {
+        &self.view.state.other
+    }
+
+    /// A record for every group as it is.
+    fn kept(&self) -> Records<'static> {
+        PerGroup::from_fn(|group| Some(Record::from(self.view.state.groups.get(group).content)))
+    }
+
+    fn can_append(&self, size: u32) -> bool {
+        let Scan { page, generation, left, tidy, end, .. } = self.current();
+        generation.is_some() && *tidy && !left && end + size <= page.size
+    }
+
+    fn append(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
+        let Scan { page, end, generation, .. } = *self.current();
+        self.write(page, end, generation.unwrap_or(0), records)
+    }
+
+    /// Writes the records, which name every group, as the first transaction of the other page. From its commit on that
+    /// page counts.
+    fn move_on(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
+        self.verify_kept(records)?;
+        let old = *self.current();
+        let generation = old.generation.map_or(0, |generation| generation.wrapping_add(1));
+        self.write(self.other().page, FIRST, generation, records)?;
+        if old.generation.is_none() || old.left {
+            return Ok(());
+        }
+        Writer::new(&mut self.view.flash, old.page, LEFT_AT).program(MARK)
+    }
+
+    /// A value that has decayed since it was read must not get a new CRC.
+    fn verify_kept(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
+        for (_, record) in records.iter() {
+            if let Some(Record::Kept(slot)) = record {
+                self.view.verify(slot)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a transaction, then reads the pages again: what the store knows is always what the flash says.
+    fn write(
+        &mut self,
+        page: Page,
+        at: u32,
+        generation: u16,
+        records: &Records<'_>,
+    ) -> Result<(), Error<F::Error>> {
+        let written = Writer::new(&mut self.view.flash, page, at).transaction(generation, records);
+        self.view.refresh()?;
+        written?;
+        let Scan { page: current, end, tidy, .. } = *self.current();
+        if current == page && end == at + size(records) && tidy { Ok(()) } else { Err(Error::Corrupt) }
+    }
+
+    /// Erases a page and marks it clean; without the mark the erase may have been cut.
+    fn erase(&mut self, page: Page) -> Result<(), Error<F::Error>> {
+        self.view.flash.erase(page.start, page.start + page.size)?;
+        Writer::new(&mut self.view.flash, page, 0).program(CLEAN)?;
+        self.view.refresh()?;
+        let clean = [self.current(), self.other()].into_iter().any(|scan| scan.page == page && scan.clean);
+        if clean { Ok(()) } else { Err(Error::Corrupt) }
+    }
+}
+
+fn last_change<'a>(changes: &[Change<'a>], group: Group) -> Option<Record<'a>> {
+    changes.iter().rev().find(|change| change.group() == group).map(|&change| Record::from(change))
+}

@@ -1,0 +1,148 @@
+//! Reading: which page counts, and what it says of each group.
+
+use embedded_storage::nor_flash::ReadNorFlash;
+
+use crate::device::DeviceRecord;
+use crate::error::Error;
+use crate::format::WORD;
+use crate::group::{Group, Health, Loaded, PerGroup};
+use crate::page::Pages;
+use crate::scan::{Content, Entry, Scan, Slot};
+
+/// The store as start-up code and host tools see it: read only.
+#[derive(Debug)]
+pub struct View<F> {
+    pub(crate) flash: F,
+    pages: Pages,
+    pub(crate) state: State,
+    health: PerGroup<Health>,
+}
+
+/// What both pages say together.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State {
+    /// The page in use; when `generation` is `None` no page is in use.
+    pub(crate) current: Scan,
+    pub(crate) other: Scan,
+    pub(crate) groups: PerGroup<Entry>,
+}
+
+impl<F: ReadNorFlash> View<F> {
+    /// Reads both pages. Nothing is written.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] when the pages do not fit the flash, [`Error::Flash`] when it cannot be read. Whatever the
+    /// pages hold is no error: see [`View::health`].
+    pub fn open(mut flash: F, pages: Pages) -> Result<View<F>, Error<F::Error>> {
+        const { assert!((WORD as usize).is_multiple_of(F::READ_SIZE), "the store reads words of 32 bits") };
+        let state = State::read(&mut flash, pages)?;
+        let health = PerGroup::from_fn(|group| state.groups.get(group).health());
+        Ok(View { flash, pages, state, health })
+    }
+
+    /// Puts the value of a group at the beginning of `buf`; `None` when there is none and the caller's defaults hold.
+    /// The value is checked once more against its transaction's CRC-32.
+    ///
+    /// # Errors
+    /// [`Error::BufferTooSmall`]; [`Error::Corrupt`] when the flash has changed since it was opened;
+    /// [`Error::Flash`]. After an error the content of `buf` has no meaning.
+    pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+        let Content::Value(slot) = self.state.groups.get(group).content else { return Ok(None) };
+        let len = slot.len as usize;
+        let target = buf.get_mut(..len).ok_or(Error::BufferTooSmall)?;
+        self.verify(&slot)?;
+        slot.page.bytes(&mut self.flash, slot.data, target)?;
+        Ok(Some(Loaded { version: slot.version, len }))
+    }
+
+    /// The device record; `None` when none is stored or it is of a layout that this program does not know.
+    ///
+    /// # Errors
+    /// As [`View::load`].
+    pub fn device(&mut self) -> Result<Option<DeviceRecord>, Error<F::Error>> {
+        let mut buf = [0; DeviceRecord::LEN];
+        match self.load(Group::Device, &mut buf) {
+            Ok(Some(loaded)) => {
+                Ok(buf.get(..loaded.len).and_then(|value| DeviceRecord::decode(loaded.version, value)))
+            }
+            Ok(None) | Err(Error::BufferTooSmall) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// How far the stored state of a group could be trusted when the store was opened.
+    #[must_use]
+    pub fn health(&self, group: Group) -> Health {
+        *self.health.get(group)
+    }
+
+    /// Gives the flash back.
+    #[must_use]
+    pub fn into_flash(self) -> F {
+        self.flash
+    }
+
+    /// Checks the transaction of a value again.
+    pub(crate) fn verify(&mut self, slot: &Slot) -> Result<(), Error<F::Error>> {
+        match slot.page.transaction(&mut self.flash, slot.transaction)? {
+            Some(_) => Ok(()),
+            None => Err(Error::Corrupt),
+        }
+    }
+
+    /// Reads both pages again after one has been written.
+    pub(crate) fn refresh(&mut self) -> Result<(), Error<F::Error>> {
+        self.state = State::read(&mut self.flash, self.pages)?;
+        Ok(())
+    }
+}
+
+impl State {
+    fn read<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Result<State, Error<F::Error>> {
+        let [first, second] = pages.split(flash.capacity(), WORD)?;
+        let (current, other) = arrange(Scan::of(flash, first)?, Scan::of(flash, second)?);
+        let groups = PerGroup::from_fn(|group| merge(&current, &other, group));
+        Ok(State { current, other, groups })
+    }
+}
+
+/// The page in use first. A page whose only transaction is not closed was cut while it took over, and the commit word
+/// may read differently next time: the other page, still whole, goes on counting, unless it says that it was left.
+fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
+    let (newer, older) = match (a.generation, b.generation) {
+        (_, None) => return (a, b),
+        (None, _) => return (b, a),
+        (Some(x), Some(y)) if follows(x, y) => (a, b),
+        (Some(_), Some(_)) => (b, a),
+    };
+    if newer.established || older.left { (newer, older) } else { (older, newer) }
+}
+
+/// Whether generation `x` comes after `y`. They are never far apart, so this holds across the wrap.
+fn follows(x: u16, y: u16) -> bool {
+    x != y && x.wrapping_sub(y) < 0x8000
+}
+
+/// The state of a group. The page in use names every group, so the other one counts only where damage has left a gap.
+/// A page in use that says it was left means that its successor cannot be read.
+fn merge(current: &Scan, other: &Scan, group: Group) -> Entry {
+    let (mine, theirs) = (*current.groups.get(group), *other.groups.get(group));
+    let unused = current.generation.is_none();
+    let suspect = mine.suspect || current.left || (unused && theirs.suspect);
+    let gap = suspect && mine.content == Content::Unnamed;
+    Entry { content: if gap { theirs.content } else { mine.content }, suspect }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn generations_are_ordered_across_the_wrap() {
+        for x in [0, 1, 0x7FFF, 0x8000, u16::MAX] {
+            assert!(follows(x.wrapping_add(1), x));
+            assert!(!follows(x, x.wrapping_add(1)));
+            assert!(!follows(x, x));
+        }
+    }
+}
