@@ -1,0 +1,3 @@
+//! The lift application profile, CiA 417.
+
+pub mod catalogue;
