@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "mock"))]
 extern crate std;
 
 mod device;
@@ -11,6 +11,8 @@ mod error;
 mod format;
 mod group;
 mod memory;
+#[cfg(feature = "mock")]
+pub mod mock;
 mod page;
 mod provision;
 mod scan;

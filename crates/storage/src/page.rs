@@ -21,13 +21,13 @@ impl Pages {
 
     /// The two pages, if a flash of `capacity` bytes that is erased in units of `erase_size` can hold them. The store
     /// takes pages of 64 bytes to 128 KiB, the largest sector of the chip.
-    pub(crate) fn split<E>(self, capacity: usize, erase_size: u32) -> Result<[Page; 2], Error<E>> {
+    pub(crate) fn split<E>(self, capacity: usize, erase_size: usize) -> Result<[Page; 2], Error<E>> {
         let Pages { start, size } = self;
         let second = start.checked_add(size).ok_or(Error::Geometry)?;
         let end = second.checked_add(size).and_then(|end| usize::try_from(end).ok());
-        let aligned = start.is_multiple_of(erase_size) && size.is_multiple_of(erase_size);
+        let is_aligned = |at: u32| usize::try_from(at).is_ok_and(|at| at.is_multiple_of(erase_size));
         let fits = end.is_some_and(|end| end <= capacity);
-        if !aligned || !fits || !(64..=128 * 1024).contains(&size) {
+        if !is_aligned(start) || !is_aligned(size) || !fits || !(64..=128 * 1024).contains(&size) {
             return Err(Error::Geometry);
         }
         Ok([Page { start, size }, Page { start: second, size }])

@@ -13,18 +13,16 @@ use crate::view::View;
 /// Erases both pages, whatever they hold, and stores a device record.
 ///
 /// # Errors
-/// As [`Store::open`], [`Store::prepare`] and [`Store::save`].
+/// As [`View::open`], [`Store::prepare`] and [`Store::save`].
 pub fn provision<F: NorFlash>(
     mut flash: F,
     pages: Pages,
     record: &DeviceRecord,
 ) -> Result<(), Error<F::Error>> {
-    let erase_size = u32::try_from(F::ERASE_SIZE).map_err(|_| Error::Geometry)?;
-    for page in pages.split::<F::Error>(flash.capacity(), erase_size)? {
+    for page in pages.split::<F::Error>(flash.capacity(), F::ERASE_SIZE)? {
         flash.erase(page.start, page.start + page.size)?;
     }
-    let mut store = Store::open(flash, pages)?;
-    store.prepare()?;
+    let mut store = Store::prepare(View::open(flash, pages)?)?;
     let value = &record.encode();
     store.save(&[Change::Set { group: Group::Device, version: DeviceRecord::VERSION, value }])
 }

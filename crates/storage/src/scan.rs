@@ -45,15 +45,23 @@ impl Entry {
     }
 }
 
+/// The first transaction of a page, with which the page takes over from the other one. It names every group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum First {
+    /// There is none, or it cannot be read.
+    Missing,
+    /// Complete but not closed: the power may have been cut at the commit word, which then reads well only by chance.
+    Open,
+    Closed,
+}
+
 /// A page as read.
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "independent facts about a page, not states of one")]
 pub(crate) struct Scan {
     pub(crate) page: Page,
     /// Which use of a page this is, counted over both; `None` when it holds no complete transaction.
     pub(crate) generation: Option<u16>,
-    /// One of the transactions is closed, so the page was certainly taken into use.
-    pub(crate) established: bool,
+    pub(crate) first: First,
     /// The store has moved on to the other page.
     pub(crate) left: bool,
     /// Erased to the end and not written since.
@@ -70,7 +78,7 @@ impl Scan {
         let mut scan = Scan {
             page,
             generation: None,
-            established: false,
+            first: First::Missing,
             left: page.word(flash, LEFT_AT)? == MARK,
             clean: page.word(flash, 0)? == CLEAN && page.erased_from(flash, WORD)?,
             tidy: true,
@@ -80,6 +88,11 @@ impl Scan {
         scan.transactions(flash)?;
         scan.rest(flash)?;
         Ok(scan)
+    }
+
+    /// Whether a transaction may be appended, if there is room.
+    pub(crate) fn can_grow(&self) -> bool {
+        self.tidy && !self.left
     }
 
     /// Takes every complete transaction. Transactions are contiguous, so one that does not begin where the last ended
@@ -102,7 +115,9 @@ impl Scan {
 
     fn take<F: ReadNorFlash>(&mut self, flash: &mut F, transaction: &Transaction) -> Result<(), F::Error> {
         self.generation = Some(transaction.generation);
-        self.established |= transaction.closed;
+        if transaction.at == FIRST {
+            self.first = if transaction.closed { First::Closed } else { First::Open };
+        }
         self.tidy &= transaction.closed;
         self.end = transaction.end();
         let mut at = transaction.at + HEAD;

@@ -6,7 +6,7 @@ use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::{CLEAN, FIRST, LEFT_AT, MARK, WORD};
 use crate::group::{Change, Group, Health, Loaded, PerGroup};
-use crate::page::{Page, Pages};
+use crate::page::Page;
 use crate::scan::Scan;
 use crate::view::View;
 use crate::writer::{Record, Records, Writer, size};
@@ -21,38 +21,32 @@ pub struct Store<F> {
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Reads both pages; nothing is written or erased.
+    /// Makes the store ready for saving: erases whatever page is not in use and not erased yet. Where the page in use
+    /// was cut or damaged, first moves what can be read to the other page, so that nothing is ever appended to doubtful
+    /// words, and what this start has read holds for good.
+    ///
+    /// To be called at start-up, before the node goes on the bus: an erase of 16 KiB stops a single-bank flash for
+    /// 0.25 s, and there can be two. Most starts erase nothing.
     ///
     /// # Errors
-    /// [`Error::Geometry`], [`Error::Flash`].
-    pub fn open(flash: F, pages: Pages) -> Result<Store<F>, Error<F::Error>> {
+    /// [`Error::Flash`]; [`Error::Corrupt`] when a page does not erase or does not take what is programmed;
+    /// [`Error::Geometry`] when the flash cannot erase the pages one by one.
+    pub fn prepare(view: View<F>) -> Result<Store<F>, Error<F::Error>> {
         const { assert!((WORD as usize).is_multiple_of(F::WRITE_SIZE), "the store programs words of 32 bits") };
-        let erase_size = u32::try_from(F::ERASE_SIZE).map_err(|_| Error::Geometry)?;
-        pages.split::<F::Error>(flash.capacity(), erase_size)?;
-        Ok(Store { view: View::open(flash, pages)? })
-    }
-
-    /// Erases whatever page is not in use and not erased yet. Where the page in use has been cut or damaged, first
-    /// moves what can be read to the other page, so that nothing is ever appended to doubtful words.
-    ///
-    /// To be called at start-up, before the node goes on the bus: an erase stops a single-bank flash for 0.25 s a page,
-    /// and there can be two. Most starts erase nothing.
-    ///
-    /// # Errors
-    /// [`Error::Flash`]; [`Error::Corrupt`] when a page does not erase or does not take what is programmed.
-    pub fn prepare(&mut self) -> Result<(), Error<F::Error>> {
-        let Scan { page, generation, clean, .. } = *self.current();
+        view.pages.split::<F::Error>(view.flash.capacity(), F::ERASE_SIZE)?;
+        let mut store = Store { view };
+        let Scan { page, generation, clean, .. } = *store.current();
         if generation.is_none() && !clean {
-            self.erase(page)?;
+            store.erase(page)?;
         }
-        if !self.other().clean {
-            self.erase(self.other().page)?;
+        if !store.other().clean {
+            store.erase(store.other().page)?;
         }
-        if generation.is_some() && (!self.current().tidy || self.current().left) {
-            self.move_on(&self.kept())?;
-            self.erase(self.other().page)?;
+        if generation.is_some() && !store.current().can_grow() {
+            store.move_on(&store.kept())?;
+            store.erase(store.other().page)?;
         }
-        Ok(())
+        Ok(store)
     }
 
     /// Makes all `changes` or none. Of several changes to one group the last counts. Only programs words, about 16 us
@@ -98,7 +92,7 @@ impl<F: NorFlash> Store<F> {
         self.view.device()
     }
 
-    /// As [`View::health`]: what `open` found, also after `prepare` has mended it.
+    /// As [`View::health`]: what the view found, also after `prepare` has mended it.
     #[must_use]
     pub fn health(&self, group: Group) -> Health {
         self.view.health(group)
@@ -124,8 +118,8 @@ impl<F: NorFlash> Store<F> {
     }
 
     fn can_append(&self, size: u32) -> bool {
-        let Scan { page, generation, left, tidy, end, .. } = self.current();
-        generation.is_some() && *tidy && !left && end + size <= page.size
+        let scan = self.current();
+        scan.generation.is_some() && scan.can_grow() && scan.end + size <= scan.page.size
     }
 
     fn append(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {

@@ -7,13 +7,13 @@ use crate::error::Error;
 use crate::format::WORD;
 use crate::group::{Group, Health, Loaded, PerGroup};
 use crate::page::Pages;
-use crate::scan::{Content, Entry, Scan, Slot};
+use crate::scan::{Content, Entry, First, Scan, Slot};
 
 /// The store as start-up code and host tools see it: read only.
 #[derive(Debug)]
 pub struct View<F> {
     pub(crate) flash: F,
-    pages: Pages,
+    pub(crate) pages: Pages,
     pub(crate) state: State,
     health: PerGroup<Health>,
 }
@@ -99,15 +99,14 @@ impl<F: ReadNorFlash> View<F> {
 
 impl State {
     fn read<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Result<State, Error<F::Error>> {
-        let [first, second] = pages.split(flash.capacity(), WORD)?;
+        let [first, second] = pages.split(flash.capacity(), WORD as usize)?;
         let (current, other) = arrange(Scan::of(flash, first)?, Scan::of(flash, second)?);
         let groups = PerGroup::from_fn(|group| merge(&current, &other, group));
         Ok(State { current, other, groups })
     }
 }
 
-/// The page in use first. A page whose only transaction is not closed was cut while it took over, and the commit word
-/// may read differently next time: the other page, still whole, goes on counting, unless it says that it was left.
+/// The page in use first: the newer one, unless it cannot be relied on and the older one is still there.
 fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
     let (newer, older) = match (a.generation, b.generation) {
         (_, None) => return (a, b),
@@ -115,7 +114,12 @@ fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
         (Some(x), Some(y)) if follows(x, y) => (a, b),
         (Some(_), Some(_)) => (b, a),
     };
-    if newer.established || older.left { (newer, older) } else { (older, newer) }
+    let took_over = match newer.first {
+        First::Closed => true,
+        First::Open => older.left,
+        First::Missing => false,
+    };
+    if took_over { (newer, older) } else { (older, newer) }
 }
 
 /// Whether generation `x` comes after `y`. They are never far apart, so this holds across the wrap.
@@ -123,14 +127,12 @@ fn follows(x: u16, y: u16) -> bool {
     x != y && x.wrapping_sub(y) < 0x8000
 }
 
-/// The state of a group. The page in use names every group, so the other one counts only where damage has left a gap.
-/// A page in use that says it was left means that its successor cannot be read.
+/// The state of a group. A page in use that says it was left means that its successor cannot be read; with no page in
+/// use, damage in either may be all that is left of a value.
 fn merge(current: &Scan, other: &Scan, group: Group) -> Entry {
-    let (mine, theirs) = (*current.groups.get(group), *other.groups.get(group));
-    let unused = current.generation.is_none();
-    let suspect = mine.suspect || current.left || (unused && theirs.suspect);
-    let gap = suspect && mine.content == Content::Unnamed;
-    Entry { content: if gap { theirs.content } else { mine.content }, suspect }
+    let (mine, theirs) = (current.groups.get(group), other.groups.get(group));
+    let successor_lost = current.left || (current.generation.is_none() && theirs.suspect);
+    Entry { suspect: mine.suspect || successor_lost, ..*mine }
 }
 
 #[cfg(test)]

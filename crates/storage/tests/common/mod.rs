@@ -1,0 +1,139 @@
+//! The plain model that the store is compared with, and what runs both.
+#![allow(dead_code, reason = "each test file uses a part")]
+
+use storage::mock::{MockFlash, PowerCut, splitmix};
+use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};
+
+/// A version and a value, or nothing.
+pub(crate) type Value = Option<(u16, Vec<u8>)>;
+
+/// What should be stored, in the order of [`Group::ALL`].
+pub(crate) type Model = [Value; 4];
+
+/// What a save changes.
+pub(crate) type Changes = Vec<(Group, Value)>;
+
+/// Nothing stored.
+pub(crate) const EMPTY: Model = [None, None, None, None];
+
+/// One thing that a device does.
+#[derive(Clone, Debug)]
+pub(crate) enum Step {
+    /// One save.
+    Save(Changes),
+    /// Start-up: `open` and `prepare`.
+    Restart,
+}
+
+/// Sets a group to `len` bytes of noise.
+pub(crate) fn set(group: Group, version: u16, len: usize) -> (Group, Value) {
+    (group, Some((version, noise(u64::from(version), len))))
+}
+
+/// Restores the defaults of a group.
+pub(crate) fn restore(group: Group) -> (Group, Value) {
+    (group, None)
+}
+
+/// `len` bytes that look random and are the same each time.
+pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
+    (0..len as u64).map(|i| splitmix(seed << 16 ^ i).to_le_bytes()[3]).collect()
+}
+
+/// The model after a save.
+pub(crate) fn after(model: &Model, changes: &Changes) -> Model {
+    let mut model = model.clone();
+    for (group, value) in changes {
+        let place = Group::ALL.iter().position(|g| g == group).unwrap();
+        model[place].clone_from(value);
+    }
+    model
+}
+
+/// The changes as the store takes them.
+pub(crate) fn as_changes(changes: &Changes) -> Vec<Change<'_>> {
+    changes.iter().map(as_change).collect()
+}
+
+fn as_change((group, value): &(Group, Value)) -> Change<'_> {
+    match value {
+        Some((version, value)) => Change::Set { group: *group, version: *version, value },
+        None => Change::Restore(*group),
+    }
+}
+
+/// What the flash holds, and how far it is to be trusted.
+pub(crate) fn read<const ERASE: usize>(flash: &mut MockFlash<ERASE>, pages: Pages) -> (Model, [Health; 4]) {
+    let mut view = View::open(flash, pages).unwrap();
+    let value = Group::ALL.map(|group| {
+        let mut buf = [0; MAX_VALUE];
+        let loaded = view.load(group, &mut buf).unwrap()?;
+        Some((loaded.version, buf[..loaded.len].to_vec()))
+    });
+    (value, Group::ALL.map(|group| view.health(group)))
+}
+
+/// What the flash holds when nothing may be doubtful.
+pub(crate) fn read_good<const ERASE: usize>(flash: &mut MockFlash<ERASE>, pages: Pages) -> Model {
+    let (model, health) = read(flash, pages);
+    assert_eq!(health, [Health::Good; 4], "a power cut is no damage");
+    model
+}
+
+/// Opens and prepares the store and takes the steps. Returns the states that the flash may be in then: one, or two
+/// when the power was cut in a save.
+pub(crate) fn run<const ERASE: usize>(
+    flash: &mut MockFlash<ERASE>,
+    pages: Pages,
+    steps: &[Step],
+    mut model: Model,
+) -> Vec<Model> {
+    let Ok(mut store) = start(flash, pages) else { return vec![model] };
+    for step in steps {
+        match step {
+            Step::Save(changes) => match store.save(&as_changes(changes)) {
+                Ok(()) => model = after(&model, changes),
+                Err(Error::Flash(PowerCut)) => return vec![after(&model, changes), model],
+                Err(Error::RestartNeeded | Error::TooLong) => {}
+                Err(error) => panic!("{error}"),
+            },
+            Step::Restart => {
+                let flash = store.into_flash();
+                match start(flash, pages) {
+                    Ok(prepared) => store = prepared,
+                    Err(PowerCut) => return vec![model],
+                }
+            }
+        }
+    }
+    vec![model]
+}
+
+/// Start-up, unless the power is cut.
+pub(crate) fn start<const ERASE: usize>(
+    flash: &mut MockFlash<ERASE>,
+    pages: Pages,
+) -> Result<Store<&mut MockFlash<ERASE>>, PowerCut> {
+    match View::open(flash, pages).and_then(Store::prepare) {
+        Ok(store) => Ok(store),
+        Err(Error::Flash(PowerCut)) => Err(PowerCut),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Power comes back: one of the `allowed` states is read, `prepare` keeps it, and it is read ever after.
+pub(crate) fn recover<const ERASE: usize>(
+    flash: &mut MockFlash<ERASE>,
+    pages: Pages,
+    allowed: &[Model],
+) -> Model {
+    flash.power_up();
+    let model = read_good(flash, pages);
+    assert!(allowed.contains(&model), "{model:?} is neither old nor new");
+    start(flash, pages).unwrap();
+    for _ in 0..2 {
+        assert_eq!(read_good(flash, pages), model, "decided once");
+        flash.power_up();
+    }
+    model
+}

@@ -1,0 +1,118 @@
+//! The power is cut at every single operation of a long scenario, and again at every operation of the recovery.
+
+mod common;
+
+use common::{EMPTY, Model, Step, after, as_changes, noise, read_good, recover, restore, run, set, start};
+use storage::mock::{MockFlash, Weak};
+use storage::{Group, Pages};
+
+/// Small pages make page moves frequent; two erase units a page make erases that are cut between units.
+const PAGES: Pages = Pages::new(256, 256);
+type Flash = MockFlash<128>;
+
+const WAYS: [Weak; 3] = [Weak::Before, Weak::After, Weak::Random];
+
+fn flash(seed: u64) -> Flash {
+    Flash::new(1024, seed)
+}
+
+/// Saves of one and of several groups, of empty values, restores, both pages filled, and restarts that erase.
+fn scenario() -> Vec<Step> {
+    use Group::{Application, Calibration, Communication, Device};
+    let save = |changes: &[_]| Step::Save(changes.to_vec());
+    vec![
+        save(&[set(Device, 1, 4)]),
+        save(&[set(Communication, 2, 17), set(Application, 3, 30)]),
+        save(&[set(Application, 4, 31), restore(Communication)]),
+        Step::Restart,
+        save(&[set(Communication, 5, 0), set(Calibration, 6, 8), set(Device, 7, 4)]),
+        save(&[set(Application, 8, 40), set(Communication, 9, 12)]),
+        save(&[restore(Application)]),
+        save(&[set(Application, 10, 25)]),
+        Step::Restart,
+        save(&[set(Application, 11, 25), set(Communication, 12, 20)]),
+        save(&[set(Device, 13, 4)]),
+        Step::Restart,
+        Step::Restart,
+        save(&[set(Application, 14, 33), set(Device, 15, 4), restore(Calibration)]),
+        save(&[set(Application, 16, 33)]),
+    ]
+}
+
+fn operations_of(run_it: impl FnOnce(&mut Flash), flash: &Flash) -> u32 {
+    let mut flash = flash.clone();
+    let before = flash.operations();
+    run_it(&mut flash);
+    flash.operations() - before
+}
+
+#[test]
+fn without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model() {
+    let mut flash = flash(0);
+    let end = run(&mut flash, PAGES, &scenario(), EMPTY);
+    assert_eq!(vec![read_good(&mut flash, PAGES)], end);
+    assert_eq!(flash.erases()[..2], [0, 0], "nothing outside the pages is erased");
+    assert!(flash.erases()[2..6].iter().all(|&erases| erases >= 2), "{:?}", flash.erases());
+}
+
+/// Every state of flash that a cut in the scenario can leave, with the states that may be read from it.
+fn cut_everywhere(mut check: impl FnMut(Flash, Vec<Model>)) -> u32 {
+    let total = operations_of(|flash| drop(run(flash, PAGES, &scenario(), EMPTY)), &flash(0));
+    for operation in 0..total {
+        for weak in WAYS {
+            let mut flash = flash(u64::from(operation));
+            flash.cut_after(operation, weak);
+            let allowed = run(&mut flash, PAGES, &scenario(), EMPTY);
+            assert!(flash.is_down());
+            check(flash, allowed);
+        }
+    }
+    total
+}
+
+#[test]
+fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on() {
+    let mut news = 0;
+    let total = cut_everywhere(|mut flash, allowed| {
+        let model = recover(&mut flash, PAGES, &allowed);
+        news += u32::from(allowed.len() == 2 && model == allowed[0]);
+        let changes = vec![set(Group::Communication, 99, 21), restore(Group::Device)];
+        start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
+        assert_eq!(read_good(&mut flash, PAGES), after(&model, &changes));
+    });
+    assert!(news > 20, "some cuts come after the commit: {news} of {total}");
+}
+
+#[test]
+fn a_second_cut_at_any_operation_of_the_recovery_changes_nothing() {
+    let mut cuts = 0;
+    cut_everywhere(|mut first, allowed| {
+        first.power_up();
+        let recovery = operations_of(|flash| drop(start(flash, PAGES)), &first);
+        for operation in 0..recovery {
+            let mut flash = first.clone();
+            flash.cut_after(operation, WAYS[operation as usize % WAYS.len()]);
+            assert!(start(&mut flash, PAGES).is_err());
+            recover(&mut flash, PAGES, &allowed);
+            cuts += 1;
+        }
+    });
+    println!("second cuts: {cuts}");
+    assert!(cuts > 1000);
+}
+
+#[test]
+fn a_dozen_cuts_in_a_row_lose_nothing() {
+    for seed in 0..200 {
+        let mut flash = flash(seed);
+        let mut model = EMPTY;
+        for round in 0..12 {
+            let changes = vec![set(Group::Device, round, 4), set(Group::Application, round + 100, 30)];
+            let steps = [Step::Save(changes.clone()), Step::Restart, Step::Save(changes)];
+            let at = noise(seed * 100 + u64::from(round), 1)[0];
+            flash.cut_after(u32::from(at) % 60, Weak::Random);
+            let allowed = run(&mut flash, PAGES, &steps, model);
+            model = recover(&mut flash, PAGES, &allowed);
+        }
+    }
+}
