@@ -39,6 +39,20 @@ impl Frame {
         self.len
     }
 
+    /// The arbitration field as one number: of two frames on the wire the lower one wins.
+    ///
+    /// The bits are identifier, RTR, IDE for a base frame and base identifier, SRR, IDE, identifier extension, RTR
+    /// for an extended one, so base wins over extended and data over remote (ISO 11898-1:2015, 10.4.2).
+    pub fn arbitration(&self) -> u32 {
+        match self.id {
+            Id::Standard(id) => u32::from(id.as_raw()) << 21 | u32::from(self.remote) << 20,
+            Id::Extended(id) => {
+                let (base, extension) = (id.as_raw() >> 18, id.as_raw() & 0x3_FFFF);
+                base << 21 | 0b11 << 19 | extension << 1 | u32::from(self.remote)
+            }
+        }
+    }
+
     /// The data; empty for a remote frame.
     pub fn bytes(&self) -> &[u8] {
         if self.remote { &[] } else { &self.data[..usize::from(self.len)] }

@@ -1,7 +1,7 @@
 //! Virtual time shared by the bus, the emulated boards and the clients.
 
 use core::fmt;
-use core::ops::{Add, AddAssign, Sub};
+use core::ops::{Add, AddAssign, Mul, Sub};
 
 /// An instant, or a span, of virtual time: a count of 1/10080 microseconds since power-on.
 ///
@@ -73,6 +73,13 @@ impl Sub for Time {
     type Output = Time;
     fn sub(self, other: Time) -> Time {
         self.since(other)
+    }
+}
+
+impl Mul<u64> for Time {
+    type Output = Time;
+    fn mul(self, times: u64) -> Time {
+        Time(self.0.saturating_mul(times))
     }
 }
 

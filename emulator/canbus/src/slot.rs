@@ -1,0 +1,200 @@
+//! The time from a start of frame to the end of its intermission: its course is worked out at the start of frame
+//! and told to the participants as it comes true.
+
+use std::collections::VecDeque;
+
+use crate::bits::encode;
+use crate::faults::{Flip, SeenBy};
+use crate::station::Notice;
+use crate::wire::{Course, Happening, Tap, run};
+use crate::{Attachment, BusError, Controller, ErrorReport, Event, Frame, Time};
+
+/// A participant that begins a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contender {
+    pub(crate) participant: usize,
+    pub(crate) bit: Time,
+    pub(crate) frame: Frame,
+}
+
+#[derive(Debug)]
+pub(crate) struct Slot {
+    start: Time,
+    winner: Contender,
+    transmitters: Vec<usize>,
+    agenda: VecDeque<(Time, Item)>,
+    recessive: Time,
+    end: Time,
+}
+
+#[derive(Debug)]
+enum Item {
+    Notice { to: Vec<usize>, notice: Notice },
+    Log(Event),
+}
+
+impl Slot {
+    /// What becomes of the frames that `contenders` begin at `start`; `None` without any. `flips` gives the bit
+    /// errors of a frame of that many bits.
+    pub(crate) fn plan(
+        start: Time,
+        contenders: &[Contender],
+        attachments: &[Attachment],
+        flips: &mut dyn FnMut(usize) -> Vec<Flip>,
+    ) -> Option<Slot> {
+        let winner = *contenders.iter().min_by_key(|contender| contender.frame.arbitration())?;
+        let flips = flips(encode(&winner.frame).len());
+        let mut taps = taps(contenders, attachments, winner.bit, &flips);
+        let course = run(&mut taps, start, winner.bit, &flips);
+        let key = winner.frame.arbitration();
+        let transmitters = contenders.iter().filter(|contender| contender.frame.arbitration() == key);
+        let mut slot = Slot {
+            start,
+            winner,
+            transmitters: transmitters.map(|contender| contender.participant).collect(),
+            agenda: VecDeque::new(),
+            recessive: course.recessive,
+            end: course.end,
+        };
+        slot.agenda = slot.agenda(&taps, &course);
+        Some(slot)
+    }
+
+    pub(crate) fn start(&self) -> Time {
+        self.start
+    }
+
+    /// The end of the intermission.
+    pub(crate) fn end(&self) -> Time {
+        self.end
+    }
+
+    /// When the last dominant bit ends.
+    pub(crate) fn recessive(&self) -> Time {
+        self.recessive
+    }
+
+    /// The length of a bit of the frame.
+    pub(crate) fn bit(&self) -> Time {
+        self.winner.bit
+    }
+
+    /// Those who won the arbitration: one, unless several sent the same identifier.
+    pub(crate) fn transmitters(&self) -> &[usize] {
+        &self.transmitters
+    }
+
+    /// When the next thing happens.
+    pub(crate) fn next(&self) -> Time {
+        self.agenda.front().map_or(self.end, |(at, _)| *at)
+    }
+
+    /// Tells the next thing that happens; `false` when nothing is left.
+    pub(crate) fn proceed(
+        &mut self,
+        participants: &mut [&mut dyn Controller],
+        log: &mut dyn FnMut(Event),
+    ) -> bool {
+        let Some((at, item)) = self.agenda.pop_front() else { return false };
+        let abandoned = self.is_abandoned(participants, at);
+        match item {
+            Item::Notice { to, notice } => {
+                let notice = if abandoned { cut_short(notice) } else { notice };
+                for participant in to {
+                    tell(participants, participant, &notice, at);
+                }
+            }
+            Item::Log(Event::Frame { .. }) if abandoned => log(self.error_event(BusError::Stuff, at)),
+            Item::Log(event) => log(event),
+        }
+        true
+    }
+
+    /// Whether nobody sends any more, because of a reset or a power cut in the middle of the frame.
+    fn is_abandoned(&self, participants: &mut [&mut dyn Controller], at: Time) -> bool {
+        self.transmitters
+            .iter()
+            .all(|n| participants.get_mut(*n).is_none_or(|sender| sender.attachment(at) == Attachment::Off))
+    }
+
+    fn agenda(&self, taps: &[Tap], course: &Course) -> VecDeque<(Time, Item)> {
+        let notices = course.happenings.iter().map(|happening| {
+            let to = taps[happening.tap].members.clone();
+            (happening.at, Item::Notice { to, notice: happening.notice })
+        });
+        let events = self.frame_event(course).into_iter().chain(self.failure(taps, course));
+        let mut agenda: Vec<_> = notices.chain(events.map(|(at, event)| (at, Item::Log(event)))).collect();
+        agenda.sort_by_key(|(at, _)| *at);
+        agenda.into()
+    }
+
+    /// The frame was sent, or at least somebody has received it.
+    fn frame_event(&self, course: &Course) -> Option<(Time, Event)> {
+        let find =
+            |test: fn(&Notice) -> bool| course.happenings.iter().find(|h| test(&h.notice)).map(|h| h.at);
+        let sent = find(|notice| matches!(notice, Notice::Sent));
+        let end = sent.or_else(|| find(|notice| matches!(notice, Notice::Received(_))))?;
+        let Contender { frame, participant: transmitter, .. } = self.winner;
+        Some((end, Event::Frame { start: self.start, end, frame, transmitter }))
+    }
+
+    /// What kept the transmitter from sending it.
+    fn failure(&self, taps: &[Tap], course: &Course) -> Option<(Time, Event)> {
+        course.happenings.iter().find_map(|Happening { at, tap, notice }| match notice {
+            Notice::Error(report) if taps[*tap].members.contains(&self.winner.participant) => {
+                Some((*at, self.error_event(report.error, *at)))
+            }
+            _ => None,
+        })
+    }
+
+    fn error_event(&self, error: BusError, end: Time) -> Event {
+        let Contender { frame, participant: transmitter, .. } = self.winner;
+        Event::Error { start: self.start, end, frame, error, transmitter }
+    }
+}
+
+/// One tap for each contender and each victim of a bit error; one for all listeners that are alike.
+fn taps(contenders: &[Contender], attachments: &[Attachment], bit: Time, flips: &[Flip]) -> Vec<Tap> {
+    let mut taps: Vec<Tap> = Vec::new();
+    for (n, attachment) in attachments.iter().enumerate() {
+        let Some(own) = attachment.bit().map(|own| locked(own, bit)) else { continue };
+        let contender = contenders.iter().find(|contender| contender.participant == n);
+        let unlike = contender.is_some() || flips.iter().any(|flip| flip.seen_by == SeenBy::Participant(n));
+        match taps.iter_mut().find(|tap| !unlike && tap.attachment == Some(*attachment)) {
+            Some(tap) => tap.members.push(n),
+            None => {
+                taps.push(Tap::new(n, *attachment, own, contender.map(|contender| &contender.frame), unlike))
+            }
+        }
+    }
+    taps
+}
+
+/// Within about one per cent resynchronisation keeps a receiver in step with the transmitter.
+fn locked(own: Time, transmitter: Time) -> Time {
+    if own.0.abs_diff(transmitter.0) * 100 <= transmitter.0 { transmitter } else { own }
+}
+
+fn tell(participants: &mut [&mut dyn Controller], n: usize, notice: &Notice, at: Time) {
+    let Some(participant) = participants.get_mut(n) else { return };
+    match notice {
+        Notice::Lost => participant.lost(at),
+        Notice::Sent => participant.sent(at),
+        Notice::Received(frame) => participant.received(frame, at),
+        Notice::Error(report) => participant.error(report, at),
+    }
+}
+
+/// What receivers make of a frame that stops in the middle: six recessive bits.
+fn cut_short(notice: Notice) -> Notice {
+    match notice {
+        Notice::Received(_) => Notice::Error(ErrorReport {
+            error: BusError::Stuff,
+            transmitting: false,
+            dominant_in_flag: 0,
+            dominant_after_flag: 0,
+        }),
+        other => other,
+    }
+}
