@@ -33,18 +33,17 @@ impl<F: NorFlash> Store<F> {
     /// [`Error::Geometry`] when the flash cannot erase the pages one by one.
     pub fn prepare(view: View<F>) -> Result<Store<F>, Error<F::Error>> {
         const { assert!((WORD as usize).is_multiple_of(F::WRITE_SIZE), "the store programs words of 32 bits") };
-        view.pages.split::<F::Error>(view.flash.capacity(), F::ERASE_SIZE)?;
+        let pages = view.pages.split(view.flash.capacity(), F::ERASE_SIZE)?;
         let mut store = Store { view };
-        let Scan { page, generation, clean, .. } = *store.current();
-        if generation.is_none() && !clean {
-            store.erase(page)?;
+        for page in pages {
+            if store.is_spare(page) && !store.is_clean(page) {
+                store.erase(page)?;
+            }
         }
-        if !store.other().clean {
-            store.erase(store.other().page)?;
-        }
-        if generation.is_some() && !store.current().can_grow() {
+        let old = *store.current();
+        if old.generation.is_some() && !old.can_grow() {
             store.move_on(&store.kept())?;
-            store.erase(store.other().page)?;
+            store.erase(old.page)?;
         }
         Ok(store)
     }
@@ -112,6 +111,14 @@ impl<F: NorFlash> Store<F> {
         &self.view.state.other
     }
 
+    fn is_spare(&self, page: Page) -> bool {
+        self.current().page != page || self.current().generation.is_none()
+    }
+
+    fn is_clean(&self, page: Page) -> bool {
+        [self.current(), self.other()].into_iter().any(|scan| scan.page == page && scan.clean)
+    }
+
     /// A record for every group as it is.
     fn kept(&self) -> Records<'static> {
         PerGroup::from_fn(|group| Some(Record::from(self.view.state.groups.get(group).content)))
@@ -170,8 +177,7 @@ impl<F: NorFlash> Store<F> {
         self.view.flash.erase(page.start, page.start + page.size)?;
         Writer::new(&mut self.view.flash, page, 0).program(CLEAN)?;
         self.view.refresh()?;
-        let clean = [self.current(), self.other()].into_iter().any(|scan| scan.page == page && scan.clean);
-        if clean { Ok(()) } else { Err(Error::Corrupt) }
+        if self.is_clean(page) { Ok(()) } else { Err(Error::Corrupt) }
     }
 }
 

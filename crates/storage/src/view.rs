@@ -106,9 +106,11 @@ impl State {
     }
 }
 
-/// The page in use first: the newer one, unless it cannot be relied on and the older one is still there.
+/// The page in use first: the newer one, unless it cannot be relied on and the older one is still there. When none is in
+/// use, the page that can take the first save comes second.
 fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
     let (newer, older) = match (a.generation, b.generation) {
+        (None, None) if a.clean => return (b, a),
         (_, None) => return (a, b),
         (None, _) => return (b, a),
         (Some(x), Some(y)) if follows(x, y) => (a, b),

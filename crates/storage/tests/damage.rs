@@ -1,0 +1,190 @@
+//! Flash content that no power cut explains: flipped bits, overwritten stretches, half erased and foreign pages.
+//! Whatever is read must have been saved once, transaction by transaction, and must not claim to be newer than it is.
+
+mod common;
+
+use common::{Changes, EMPTY, Model, after, as_changes, noise, read, read_good, restore, set, start};
+use storage::mock::{MockFlash, splitmix};
+use storage::{Group, Health, Pages};
+
+const PAGES: Pages = Pages::new(0, 512);
+type Flash = MockFlash<256>;
+
+fn replay(saves: &mut dyn Iterator<Item = &Changes>) -> Model {
+    saves.fold(EMPTY, |model, changes| after(&model, changes))
+}
+
+fn explainable(saves: &[Changes]) -> Vec<Model> {
+    let lost = (0..=saves.len()).flat_map(|from| (from..=saves.len()).map(move |to| (from, to)));
+    lost.map(|(from, to)| replay(&mut saves[..from].iter().chain(&saves[to..]))).collect()
+}
+
+/// A device with a history of saves.
+struct Device {
+    flash: Flash,
+    saves: Vec<Changes>,
+    /// The states that the loss of whole, successive saves can leave.
+    explainable: Vec<Model>,
+}
+
+impl Device {
+    fn new(saves: Vec<Changes>) -> Device {
+        let mut flash = Flash::new(1024, 1);
+        let mut store = start(&mut flash, PAGES).unwrap();
+        for changes in &saves {
+            store.save(&as_changes(changes)).unwrap();
+        }
+        let explainable = explainable(&saves);
+        Device { flash, saves, explainable }
+    }
+
+    /// All saves in one page, the other one is clean.
+    fn on_one_page() -> Device {
+        use Group::{Application, Calibration, Communication, Device as Identity};
+        Device::new(vec![
+            vec![
+                set(Identity, 1, 4),
+                set(Communication, 2, 20),
+                set(Application, 3, 30),
+                set(Calibration, 4, 6),
+            ],
+            vec![set(Communication, 5, 21)],
+            vec![set(Application, 6, 31), restore(Calibration)],
+            vec![set(Identity, 7, 4), set(Application, 8, 0)],
+            vec![set(Application, 9, 33)],
+        ])
+    }
+
+    /// The same and so much more that the last saves are in the other page, with the old one not erased yet.
+    fn just_moved() -> Device {
+        let Device { mut saves, .. } = Device::on_one_page();
+        saves.extend((10..17).map(|version| vec![set(Group::Application, version, 34)]));
+        let device = Device::new(saves);
+        assert!(device.flash.bytes()[512..].iter().any(|&byte| byte != 0xFF));
+        device
+    }
+
+    fn newest(&self) -> Model {
+        replay(&mut self.saves.iter())
+    }
+
+    /// Damages a copy and checks what is read from it, before and after it was mended.
+    fn check(&self, honest: bool, damage: impl FnOnce(&mut Flash)) -> [Health; 4] {
+        let mut flash = self.flash.clone();
+        damage(&mut flash);
+        let (model, health) = read(&mut flash, PAGES);
+        assert!(self.explainable.contains(&model), "{model:?} was never saved");
+        for ((value, newest), health) in model.iter().zip(&self.newest()).zip(health) {
+            match health {
+                Health::Good => assert!(!honest || value == newest, "silently older"),
+                Health::FellBack => {}
+                Health::Lost => assert_eq!(*value, None),
+            }
+        }
+        let mut store = start(&mut flash, PAGES).unwrap();
+        store.save(&as_changes(&vec![set(Group::Device, 77, 4)])).unwrap();
+        assert_eq!(read_good(&mut flash, PAGES), after(&model, &vec![set(Group::Device, 77, 4)]), "mended");
+        health
+    }
+}
+
+#[test]
+fn any_flipped_bit_of_either_page_is_noticed_or_harmless() {
+    for device in [Device::on_one_page(), Device::just_moved()] {
+        let mut doubtful = 0;
+        for bit in 0..1024 * 8 {
+            let health = device.check(true, |flash| flash.disturb(bit / 8, |byte| byte ^ 1 << (bit % 8)));
+            doubtful += u32::from(health != [Health::Good; 4]);
+        }
+        println!("of 8192 flipped bits {doubtful} made a group doubtful");
+        assert!(doubtful > 500);
+    }
+}
+
+#[test]
+fn a_flipped_bit_in_the_newest_save_falls_back_to_the_one_before() {
+    let device = Device::on_one_page();
+    let end = device.flash.bytes()[..512].iter().rposition(|&byte| byte != 0xFF).unwrap();
+    // The closing mark and the commit word are the last eight bytes.
+    let mut flash = device.flash.clone();
+    flash.disturb(end - 12, |byte| byte ^ 0x10);
+    let (model, health) = read(&mut flash, PAGES);
+    let before = replay(&mut device.saves[..device.saves.len() - 1].iter());
+    assert_eq!((model, health), (before, [Health::FellBack; 4]));
+}
+
+#[test]
+fn a_damaged_first_save_of_the_only_page_costs_only_what_no_later_save_holds() {
+    let device = Device::new(Device::on_one_page().saves[..2].to_vec());
+    let health = device.check(true, |flash| flash.disturb(24, |byte| byte ^ 1));
+    assert_eq!(health, [Health::Lost, Health::Good, Health::Lost, Health::Lost]);
+}
+
+#[test]
+fn an_overwritten_stretch_is_noticed_or_harmless() {
+    for device in [Device::on_one_page(), Device::just_moved()] {
+        for seed in 0..4000 {
+            let random = splitmix(seed).to_le_bytes();
+            let (at, len) =
+                (usize::from(u16::from_le_bytes([random[0], random[1]])) % 1024, usize::from(random[2]) % 64);
+            let fill = |index: usize| match seed % 3 {
+                0 => noise(seed, 64)[index],
+                1 => 0x00,
+                _ => 0xFF,
+            };
+            // Cells that return to the erased value look like a save that was cut: older, but still whole.
+            device.check(seed % 3 != 2, |flash| {
+                (at..1024.min(at + len))
+                    .enumerate()
+                    .for_each(|(index, at)| flash.disturb(at, |_| fill(index)));
+            });
+        }
+    }
+}
+
+#[test]
+fn whatever_a_cut_erase_leaves_in_the_old_page_does_not_count() {
+    let device = Device::just_moved();
+    for seed in 0..500 {
+        let mut flash = device.flash.clone();
+        for at in 0..512 {
+            let [raised, whole, ..] = splitmix(seed << 16 ^ at).to_le_bytes();
+            let raised = if u64::from(whole) < seed % 256 { 0xFF } else { raised };
+            flash.disturb(usize::try_from(at).unwrap(), |byte| byte | raised);
+        }
+        assert_eq!(read_good(&mut flash, PAGES), device.newest());
+        start(&mut flash, PAGES).unwrap();
+        assert_eq!(read_good(&mut flash, PAGES), device.newest());
+    }
+}
+
+#[test]
+fn foreign_pages_are_reported_and_replaced() {
+    let contents = [
+        (vec![0xFF; 1024], Health::Good),
+        (vec![0x00; 1024], Health::Lost),
+        (noise(3, 1024), Health::Lost),
+        (b"PRM1 and then something else...\n".repeat(32), Health::Lost),
+    ];
+    for (content, expected) in contents {
+        let mut flash = Flash::new(1024, 1);
+        (0..1024).for_each(|at| flash.disturb(at, |_| content[at]));
+        assert_eq!(read(&mut flash, PAGES), (EMPTY, [expected; 4]));
+        let changes = vec![set(Group::Device, 1, 4)];
+        start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
+        assert_eq!(read_good(&mut flash, PAGES), after(&EMPTY, &changes));
+    }
+}
+
+#[test]
+fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
+    let first = vec![set(Group::Device, 1, 4)];
+    let mut device = Device::new(vec![first.clone()]);
+    let page = device.flash.bytes();
+    let second = vec![(Group::Application, Some((2, page[8..100].to_vec())))];
+    device = Device::new(vec![first, second, vec![restore(Group::Device)]]);
+    // With the head of the second transaction damaged the search for the third passes through the value.
+    for at in 0..1024 {
+        device.check(true, |flash| flash.disturb(at, |byte| byte ^ 0x81));
+    }
+}

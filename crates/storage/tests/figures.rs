@@ -1,0 +1,75 @@
+//! The figures that the documentation of the crate states: `cargo test -p storage --test figures -- --nocapture`
+
+mod common;
+
+use common::{Changes, as_changes, set, start};
+use storage::mock::MockFlash;
+use storage::{Group, MAX_VALUE, Pages};
+
+const PAGE: usize = 16 * 1024;
+const PAGES: Pages = Pages::new(0, 16 * 1024);
+/// Guaranteed erase cycles of a sector (STM32F446 datasheet, flash memory endurance).
+const ENDURANCE: usize = 10_000;
+/// Programming time of a word in microseconds, typical and most (same datasheet, flash memory programming, x32).
+const WORD_US: [f64; 2] = [16.0, 100.0];
+
+fn blank() -> MockFlash<PAGE> {
+    MockFlash::new(2 * PAGE, 0)
+}
+
+/// Saves that fit between two starts, when both pages are empty at the first.
+fn saves_without_restart(changes: &Changes) -> usize {
+    let mut flash = blank();
+    let mut store = start(&mut flash, PAGES).unwrap();
+    let mut saves = 0;
+    while store.save(&as_changes(changes)).is_ok() {
+        saves += 1;
+    }
+    saves
+}
+
+/// Words programmed by each of `count` saves, with a start before each.
+fn words_of_saves(changes: &Changes, count: usize) -> Vec<u32> {
+    let mut flash = blank();
+    let words = (0..count).map(|_| {
+        start(&mut flash, PAGES).unwrap();
+        let before = flash.programmed();
+        start(&mut flash, PAGES).unwrap().save(&as_changes(changes)).unwrap();
+        flash.programmed() - before
+    });
+    words.collect()
+}
+
+#[test]
+fn saves_until_a_restart_and_until_worn_out() {
+    let typical =
+        vec![set(Group::Device, 1, 4), set(Group::Communication, 1, 176), set(Group::Application, 1, 184)];
+    let sets = [
+        ("application, 184 B", vec![set(Group::Application, 1, 184)], 154),
+        ("device, communication and application, 364 B", typical, 80),
+        (
+            "all four groups at their most, 8192 B",
+            Group::ALL.map(|group| set(group, 1, MAX_VALUE)).to_vec(),
+            2,
+        ),
+    ];
+    for (name, changes, expected) in sets {
+        let saves = saves_without_restart(&changes);
+        let words = words_of_saves(&changes, saves + 1);
+        let (one, dearest) = (words.iter().min().unwrap(), words.iter().max().unwrap());
+        let ms = |words: &u32, us: f64| f64::from(*words) * us / 1000.0;
+        println!("{name}:");
+        println!("  {saves} saves without a restart, {} in the life of the flash", saves * ENDURANCE);
+        println!(
+            "  a save programs {one} words, {:.1} ms (at most {:.1} ms),",
+            ms(one, WORD_US[0]),
+            ms(one, WORD_US[1])
+        );
+        println!(
+            "  one that moves {dearest} words, {:.1} ms (at most {:.1} ms)",
+            ms(dearest, WORD_US[0]),
+            ms(dearest, WORD_US[1])
+        );
+        assert_eq!(saves, expected, "the documentation states this");
+    }
+}

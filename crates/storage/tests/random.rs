@@ -1,0 +1,49 @@
+//! Random lives of a device against the model; proptest shrinks what fails. The seed is fixed.
+
+mod common;
+
+use common::{Changes, EMPTY, Step, noise, recover, run};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use storage::mock::{MockFlash, Weak};
+use storage::{Group, Pages};
+
+const PAGES: Pages = Pages::new(512, 512);
+
+/// What a device does until the power is cut, when, and how the weak bits read then.
+type Life = (Vec<Step>, u32, Weak);
+
+fn changes() -> impl Strategy<Value = Changes> {
+    let group = prop::sample::select(Group::ALL.to_vec());
+    let value = prop::option::weighted(0.8, (any::<u16>(), 0_usize..120));
+    let value = value.prop_map(|value| value.map(|(version, len)| (version, noise(len as u64, len))));
+    vec((group, value), 1..4)
+}
+
+fn step() -> impl Strategy<Value = Step> {
+    prop_oneof![4 => changes().prop_map(Step::Save), 1 => Just(Step::Restart)]
+}
+
+fn life() -> impl Strategy<Value = Life> {
+    let weak = prop::sample::select(vec![Weak::Before, Weak::After, Weak::Random]);
+    (vec(step(), 1..12), 0_u32..400, weak)
+}
+
+#[test]
+fn random_lives_agree_with_the_model() {
+    let config = Config { cases: 1500, failure_persistence: None, ..Config::default() };
+    let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+    let lives = (any::<u64>(), vec(life(), 1..6));
+    let outcome = TestRunner::new_with_rng(config, rng).run(&lives, |(seed, lives)| {
+        let mut flash = MockFlash::<512>::new(2048, seed);
+        let mut model = EMPTY;
+        for (steps, operations, weak) in lives {
+            flash.cut_after(operations, weak);
+            let allowed = run(&mut flash, PAGES, &steps, model);
+            model = recover(&mut flash, PAGES, &allowed);
+        }
+        Ok(())
+    });
+    outcome.unwrap_or_else(|error| panic!("{error}"));
+}

@@ -1,0 +1,189 @@
+//! The store without accidents, and with a flash that does not do what it is told.
+
+mod common;
+
+use common::{EMPTY, after, as_changes, noise, read_good, restore, set, start};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+use storage::mock::MockFlash;
+use storage::{Change, DeviceRecord, Error, Group, Loaded, MAX_VALUE, Memory, Pages, Store, View};
+
+const PAGES: Pages = Pages::new(0, 512);
+
+fn application(value: &[u8]) -> [Change<'_>; 1] {
+    [Change::Set { group: Group::Application, version: 1, value }]
+}
+
+#[test]
+fn a_value_comes_back_with_its_version_and_an_empty_value_is_not_none() {
+    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut store = start(&mut flash, PAGES).unwrap();
+    let value = [1, 2, 3, 4, 5];
+    let group = Group::Communication;
+    store.save(&[Change::Set { group, version: 0xABCD, value: &value }]).unwrap();
+    store.save(&application(&[])).unwrap();
+    let mut buf = [0; 8];
+    assert_eq!(store.load(group, &mut buf), Ok(Some(Loaded { version: 0xABCD, len: 5 })));
+    assert_eq!(buf, [1, 2, 3, 4, 5, 0, 0, 0]);
+    assert_eq!(store.load(group, &mut buf[..4]), Err(Error::BufferTooSmall));
+    assert_eq!(store.load(Group::Application, &mut []), Ok(Some(Loaded { version: 1, len: 0 })));
+    assert_eq!(store.load(Group::Calibration, &mut []), Ok(None));
+}
+
+#[test]
+fn of_several_changes_to_one_group_the_last_counts() {
+    let mut flash = MockFlash::<512>::new(1024, 0);
+    let changes = vec![
+        set(Group::Device, 1, 4),
+        set(Group::Application, 2, 9),
+        restore(Group::Device),
+        set(Group::Device, 3, 5),
+    ];
+    start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
+    assert_eq!(read_good(&mut flash, PAGES), after(&EMPTY, &changes));
+}
+
+#[test]
+fn a_device_record_of_another_layout_is_none() {
+    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut store = start(&mut flash, PAGES).unwrap();
+    let record = DeviceRecord::new(7, 500, 1).unwrap();
+    for (version, value, expected) in [
+        (DeviceRecord::VERSION, record.encode().to_vec(), Some(record)),
+        (DeviceRecord::VERSION + 1, record.encode().to_vec(), None),
+        (DeviceRecord::VERSION, vec![7; 40], None),
+    ] {
+        store.save(&[Change::Set { group: Group::Device, version, value: &value }]).unwrap();
+        assert_eq!(store.device(), Ok(expected));
+    }
+}
+
+#[test]
+fn when_both_pages_are_used_up_a_restart_is_asked_for_and_nothing_is_lost() {
+    let mut flash = MockFlash::<512>::new(1024, 0);
+    for round in 0..20_u8 {
+        let mut store = start(&mut flash, PAGES).unwrap();
+        let mut saves = 0;
+        while store.save(&application(&[round, saves])).is_ok() {
+            saves += 1;
+        }
+        assert_eq!(store.save(&application(&[0])), Err(Error::RestartNeeded));
+        let mut buf = [0; 2];
+        store.load(Group::Application, &mut buf).unwrap();
+        assert_eq!(buf, [round, saves - 1]);
+        assert!(saves >= 12, "at least a page's worth of saves after each start: {saves}");
+    }
+    let [first, second] = flash.erases() else { panic!("two pages") };
+    assert!(first.abs_diff(*second) <= 1 && first + second <= 22, "wear is even: {first} and {second}");
+}
+
+#[test]
+fn what_could_never_be_moved_is_refused_while_there_is_room() {
+    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut store = start(&mut flash, PAGES).unwrap();
+    store.save(&application(&noise(1, 200))).unwrap();
+    let value = noise(2, 253);
+    let too_long = [Change::Set { group: Group::Communication, version: 1, value: &value }];
+    assert_eq!(store.save(&too_long), Err(Error::TooLong));
+    let value = noise(2, 252);
+    let fits = [Change::Set { group: Group::Communication, version: 1, value: &value }];
+    assert_eq!(store.save(&fits), Ok(()));
+    assert_eq!(store.save(&application(&vec![0; MAX_VALUE + 1])), Err(Error::TooLong));
+    assert_eq!(store.load(Group::Application, &mut [0; 200]), Ok(Some(Loaded { version: 1, len: 200 })));
+}
+
+#[test]
+fn four_values_of_the_greatest_length_fit_the_pages_of_the_chip() {
+    let pages = Pages::new(0, 16 * 1024);
+    let mut flash = MockFlash::<16384>::new(32 * 1024, 0);
+    let changes: Vec<_> = Group::ALL.iter().map(|&group| set(group, 1, MAX_VALUE)).collect();
+    for _ in 0..3 {
+        start(&mut flash, pages).unwrap().save(&as_changes(&changes)).unwrap();
+    }
+    assert_eq!(read_good(&mut flash, pages), after(&EMPTY, &changes));
+}
+
+#[test]
+fn pages_that_cannot_be_erased_one_by_one_are_refused() {
+    for pages in [Pages::new(0, 384), Pages::new(128, 512), Pages::new(0, 1024)] {
+        let mut flash = MockFlash::<256>::new(1536, 0);
+        let prepared = View::open(&mut flash, pages).and_then(Store::prepare);
+        assert_eq!(prepared.err(), Some(Error::Geometry));
+    }
+}
+
+#[test]
+fn the_generation_of_the_pages_may_wrap() {
+    // Pages so small that every save moves.
+    let pages = Pages::new(0, 64);
+    let mut flash = MockFlash::<64>::new(128, 0);
+    for count in 0..=66_000_u32 {
+        let mut store = start(&mut flash, pages).unwrap();
+        store.save(&application(&count.to_le_bytes())).unwrap();
+        if count % 100 == 0 || count > 65_500 {
+            let mut buf = [0; 4];
+            View::open(&mut flash, pages).unwrap().load(Group::Application, &mut buf).unwrap();
+            assert_eq!(u32::from_le_bytes(buf), count);
+        }
+    }
+    assert!(flash.erases()[0] > 32_768);
+}
+
+/// A flash in which one word keeps a bit that should be programmed, as a worn-out cell does.
+struct Worn {
+    flash: Memory<Vec<u8>>,
+    at: u32,
+}
+
+impl ErrorType for Worn {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for Worn {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        self.flash.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.flash.capacity()
+    }
+}
+
+impl NorFlash for Worn {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = 512;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        self.flash.erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        let stuck = if offset == self.at { 0x01 } else { 0x00 };
+        let bytes: Vec<u8> = bytes.iter().map(|byte| byte | stuck).collect();
+        self.flash.write(offset, &bytes)
+    }
+}
+
+#[test]
+fn a_worn_out_word_fails_the_save_and_the_next_one_goes_to_the_other_page() {
+    for at in (0..1024).step_by(4) {
+        let worn = Worn { flash: Memory(vec![0xFF; 1024]), at };
+        let Ok(mut store) = View::open(worn, PAGES).and_then(Store::prepare) else {
+            assert!(at % 512 == 0, "only the clean mark is needed by prepare");
+            continue;
+        };
+        let mut last = 0;
+        for value in 1_u8..15 {
+            let saved = store.save(&application(&[value * 2]));
+            let mut buf = [0; 1];
+            store.load(Group::Application, &mut buf).unwrap();
+            match saved {
+                Ok(()) => assert_eq!(buf, [value * 2]),
+                Err(Error::Corrupt) => assert!(buf == [last] || buf == [value * 2], "old or new"),
+                Err(error) => panic!("{error}"),
+            }
+            [last] = buf;
+        }
+    }
+}
