@@ -1,0 +1,41 @@
+//! PWR: voltage scaling, over-drive and the access to the backup domain (RM0390 section 5.4, RM0090 section 5.4).
+//! The regulator is ready at once; stop and standby modes are not entered.
+
+use crate::register::{Plain, RegisterFile, bit, flag};
+use crate::variant::Variant;
+
+const CR: u32 = 0x00;
+const CSR: u32 = 0x04;
+
+const F446: &[Plain] = &[Plain::new(CR, 0xC000, 0x003F_EFF3), Plain::new(CSR, 0, 0x0000_0380)];
+const F405: &[Plain] = &[Plain::new(CR, 0x4000, 0x0000_43F3), Plain::new(CSR, 0, 0x0000_0300)];
+
+#[derive(Clone)]
+pub(crate) struct Pwr {
+    plain: RegisterFile,
+    over_drive: bool,
+}
+
+impl Pwr {
+    pub(crate) fn new(variant: Variant) -> Self {
+        let over_drive = variant == Variant::F446;
+        Self { plain: RegisterFile::new(if over_drive { F446 } else { F405 }), over_drive }
+    }
+
+    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+        let value = self.plain.read(offset)?;
+        Some(if offset == CSR { value | self.ready_bits() } else { value })
+    }
+
+    pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
+        self.plain.write(offset, value)
+    }
+
+    /// BRR, VOSRDY, ODRDY and ODSWRDY.
+    fn ready_bits(&self) -> u32 {
+        let control = self.plain.get(CR);
+        let on = |n| self.over_drive && bit(control, n);
+        let backup_regulator = bit(self.plain.get(CSR), 9);
+        flag(backup_regulator, 3) | flag(true, 14) | flag(on(16), 16) | flag(on(17), 17)
+    }
+}

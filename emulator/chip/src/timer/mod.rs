@@ -1,0 +1,358 @@
+//! Timers TIM2 to TIM7 and TIM9 to TIM14 (RM0390 sections 17 to 19, RM0090 sections 18 to 20).
+//!
+//! Up-counting, update and compare events, preloads, TRGO, encoder mode and input capture. Output pins, DMA requests
+//! of the timer, counting down and the other slave modes are not modelled: a write that asks for them is on record.
+
+mod counter;
+
+use canbus::Time;
+use counter::{Counter, Shadow};
+
+use crate::register::{bit, field, flag};
+
+const CR1: u32 = 0x00;
+const CR2: u32 = 0x04;
+const SMCR: u32 = 0x08;
+const DIER: u32 = 0x0C;
+const SR: u32 = 0x10;
+const EGR: u32 = 0x14;
+const CCMR1: u32 = 0x18;
+const CCMR2: u32 = 0x1C;
+const CCER: u32 = 0x20;
+const CNT: u32 = 0x24;
+const PSC: u32 = 0x28;
+const ARR: u32 = 0x2C;
+const CCR1: u32 = 0x34;
+const CCR4: u32 = 0x40;
+
+const CR1_CEN: u32 = 0;
+const CR1_UDIS: u32 = 1;
+const CR1_URS: u32 = 2;
+const CR1_OPM: u32 = 3;
+const CR1_ARPE: u32 = 7;
+/// DIR and CMS: counting down and up-down.
+const CR1_DOWN: u32 = 0x0070;
+const SR_UIF: u32 = 0;
+/// UIE, CC1IE to CC4IE, TIE; what lies above asks for DMA.
+const DIER_INTERRUPTS: u32 = 0x005F;
+
+/// What a timer has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Kind {
+    /// 32 bits instead of 16.
+    pub(crate) wide: bool,
+    /// Capture and compare channels.
+    pub(crate) channels: u32,
+}
+
+/// One timer.
+#[derive(Clone)]
+pub(crate) struct Timer {
+    kind: Kind,
+    counter: Counter,
+    compare: [Shadow; 4],
+    cr1: u32,
+    cr2: u32,
+    smcr: u32,
+    dier: u32,
+    sr: u32,
+    ccmr: [u32; 2],
+    ccer: u32,
+    /// Position of the encoder, in quarter periods, at the last look.
+    position: i64,
+    /// The last motion of the encoder was backwards.
+    backwards: bool,
+    /// An update event by software sent TRGO.
+    triggered: bool,
+}
+
+impl Timer {
+    pub(crate) fn new(kind: Kind, cycle: Time) -> Self {
+        let max = if kind.wide { u32::MAX } else { 0xFFFF };
+        Self {
+            kind,
+            counter: Counter::new(cycle, max),
+            compare: [Shadow::default(); 4],
+            cr1: 0,
+            cr2: 0,
+            smcr: 0,
+            dier: 0,
+            sr: 0,
+            ccmr: [0; 2],
+            ccer: 0,
+            position: 0,
+            backwards: false,
+            triggered: false,
+        }
+    }
+
+    /// The clock of the timer changes at `now`, up to which it was run.
+    pub(crate) fn set_cycle(&mut self, cycle: Time, now: Time) {
+        self.counter.set_cycle(cycle, now);
+    }
+
+    /// Reads a register as it is after `run`.
+    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+        match offset {
+            CR1 => Some(self.cr1 | flag(self.backwards && self.is_encoder(), 4)),
+            CR2 => Some(self.cr2),
+            DIER => Some(self.dier),
+            SR => Some(self.sr),
+            EGR => Some(0),
+            CNT => Some(self.counter.value()),
+            PSC => Some(self.counter.prescaler.preload),
+            ARR => Some(self.counter.top.preload),
+            _ if self.kind.channels == 0 => None,
+            SMCR => Some(self.smcr),
+            CCMR1 => Some(self.ccmr[0]),
+            CCMR2 => Some(self.ccmr[1]),
+            CCER => Some(self.ccer),
+            CCR1..=CCR4 => self.channel_at(offset).map(|channel| self.compare[channel].preload),
+            _ => None,
+        }
+    }
+
+    /// Writes a register after `run`. `None` when it, or what is asked of it, is not modelled.
+    pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
+        match offset {
+            CR1 => return self.write_control(value, now),
+            CR2 => return self.write_master(value),
+            DIER => return self.write_interrupts(value),
+            // Software clears flags by writing 0 to them.
+            SR => self.sr &= value,
+            EGR => return self.generate(value, now),
+            CNT => self.counter.set_value(value),
+            PSC => self.counter.prescaler.write(value & 0xFFFF, true),
+            ARR => self.counter.top.write(value & self.counter.max(), bit(self.cr1, CR1_ARPE)),
+            _ if self.kind.channels == 0 => return None,
+            SMCR => return self.write_slave(value, now),
+            CCMR1 => self.ccmr[0] = value & 0xFFFF,
+            CCMR2 => self.ccmr[1] = value & 0xFFFF,
+            CCER => self.ccer = value & 0xBBBB,
+            CCR1..=CCR4 => return self.write_compare(offset, value),
+            _ => return None,
+        }
+        Some(())
+    }
+
+    fn write_control(&mut self, value: u32, now: Time) -> Option<()> {
+        self.cr1 = value & 0x038F;
+        self.counter.set_running(bit(value, CR1_CEN), now);
+        let down = value & CR1_DOWN != 0 && !self.is_encoder();
+        (!down).then_some(())
+    }
+
+    fn write_master(&mut self, value: u32) -> Option<()> {
+        self.cr2 = value & 0x00F8;
+        matches!(field(value, 4, 3), 0 | 2).then_some(())
+    }
+
+    fn write_slave(&mut self, value: u32, now: Time) -> Option<()> {
+        self.smcr = value & 0xFFF7;
+        self.counter.restart_tick(now);
+        (field(value, 0, 3) <= 3).then_some(())
+    }
+
+    fn write_interrupts(&mut self, value: u32) -> Option<()> {
+        self.dier = value & 0x5F5F;
+        (value & !DIER_INTERRUPTS == 0).then_some(())
+    }
+
+    fn write_compare(&mut self, offset: u32, value: u32) -> Option<()> {
+        let channel = self.channel_at(offset)?;
+        // An input channel's register is read only.
+        if !self.is_input(channel) {
+            let buffered = bit(self.mode(channel), 3);
+            self.compare[channel].write(value & self.counter.max(), buffered);
+        }
+        Some(())
+    }
+
+    fn channel_at(&self, offset: u32) -> Option<usize> {
+        let channel = (offset - CCR1) / 4;
+        (offset % 4 == 0 && channel < self.kind.channels).then_some(channel as usize)
+    }
+
+    /// The eight bits of CCMR of a channel.
+    fn mode(&self, channel: usize) -> u32 {
+        field(self.ccmr[channel / 2], channel as u32 % 2 * 8, 8)
+    }
+
+    fn is_input(&self, channel: usize) -> bool {
+        field(self.mode(channel), 0, 2) != 0
+    }
+
+    /// Events by software: UG, CC1G to CC4G.
+    fn generate(&mut self, value: u32, now: Time) -> Option<()> {
+        if bit(value, 0) {
+            self.counter.clear(now);
+            self.update_event(bit(self.cr1, CR1_URS));
+            self.triggered |= matches!(field(self.cr2, 4, 3), 0 | 2);
+        }
+        self.sr |= value & 0x1E;
+        (value & !0x1F == 0).then_some(())
+    }
+
+    /// Loads the preloads and sets UIF unless that is masked.
+    fn update_event(&mut self, silent: bool) {
+        if bit(self.cr1, CR1_UDIS) {
+            return;
+        }
+        self.counter.load();
+        self.compare.iter_mut().for_each(Shadow::load);
+        self.sr |= flag(!silent, SR_UIF);
+    }
+
+    /// Counts up to `now`. `position` is that of the encoder on the two inputs, in quarter periods.
+    pub(crate) fn run(&mut self, now: Time, position: i64) {
+        if self.is_encoder() {
+            self.follow(position);
+        } else {
+            self.count(now);
+        }
+        self.position = position;
+    }
+
+    fn count(&mut self, now: Time) {
+        let run = self.counter.run_in_period(now);
+        self.match_channels(|value| run.reached(value));
+        if !self.counter.run_over(now) {
+            return;
+        }
+        self.update_event(false);
+        self.match_channels(|value| value == 0);
+        if bit(self.cr1, CR1_OPM) {
+            self.cr1 &= !(1 << CR1_CEN);
+            self.counter.set_running(false, now);
+            return;
+        }
+        let run = self.counter.run_on(now);
+        self.match_channels(|value| run.reached(value));
+        if run.reached(0) {
+            self.update_event(false);
+        }
+    }
+
+    /// Sets CCxIF of the output channels whose compare value was reached.
+    fn match_channels(&mut self, reached: impl Fn(u32) -> bool) {
+        for channel in 0..self.kind.channels as usize {
+            let hit = !self.is_input(channel) && reached(self.compare[channel].active);
+            self.sr |= flag(hit, channel as u32 + 1);
+        }
+    }
+
+    /// Takes the value of the counter into the register of an input channel (an edge that it is set up for).
+    pub(crate) fn capture(&mut self, channel: usize, rising: bool) {
+        let enabled = bit(self.ccer, channel as u32 * 4);
+        if enabled && self.captures(channel, rising) {
+            let flag_bit = channel as u32 + 1;
+            // A capture over one that was not read: CCxOF.
+            self.sr |= flag(bit(self.sr, flag_bit), flag_bit + 8) | flag(true, flag_bit);
+            self.compare[channel].write(self.counter.value(), false);
+        }
+    }
+
+    /// Whether a channel is an input that takes its own pin and this edge (CCxP and CCxNP).
+    fn captures(&self, channel: usize, rising: bool) -> bool {
+        let own_pin = field(self.mode(channel), 0, 2) == 1;
+        let polarity = field(self.ccer, channel as u32 * 4, 4) & 0b1010;
+        let both = polarity == 0b1010;
+        own_pin && (both || rising == (polarity == 0))
+    }
+
+    /// Whether edges on the pin of a channel are taken.
+    pub(crate) fn listens(&self, channel: usize) -> bool {
+        self.is_input(channel) && bit(self.ccer, channel as u32 * 4)
+    }
+
+    /// Whether the two first inputs drive the counter.
+    pub(crate) fn is_encoder(&self) -> bool {
+        matches!(field(self.smcr, 0, 3), 1..=3)
+    }
+
+    fn follow(&mut self, position: i64) {
+        let steps = self.steps_to(position);
+        if steps == 0 || !self.counter.running() {
+            return;
+        }
+        let forwards = steps > 0;
+        let turn = self.counter.turn(steps);
+        self.backwards = !forwards;
+        self.match_channels(|value| turn.reached(value, forwards));
+        if turn.wrapped {
+            self.update_event(false);
+        }
+    }
+
+    /// Counts between the last position and this one (RM0390 section 17.3.12): every edge of both inputs, or only
+    /// those of input 2 (mode 1) or input 1 (mode 2). One inverted input turns the direction around.
+    fn steps_to(&self, position: i64) -> i64 {
+        let counted = |position: i64| match field(self.smcr, 0, 3) {
+            1 => position.div_euclid(2),
+            2 => (position + 1).div_euclid(2),
+            _ => position,
+        };
+        let steps = counted(position) - counted(self.position);
+        if bit(self.ccer, 1) == bit(self.ccer, 5) { steps } else { -steps }
+    }
+
+    /// Whether a move of the encoder from the last position raises an interrupt that is not up yet.
+    pub(crate) fn rises_at(&self, position: i64) -> bool {
+        let steps = self.steps_to(position);
+        let turn = self.counter.look(steps);
+        let wraps = turn.wrapped && self.awaits(SR_UIF);
+        wraps || self.awaited_channels().any(|channel| turn.reached(self.compare[channel].active, steps > 0))
+    }
+
+    /// Whether the encoder drives the counter and an interrupt can come of it.
+    pub(crate) fn watches_encoder(&self) -> bool {
+        let watches = self.awaits(SR_UIF) || self.awaited_channels().next().is_some();
+        self.is_encoder() && self.counter.running() && watches
+    }
+
+    /// An interrupt is enabled whose flag is not up.
+    fn awaits(&self, flag_bit: u32) -> bool {
+        bit(self.dier & !self.sr, flag_bit)
+    }
+
+    fn awaited_channels(&self) -> impl Iterator<Item = usize> {
+        let channels = 0..self.kind.channels as usize;
+        channels.filter(|&channel| self.awaits(channel as u32 + 1) && !self.is_input(channel))
+    }
+
+    /// When the next interrupt that is not up yet comes, or earlier; never late. Not for encoder mode.
+    pub(crate) fn deadline(&self) -> Time {
+        if self.is_encoder() {
+            return Time::NEVER;
+        }
+        let update = if self.awaits(SR_UIF) { self.counter.overflow() } else { Time::NEVER };
+        let compare = |channel: usize| {
+            let Shadow { preload, active } = self.compare[channel];
+            self.counter.reaches(active).min(if preload == active {
+                Time::NEVER
+            } else {
+                self.counter.overflow()
+            })
+        };
+        self.awaited_channels().map(compare).fold(update, Time::min)
+    }
+
+    /// When TRGO next rises, and how soon after that again at the earliest.
+    pub(crate) fn trigger_output(&self) -> (Time, Time) {
+        let next = match field(self.cr2, 4, 3) {
+            2 if !bit(self.cr1, CR1_UDIS) => self.counter.overflow(),
+            _ => Time::NEVER,
+        };
+        (next, self.counter.period())
+    }
+
+    /// Whether an update event by software sent TRGO since the last call.
+    pub(crate) fn take_trigger(&mut self) -> bool {
+        std::mem::take(&mut self.triggered)
+    }
+
+    /// The level of the interrupt line.
+    pub(crate) fn interrupt(&self) -> bool {
+        self.sr & self.dier & DIER_INTERRUPTS != 0
+    }
+}

@@ -1,0 +1,54 @@
+//! What differs between the chips.
+
+/// One of the chips that the images are built for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variant {
+    /// STM32F446xE: 512 KiB of flash, RM0390.
+    F446,
+    /// STM32F405xG: 1 MiB of flash, RM0090.
+    F405,
+    /// STM32F407xG: as the F405, with Ethernet and a camera interface.
+    F407,
+}
+
+/// Address of the first byte of flash.
+pub const FLASH_BASE: u32 = 0x0800_0000;
+
+const KIB: u32 = 1024;
+
+impl Variant {
+    /// Size of the flash in bytes.
+    pub const fn flash_size(self) -> u32 {
+        match self {
+            Variant::F446 => 512 * KIB,
+            Variant::F405 | Variant::F407 => 1024 * KIB,
+        }
+    }
+
+    /// Sizes of the flash sectors in bytes, in order (RM0390 table 4, RM0090 table 5).
+    pub fn sectors(self) -> impl Iterator<Item = u32> {
+        let size = |index| match index {
+            0..=3 => 16 * KIB,
+            4 => 64 * KIB,
+            _ => 128 * KIB,
+        };
+        let count = if self == Variant::F446 { 8 } else { 12 };
+        (0..count).map(size)
+    }
+
+    /// DBGMCU_IDCODE: device and revision (RM0390 section 33.6.1, RM0090 section 38.6.1).
+    pub(crate) const fn id_code(self) -> u32 {
+        match self {
+            Variant::F446 => 0x1000_0421,
+            Variant::F405 | Variant::F407 => 0x100F_0413,
+        }
+    }
+
+    /// The ADC1 input of the internal temperature sensor (RM0390 section 13.10, RM0090 section 13.10).
+    pub(crate) const fn temperature_channel(self) -> u32 {
+        match self {
+            Variant::F446 => 18,
+            Variant::F405 | Variant::F407 => 16,
+        }
+    }
+}
