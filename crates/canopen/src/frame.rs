@@ -1,5 +1,7 @@
 //! The frames that CANopen uses: 11-bit identifiers, data or remote.
 
+use crate::CanId;
+
 /// A frame on the wire. CANopen services of this node use the CAN base frame format only (CiA 301, 7.3.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
@@ -17,6 +19,16 @@ impl Frame {
         data.get_mut(..bytes.len())?.copy_from_slice(bytes);
         let len = u8::try_from(bytes.len()).ok()?;
         (id <= 0x7FF).then_some(Frame { id, remote: false, len, data })
+    }
+
+    /// A data frame of the first `len` bytes; a length above eight is cut.
+    pub(crate) fn data_frame(id: CanId, len: u8, data: [u8; 8]) -> Frame {
+        Frame { id: id.get(), remote: false, len: len.min(8), data }
+    }
+
+    /// All eight bytes of a full data frame; `None` for any other.
+    pub(crate) fn full(&self) -> Option<[u8; 8]> {
+        (self.len == 8 && !self.remote).then_some(self.data)
     }
 
     /// A remote frame; `None` for an identifier above 7FFh or a length above eight.

@@ -1,13 +1,30 @@
 //! Sans-IO CANopen (CiA 301, 305): frame and time in, frames and the next deadline out.
+//!
+//! [`Device`] is a whole CANopen device. It owns its protocols and the values of its object dictionary; what the
+//! dictionary contains is a table ([`dictionary`]), and what the device does beyond CANopen is its [`Application`].
+//! Each message of the protocol has a type that can only be valid, with `parse` and `encode`.
+//!
+//! Nothing here reads a clock, blocks, allocates or panics, whatever arrives from the bus.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
+mod can_id;
+mod device;
+pub mod dictionary;
+pub mod emcy;
 mod frame;
+mod heartbeat;
+pub mod nmt;
 mod node_id;
+pub mod pdo;
+pub mod sdo;
+mod sync;
 mod time;
 mod transmit;
 
+pub use can_id::{CanId, CobId};
+pub use device::{Action, Application, Device};
 pub use frame::Frame;
 pub use node_id::NodeId;
 pub use time::{Duration, Instant};

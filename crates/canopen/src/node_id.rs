@@ -1,5 +1,6 @@
 //! The node-ID and the identifiers that follow from it.
 
+use crate::CanId;
 use core::num::NonZeroU8;
 
 /// A node-ID, 1 to 127 (CiA 301, 7.3.5). 0 addresses all nodes and is never a node's own.
@@ -22,8 +23,8 @@ impl NodeId {
         self.0.get()
     }
 
-    /// The CAN-ID of a service of the pre-defined connection set: `base` (a multiple of 80h) plus the node-ID.
-    pub(crate) const fn on(self, base: u16) -> u16 {
-        base | self.get() as u16
+    /// The CAN-ID of one of its services in the pre-defined connection set (CiA 301, 7.3.5).
+    pub(crate) const fn service(self, function: u16) -> CanId {
+        CanId::of_service(function, self.get())
     }
 }

@@ -10,7 +10,19 @@ impl Duration {
     /// `n` milliseconds.
     #[must_use]
     pub const fn from_millis(n: u64) -> Duration {
-        Duration(n * 1_000)
+        Duration(n.saturating_mul(1_000))
+    }
+
+    /// `n` units of 100 us, the unit of inhibit times.
+    #[must_use]
+    pub const fn from_inhibit(n: u32) -> Duration {
+        Duration(n as u64 * 100)
+    }
+
+    /// Whether it is nothing: a timer that is switched off.
+    #[must_use]
+    pub const fn is_zero(self) -> bool {
+        self.0 == 0
     }
 }
 

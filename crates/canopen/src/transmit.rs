@@ -1,6 +1,6 @@
 //! Where frames go: the driver's transmit queue as the protocol sees it.
 
-use crate::Frame;
+use crate::{Duration, Frame};
 
 /// The queue has no room; the sender keeps what it wanted to send and tries again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,3 +17,6 @@ pub trait Transmit {
     /// How many frames `send` would take now.
     fn room(&self) -> usize;
 }
+
+/// When to try again after `QueueFull`.
+pub(crate) const RETRY: Duration = Duration::from_millis(1);

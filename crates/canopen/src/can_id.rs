@@ -1,0 +1,82 @@
+//! CAN-IDs, and COB-IDs as the dictionary stores them.
+
+/// An 11-bit CAN-ID.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct CanId(u16);
+
+impl CanId {
+    /// NMT commands (CiA 301, 7.3.5).
+    pub(crate) const NMT: CanId = CanId(0x000);
+
+    /// `None` above 7FFh.
+    #[must_use]
+    pub const fn new(id: u16) -> Option<CanId> {
+        if id <= 0x7FF { Some(CanId(id)) } else { None }
+    }
+
+    /// The number.
+    #[must_use]
+    pub const fn get(self) -> u16 {
+        self.0
+    }
+
+    /// An identifier of the pre-defined connection set: a function code in bits 7..10, a node-ID below.
+    pub(crate) const fn of_service(function: u16, node: u8) -> CanId {
+        CanId((function & 0x780) | (node & 0x7F) as u16)
+    }
+
+    /// Whether no configurable service may use it: NMT, SDO, error control, and the ranges that
+    /// CiA 301 reserves (7.3.5, restricted CAN-IDs).
+    #[must_use]
+    pub const fn is_restricted(self) -> bool {
+        matches!(self.0, 0x000..=0x07F | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..)
+    }
+}
+
+/// The value of a COB-ID entry: an 11-bit CAN-ID and two flags, the meaning of bit 30 depending on the object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CobId {
+    /// The CAN-ID, bits 0..10.
+    pub id: CanId,
+    /// Bit 31.
+    pub bit31: bool,
+    /// Bit 30.
+    pub bit30: bool,
+}
+
+impl CobId {
+    /// `None` for an extended frame (bit 29) or a CAN-ID of more than 11 bits: this node has base frames only.
+    #[must_use]
+    pub fn parse(value: u32) -> Option<CobId> {
+        let id = CanId::new(u16::try_from(value & 0x3FFF_FFFF).ok()?)?;
+        Some(CobId { id, bit31: value & 1 << 31 != 0, bit30: value & 1 << 30 != 0 })
+    }
+
+    /// The value as the dictionary stores it.
+    #[must_use]
+    pub const fn encode(self) -> u32 {
+        self.id.0 as u32 | (self.bit30 as u32) << 30 | (self.bit31 as u32) << 31
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn restricted_ranges_end_where_cia_301_says() {
+        let free = [0x080, 0x100, 0x181, 0x580, 0x600, 0x680, 0x6DF, 0x700];
+        let restricted = [0x000, 0x07F, 0x101, 0x180, 0x581, 0x5FF, 0x601, 0x67F, 0x6E0, 0x6FF, 0x701, 0x7FF];
+        assert!(free.iter().all(|&id| !CanId::new(id).unwrap().is_restricted()));
+        assert!(restricted.iter().all(|&id| CanId::new(id).unwrap().is_restricted()));
+    }
+
+    #[test]
+    fn a_cob_id_has_eleven_bits_and_no_extended_frame() {
+        assert_eq!(CobId::parse(0x2000_0080), None);
+        assert_eq!(CobId::parse(0x0000_0800), None);
+        let cob = CobId::parse(0xC000_0181).unwrap();
+        assert_eq!((cob.id.get(), cob.bit31, cob.bit30), (0x181, true, true));
+        assert_eq!(cob.encode(), 0xC000_0181);
+    }
+}

@@ -1,0 +1,91 @@
+//! The CANopen device: the protocols, the dictionary's values and what connects them.
+//!
+//! Two callers share it, one for process data and one for services. After any call that took a frame or changed
+//! something, `poll_process` and `poll_services` say when the device wants to be called next.
+
+mod application;
+mod objects;
+mod process;
+mod services;
+mod state;
+mod tpdos;
+
+pub use application::Application;
+pub use state::Action;
+
+use crate::dictionary::Dictionary;
+use crate::nmt::State;
+use crate::pdo::Tpdo;
+use crate::sdo::{Response, Server};
+use crate::{Instant, NodeId, emcy, heartbeat, sync};
+
+/// How many TPDOs a device can have; which of them it has, the dictionary says.
+const TPDOS: usize = 2;
+
+/// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
+#[derive(Debug)]
+pub struct Device<A, const N: usize> {
+    server: Server,
+    /// A response that found the queue full, and when to try again.
+    response: Option<(Response, Instant)>,
+    core: Core<A, N>,
+}
+
+/// All but the SDO server: what the server serves.
+#[derive(Debug)]
+struct Core<A, const N: usize> {
+    dictionary: &'static Dictionary,
+    node_id: NodeId,
+    state: State,
+    image: [u8; N],
+    application: A,
+    heartbeat: heartbeat::Producer,
+    sync: sync::Consumer,
+    emcy: emcy::Producer,
+    tpdos: [Tpdo; TPDOS],
+    /// Cached next deadlines; `STALE` after a change that may have moved them.
+    process_due: Instant,
+    services_due: Instant,
+    pending: state::Pending,
+}
+
+/// A deadline in the past: the next poll looks at everything.
+const STALE: Instant = Instant(0);
+
+impl<A: Application, const N: usize> Device<A, N> {
+    /// A device that has not started: silent and deaf until [`start`](Device::start).
+    pub fn new(dictionary: &'static Dictionary, node_id: NodeId, application: A) -> Device<A, N> {
+        let core = Core {
+            dictionary,
+            node_id,
+            state: State::Initialising,
+            image: [0; N],
+            application,
+            heartbeat: heartbeat::Producer::new(),
+            sync: sync::Consumer::new(),
+            emcy: emcy::Producer::new(),
+            tpdos: [const { Tpdo::new() }; TPDOS],
+            process_due: Instant::NEVER,
+            services_due: Instant::NEVER,
+            pending: state::Pending::new(),
+        };
+        Device { server: Server::new(), response: None, core }
+    }
+
+    /// The NMT state.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.core.state
+    }
+
+    /// The values of all objects.
+    #[must_use]
+    pub fn image(&self) -> &[u8] {
+        &self.core.image
+    }
+
+    /// The values of all objects, for the application to update. To be followed by [`changed`](Device::changed).
+    pub fn image_mut(&mut self) -> &mut [u8] {
+        &mut self.core.image
+    }
+}

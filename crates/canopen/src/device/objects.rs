@@ -1,0 +1,112 @@
+//! SDO access to the dictionary: the rules of the communication objects.
+
+use super::{Application, Core, STALE};
+use crate::dictionary::{Entry, Field, Group, Rule, Type};
+use crate::nmt::State;
+use crate::sdo::{Abort, Multiplexer, Objects};
+use crate::{Duration, Instant, emcy, sync};
+
+impl<A: Application, const N: usize> Objects for Core<A, N> {
+    fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        if !entry.access.is_readable() {
+            return Err(Abort::WriteOnly);
+        }
+        match entry.rule {
+            Rule::ErrorCount => Ok(core::slice::from_ref(self.emcy.history().count())),
+            Rule::ErrorEntry => {
+                self.emcy.history().error(at.sub).map(|error| &error[..]).ok_or(Abort::NoData)
+            }
+            _ => Ok(stored(entry, &self.image)),
+        }
+    }
+
+    fn writable(&self, at: Multiplexer) -> Result<usize, Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        if entry.access.is_writable() { Ok(entry.field.size.into()) } else { Err(Abort::ReadOnly) }
+    }
+
+    fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        if !entry.access.is_writable() {
+            return Err(Abort::ReadOnly);
+        }
+        entry.check_value(bytes)?;
+        self.admit(entry, bytes)?;
+        if !entry.rule.is_computed() {
+            entry.field.set(&mut self.image, bytes);
+        }
+        self.follow(entry, now);
+        Ok(())
+    }
+}
+
+impl<A: Application, const N: usize> Core<A, N> {
+    pub(super) fn is_initialising(&self) -> bool {
+        self.state == State::Initialising
+    }
+
+    /// An integer of at most 32 bits; 0 where the dictionary has no such entry.
+    pub(super) fn number(&self, index: u16, sub: u8) -> u32 {
+        self.number_or(index, sub, 0)
+    }
+
+    pub(super) fn number_or(&self, index: u16, sub: u8, absent: u32) -> u32 {
+        self.dictionary.find(index, sub).map_or(absent, |entry| self.word(entry.field))
+    }
+
+    fn word(&self, field: Field) -> u32 {
+        little_endian(field.get(&self.image))
+    }
+
+    /// Whether the rule of the entry allows the value.
+    fn admit(&mut self, entry: &Entry, bytes: &[u8]) -> Result<(), Abort> {
+        let value = little_endian(bytes);
+        match entry.rule {
+            Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
+            Rule::SyncCobId => sync::check_cob_id(value),
+            Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
+            Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
+            Rule::TpdoCobId => self.admit_tpdo_cob_id(entry, value),
+            Rule::TpdoType => self.admit_tpdo_type(entry, value),
+            Rule::TpdoInhibit if self.tpdo_is_valid(entry) => Err(Abort::InvalidValue),
+            Rule::TpdoCount => self.admit_tpdo_count(entry, value),
+            Rule::TpdoSlot => self.admit_tpdo_slot(entry, value),
+            Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
+            _ => Ok(()),
+        }
+    }
+
+    /// What follows from a new value.
+    fn follow(&mut self, entry: &Entry, now: Instant) {
+        let value = self.word(entry.field);
+        match entry.rule {
+            Rule::ErrorCount => self.emcy.clear_history(),
+            Rule::SyncCobId => self.sync.configure(value),
+            Rule::EmcyCobId => self.emcy.configure(value),
+            Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
+            Rule::TpdoCobId | Rule::TpdoType | Rule::TpdoInhibit | Rule::TpdoEventTimer => {
+                self.configure_tpdo(super::tpdos::number(entry));
+            }
+            _ => (),
+        }
+        self.pending.identifiers |= matches!(entry.rule, Rule::SyncCobId | Rule::TpdoCobId);
+        self.pending.parameters |=
+            matches!(entry.rule, Rule::Application(_)) || entry.group == Group::Application;
+        (self.process_due, self.services_due) = (STALE, STALE);
+    }
+}
+
+/// The value as an upload gives it: a string ends where its zeros begin.
+fn stored<'a>(entry: &Entry, image: &'a [u8]) -> &'a [u8] {
+    let value = entry.field.get(image);
+    match entry.kind {
+        Type::VisibleString(_) => value.split(|&byte| byte == 0).next().unwrap_or(value),
+        _ => value,
+    }
+}
+
+/// The number in up to four bytes.
+fn little_endian(bytes: &[u8]) -> u32 {
+    bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
+}

@@ -1,0 +1,75 @@
+//! Process data: NMT commands, SYNC, PDOs.
+
+use super::{Application, Core, Device, STALE};
+use crate::nmt::Command;
+use crate::pdo::Tpdo;
+use crate::{CanId, Frame, Instant, Transmit};
+
+impl<A: Application, const N: usize> Device<A, N> {
+    /// A frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
+    pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if frame.id() == CanId::NMT.get() {
+            self.on_nmt(frame, now, out);
+        } else if self.core.state.has_pdos() {
+            self.core.on_pdo_frame(frame, now, out);
+        }
+    }
+
+    fn on_nmt(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        let is_deaf = self.core.is_initialising();
+        let Some(command) = Command::parse(frame.data(), self.core.node_id).filter(|_| !is_deaf) else {
+            return;
+        };
+        self.command(command);
+        self.poll_process(now, out);
+    }
+
+    /// Sends what is due. Returns the instant of the next call.
+    pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        let core = &mut self.core;
+        if now >= core.process_due {
+            for tpdo in &mut core.tpdos {
+                tpdo.poll(&core.image, now, out);
+            }
+            core.process_due = core.tpdos.iter().map(Tpdo::due).min().unwrap_or(Instant::NEVER);
+        }
+        core.process_due
+    }
+
+    /// The application has updated values in the image: sends what a change triggers.
+    pub fn changed(&mut self, now: Instant, out: &mut impl Transmit) {
+        if self.core.state.has_pdos() {
+            self.core.each_tpdo(|tpdo, image| tpdo.on_change(image, now, out));
+        }
+    }
+
+    /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
+    pub fn process_ids(&self) -> impl Iterator<Item = CanId> {
+        let requests = self.core.tpdos.iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
+        [CanId::NMT, self.core.sync.id()].into_iter().chain(requests.map(|tpdo| tpdo.id))
+    }
+}
+
+impl<A: Application, const N: usize> Core<A, N> {
+    fn on_pdo_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if self.sync.accepts(frame) {
+            self.each_tpdo(|tpdo, image| tpdo.on_sync(image, now, out));
+        } else if frame.is_remote() {
+            self.each_tpdo(|tpdo, image| {
+                if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
+                    tpdo.on_remote(image, now, out);
+                }
+            });
+        }
+    }
+
+    /// What a TPDO could not send at once moves the next deadline.
+    fn each_tpdo(&mut self, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
+        for tpdo in &mut self.tpdos {
+            visit(tpdo, &self.image);
+            if tpdo.is_pending() {
+                self.process_due = STALE;
+            }
+        }
+    }
+}

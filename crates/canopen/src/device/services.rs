@@ -1,0 +1,84 @@
+//! Services: SDO, heartbeat and EMCY.
+
+use super::{Application, Device, STALE};
+use crate::sdo::Response;
+use crate::transmit::RETRY;
+use crate::{CanId, Frame, Instant, Transmit};
+
+/// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
+const SDO_RESPONSE: u16 = 0x580;
+const SDO_REQUEST: u16 = 0x600;
+const ERROR_CONTROL: u16 = 0x700;
+
+impl<A: Application, const N: usize> Device<A, N> {
+    /// A frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
+    pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if frame.id() == self.core.node_id.service(SDO_REQUEST).get() && self.core.state.has_services() {
+            self.on_sdo(frame, now, out);
+        }
+    }
+
+    /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
+    fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        let Some(request) = frame.full() else { return };
+        let response = self.server.answer(request, &mut self.core, now);
+        self.core.services_due = self.core.services_due.min(self.server.deadline());
+        self.respond(response, now, out);
+    }
+
+    /// Sends a response. One that still waits is obsolete: its client has gone on.
+    fn respond(&mut self, response: Option<Response>, now: Instant, out: &mut impl Transmit) {
+        self.response = None;
+        let Some(response) = response else { return };
+        let id = self.core.node_id.service(SDO_RESPONSE);
+        if out.send(Frame::data_frame(id, 8, response.encode())).is_err() {
+            self.response = Some((response, now + RETRY));
+            self.core.services_due = STALE;
+        }
+    }
+
+    /// Sends what is due. Returns the instant of the next call.
+    pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        if now >= self.core.services_due {
+            self.poll_heartbeat(now, out);
+            if self.core.state.has_services() {
+                self.core.emcy.poll(now, out);
+                self.poll_sdo(now, out);
+            }
+            self.core.services_due = self.next_service();
+        }
+        self.core.services_due
+    }
+
+    fn poll_heartbeat(&mut self, now: Instant, out: &mut impl Transmit) {
+        if !self.core.is_initialising() {
+            let id = self.core.node_id.service(ERROR_CONTROL);
+            self.core.heartbeat.poll(id, self.core.state, now, out);
+        }
+    }
+
+    fn poll_sdo(&mut self, now: Instant, out: &mut impl Transmit) {
+        match self.response {
+            Some((response, due)) if now >= due => self.respond(Some(response), now, out),
+            _ => (),
+        }
+        if let Some(abort) = self.server.expire(now) {
+            self.respond(Some(abort), now, out);
+        }
+    }
+
+    fn next_service(&self) -> Instant {
+        let core = &self.core;
+        let heartbeat = if core.is_initialising() { Instant::NEVER } else { core.heartbeat.due() };
+        if !core.state.has_services() {
+            return heartbeat;
+        }
+        let response = self.response.map_or(Instant::NEVER, |(_, due)| due);
+        heartbeat.min(core.emcy.due()).min(self.server.deadline()).min(response)
+    }
+
+    /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).
+    pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
+        core::iter::once(self.core.node_id.service(SDO_REQUEST))
+    }
+}

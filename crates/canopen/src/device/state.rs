@@ -1,0 +1,187 @@
+//! NMT state, resets, and the reactions to errors.
+
+use super::{Application, Core, Device, STALE};
+use crate::emcy::Fault;
+use crate::nmt::{Command, State};
+use crate::{Duration, Instant, Transmit};
+
+/// 1F80h: the one value that makes the node start by itself.
+pub(super) const SELF_START: u32 = 0x08;
+
+/// Something that is left to the caller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// NMT reset node: restart everything, or at least call [`Device::start`].
+    ResetNode,
+    /// NMT reset communication: discard frames that still wait to be sent, then call [`Device::start`].
+    ResetCommunication,
+    /// The sets of identifiers to receive have changed.
+    Identifiers,
+}
+
+/// What [`Device::start`] has to initialise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reset {
+    Communication,
+    Node,
+}
+
+/// What waits for the caller.
+#[derive(Debug)]
+pub(super) struct Pending {
+    /// What the next start covers; told to the caller once.
+    reset: Reset,
+    reset_untold: bool,
+    pub(super) identifiers: bool,
+    pub(super) parameters: bool,
+}
+
+impl Pending {
+    pub(super) const fn new() -> Pending {
+        Pending { reset: Reset::Node, reset_untold: false, identifiers: false, parameters: false }
+    }
+}
+
+impl<A: Application, const N: usize> Device<A, N> {
+    /// Initialises what the last reset covers (at first everything), boots up, and starts by itself if 1F80h says so.
+    pub fn start(&mut self, now: Instant, out: &mut impl Transmit) {
+        self.server.reset();
+        self.response = None;
+        self.core.enter(State::Initialising);
+        self.core.load();
+        self.core.configure(now);
+        self.core.enter(State::PreOperational);
+        self.poll_services(now, out);
+        if self.core.number(0x1F80, 0) == SELF_START && self.core.emcy.register() == 0 {
+            self.core.enter(State::Operational);
+            self.poll_process(now, out);
+        }
+    }
+
+    /// The next thing that is left to the caller.
+    pub fn take_action(&mut self) -> Option<Action> {
+        let pending = &mut self.core.pending;
+        if core::mem::take(&mut pending.reset_untold) {
+            return Some(match pending.reset {
+                Reset::Node => Action::ResetNode,
+                Reset::Communication => Action::ResetCommunication,
+            });
+        }
+        core::mem::take(&mut pending.identifiers).then_some(Action::Identifiers)
+    }
+
+    /// Whether application parameters have changed since the last call; they have after a start.
+    pub fn take_parameters_changed(&mut self) -> bool {
+        core::mem::take(&mut self.core.pending.parameters)
+    }
+
+    pub(super) fn command(&mut self, command: Command) {
+        match command {
+            Command::Start => self.core.enter(State::Operational),
+            Command::Stop => self.core.enter(State::Stopped),
+            Command::EnterPreOperational => self.core.enter(State::PreOperational),
+            Command::ResetNode => self.core.begin_reset(Reset::Node),
+            Command::ResetCommunication => self.core.begin_reset(Reset::Communication),
+        }
+        self.silence_services();
+    }
+
+    /// A transfer does not survive a state without SDO.
+    pub(super) fn silence_services(&mut self) {
+        if !self.core.state.has_services() {
+            self.server.reset();
+            self.response = None;
+        }
+    }
+
+    /// Sets a fault. It is signalled once, until it is cleared.
+    pub fn raise(&mut self, fault: Fault, now: Instant) {
+        self.core.raise(fault, now);
+    }
+
+    /// Clears a fault.
+    pub fn clear(&mut self, fault: Fault, now: Instant) {
+        self.core.clear(fault, now);
+    }
+
+    /// Reacts to an error as object 1029h says under `sub`: 1 for communication errors, 2 and up for the profile's own.
+    pub fn apply_error_behaviour(&mut self, sub: u8) {
+        match self.core.number(0x1029, sub) {
+            0 if self.core.state == State::Operational => self.core.enter(State::PreOperational),
+            2 if self.core.state.has_services() => self.core.enter(State::Stopped),
+            _ => (),
+        }
+        self.silence_services();
+    }
+}
+
+impl<A: Application, const N: usize> Core<A, N> {
+    fn begin_reset(&mut self, reset: Reset) {
+        self.enter(State::Initialising);
+        (self.pending.reset, self.pending.reset_untold) = (reset, true);
+    }
+
+    pub(super) fn enter(&mut self, state: State) {
+        if state == self.state {
+            return;
+        }
+        self.state = state;
+        for tpdo in &mut self.tpdos {
+            if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
+        }
+        (self.process_due, self.services_due) = (STALE, STALE);
+    }
+
+    /// Takes the default values of what is to be reset. Communication parameters (1000h to 1FFFh) come first in the image.
+    fn load(&mut self) {
+        let everything = self.pending.reset == Reset::Node;
+        let entries = self.dictionary.entries();
+        for entry in entries.iter().filter(|entry| everything || entry.index() < 0x2000) {
+            let default: [u8; 4] = entry.field.load(self.dictionary.defaults());
+            if entry.node_relative {
+                self.store_node_relative(entry.field, u32::from_le_bytes(default));
+            } else if !entry.rule.is_computed() {
+                entry.field.set(&mut self.image, entry.field.get(self.dictionary.defaults()));
+            }
+        }
+        self.application.initialise(&mut self.image);
+        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
+    }
+
+    fn store_node_relative(&mut self, field: crate::dictionary::Field, base: u32) {
+        field.store(&mut self.image, base.wrapping_add(self.node_id.get().into()).to_le_bytes());
+    }
+
+    /// Gives every protocol its parameters.
+    fn configure(&mut self, now: Instant) {
+        self.sync.configure(self.number(0x1005, 0));
+        self.emcy.configure(self.number_or(0x1014, 0, NO_EMCY));
+        self.emcy.restart(now);
+        self.update_error_register();
+        let period = Duration::from_millis(self.number(0x1017, 0).into());
+        self.heartbeat.boot_up(period, now);
+        (0..self.tpdos.len()).for_each(|number| self.configure_tpdo(number));
+    }
+
+    fn raise(&mut self, fault: Fault, now: Instant) {
+        if self.emcy.raise(fault, now) {
+            self.update_error_register();
+            self.services_due = STALE;
+        }
+    }
+
+    fn clear(&mut self, fault: Fault, now: Instant) {
+        self.emcy.clear(fault, now);
+        self.update_error_register();
+        self.services_due = STALE;
+    }
+
+    fn update_error_register(&mut self) {
+        if let Ok(entry) = self.dictionary.find(0x1001, 0) {
+            entry.field.store(&mut self.image, [self.emcy.register()]);
+        }
+    }
+}
+
+/// What a dictionary without 1014h amounts to.
+const NO_EMCY: u32 = 1 << 31;

@@ -1,0 +1,165 @@
+//! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
+
+use super::{Access, DefaultValue, Entry, Field, Group, Mapping, Object, Rule, Type};
+
+/// How many rows the parts of a table have together.
+#[must_use]
+pub const fn count(parts: &[&[Object]]) -> usize {
+    let (mut total, mut i) = (0, 0);
+    while i < parts.len() {
+        total += parts[i].len();
+        i += 1;
+    }
+    total
+}
+
+/// Joins the parts of a table. `N` is what [`count`] says.
+///
+/// # Panics
+/// During compilation, when `N` does not fit.
+#[must_use]
+pub const fn gather<const N: usize>(parts: &[&[Object]]) -> [Object; N] {
+    let mut rows = [Object::new(0, 0, "", Type::Unsigned8, Access::Const); N];
+    let (mut part, mut row, mut at) = (0, 0, 0);
+    while part < parts.len() {
+        if row == parts[part].len() {
+            (part, row) = (part + 1, 0);
+            continue;
+        }
+        rows[at] = parts[part][row];
+        (row, at) = (row + 1, at + 1);
+    }
+    assert!(at == N, "N is not the number of rows");
+    rows
+}
+
+/// The run-time entries of a table.
+#[must_use]
+pub const fn compile<const N: usize>(rows: &[Object; N]) -> [Entry; N] {
+    let mut entries = [entry(&rows[0], 0); N];
+    let (mut i, mut offset) = (0, 0);
+    while i < N {
+        entries[i] = entry(&rows[i], offset);
+        offset += rows[i].stored_size();
+        i += 1;
+    }
+    entries
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `check` has seen the ranges.
+const fn entry(row: &Object, offset: usize) -> Entry {
+    let (low, high) = effective_limits(row);
+    Entry {
+        key: row.key(),
+        low: low as i32,
+        high: high as u32,
+        field: Field { offset: offset as u16, size: row.kind.size() },
+        kind: row.kind,
+        access: row.access,
+        mapping: row.mapping,
+        group: row.group,
+        rule: row.rule,
+        node_relative: matches!(row.default, DefaultValue::NodeId(_)),
+    }
+}
+
+const fn effective_limits(row: &Object) -> (i64, i64) {
+    match (row.limits, row.kind.range()) {
+        (Some(limits), _) | (None, Some(limits)) => limits,
+        (None, None) => (0, 0),
+    }
+}
+
+/// Bytes of the image of all values.
+#[must_use]
+pub const fn image_size(rows: &[Object]) -> usize {
+    let (mut total, mut i) = (0, 0);
+    while i < rows.len() {
+        total += rows[i].stored_size();
+        i += 1;
+    }
+    total
+}
+
+/// The image of all default values. `S` is what [`image_size`] says.
+#[must_use]
+pub const fn default_image<const S: usize>(rows: &[Object]) -> [u8; S] {
+    let mut image = [0; S];
+    let (mut row, mut offset) = (0, 0);
+    while row < rows.len() {
+        let mut i = 0;
+        while i < rows[row].stored_size() {
+            image[offset + i] = default_byte(rows[row].default, i);
+            i += 1;
+        }
+        offset += rows[row].stored_size();
+        row += 1;
+    }
+    image
+}
+
+const fn default_byte(value: DefaultValue, i: usize) -> u8 {
+    match value {
+        DefaultValue::Integer(value) => value.to_le_bytes()[i],
+        DefaultValue::Real(value) => value.to_le_bytes()[i],
+        DefaultValue::NodeId(base) => base.to_le_bytes()[i],
+        DefaultValue::Text(text) if i < text.len() => text.as_bytes()[i],
+        DefaultValue::Text(_) => 0,
+    }
+}
+
+/// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
+/// are others, attributes that fit together.
+///
+/// # Panics
+/// During compilation, when a row is wrong.
+pub const fn check(rows: &[Object]) {
+    assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
+    let mut i = 0;
+    while i < rows.len() {
+        check_row(&rows[i]);
+        if i > 0 {
+            assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
+        }
+        let has_sub_0 = rows[i].sub == 0 || (i > 0 && rows[i - 1].index == rows[i].index);
+        assert!(has_sub_0, "an object has no sub-index 0");
+        i += 1;
+    }
+}
+
+const fn check_row(row: &Object) {
+    check_limits(row);
+    match (row.default, row.kind) {
+        (DefaultValue::Integer(value), _) => {
+            let (low, high) = effective_limits(row);
+            assert!(
+                row.kind.range().is_some() && low <= value && value <= high,
+                "the default is out of range"
+            );
+        }
+        (DefaultValue::Real(value), Type::Real32) => {
+            assert!(value.is_finite(), "the default is not a number");
+        }
+        (DefaultValue::Text(text), Type::VisibleString(capacity)) => {
+            assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
+        }
+        (DefaultValue::NodeId(_), Type::Unsigned32) => (),
+        _ => panic!("the default is of another type"),
+    }
+    let mappable = !matches!(row.mapping, Mapping::No);
+    assert!(!mappable || row.kind.size() <= 8, "a mapped object is longer than a PDO");
+    assert!(!mappable || !row.rule.is_computed(), "a mapped object has no place in the image");
+    let saved = !matches!(row.group, Group::Volatile);
+    assert!(!saved || matches!(row.access, Access::ReadWrite), "only a parameter can be saved");
+    let tpdo = matches!(row.mapping, Mapping::Tpdo);
+    assert!(!tpdo || row.access.is_readable(), "a TPDO sends what can be read");
+    let listed = matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
+    assert!(!listed || row.index == 0x1003, "the error list is object 1003h");
+}
+
+const fn check_limits(row: &Object) {
+    if let Some((low, high)) = row.limits {
+        let Some((min, max)) = row.kind.range() else { panic!("limits of what is not an integer") };
+        assert!(min <= low && low <= high && high <= max, "limits are wider than the type");
+    }
+}

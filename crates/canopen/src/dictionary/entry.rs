@@ -1,0 +1,133 @@
+//! The dictionary at run time: entries without text, found by binary search.
+
+use super::{Access, Field, Group, Mapping, Rule, Type};
+use crate::sdo::Abort;
+
+/// One entry as the node needs it.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    pub(crate) key: u32,
+    /// Limits of an integer: the smallest value fits a signed word and the largest an unsigned one for every type there is.
+    pub(crate) low: i32,
+    pub(crate) high: u32,
+    pub(crate) field: Field,
+    pub(crate) kind: Type,
+    pub(crate) access: Access,
+    pub(crate) mapping: Mapping,
+    pub(crate) group: Group,
+    pub(crate) rule: Rule,
+    /// The default value counts from the node-ID.
+    pub(crate) node_relative: bool,
+}
+
+impl Entry {
+    /// Index.
+    #[must_use]
+    pub const fn index(&self) -> u16 {
+        let [_, low, high, _] = self.key.to_le_bytes();
+        u16::from_le_bytes([low, high])
+    }
+
+    /// Sub-index.
+    #[must_use]
+    pub const fn sub(&self) -> u8 {
+        self.key.to_le_bytes()[0]
+    }
+
+    /// Place of its value in the image.
+    #[must_use]
+    pub const fn field(&self) -> Field {
+        self.field
+    }
+
+    /// Checks the bytes of an SDO download against type and limits.
+    ///
+    /// # Errors
+    /// The abort code for what is wrong with them.
+    pub(crate) fn check_value(&self, bytes: &[u8]) -> Result<(), Abort> {
+        match self.kind {
+            Type::VisibleString(capacity) if bytes.len() > usize::from(capacity) => Err(Abort::TooLong),
+            Type::VisibleString(_) => Ok(()),
+            _ if bytes.len() > usize::from(self.field.size) => Err(Abort::TooLong),
+            _ if bytes.len() < usize::from(self.field.size) => Err(Abort::TooShort),
+            Type::Real32 => check_real(bytes),
+            _ => self.check_limits(bytes),
+        }
+    }
+
+    fn check_limits(&self, bytes: &[u8]) -> Result<(), Abort> {
+        let value = self.kind.integer(bytes).ok_or(Abort::Length)?;
+        if value > i64::from(self.high) {
+            return Err(Abort::ValueTooHigh);
+        }
+        if value < i64::from(self.low) { Err(Abort::ValueTooLow) } else { Ok(()) }
+    }
+}
+
+/// A parameter that is not a number would turn every measured value into one that is not.
+fn check_real(bytes: &[u8]) -> Result<(), Abort> {
+    let value = bytes.first_chunk().map_or(f32::NAN, |bytes| f32::from_le_bytes(*bytes));
+    if value.is_finite() { Ok(()) } else { Err(Abort::InvalidValue) }
+}
+
+/// The dictionary of one personality.
+#[derive(Clone, Copy, Debug)]
+pub struct Dictionary {
+    entries: &'static [Entry],
+    defaults: &'static [u8],
+}
+
+impl Dictionary {
+    /// From what [`compile`](super::compile) and [`default_image`](super::default_image) made of the same rows.
+    #[must_use]
+    pub const fn new(entries: &'static [Entry], defaults: &'static [u8]) -> Dictionary {
+        Dictionary { entries, defaults }
+    }
+
+    /// All entries, sorted.
+    #[must_use]
+    pub const fn entries(&self) -> &'static [Entry] {
+        self.entries
+    }
+
+    /// The image of all default values; what counts from the node-ID holds the rest.
+    #[must_use]
+    pub const fn defaults(&self) -> &'static [u8] {
+        self.defaults
+    }
+
+    /// The entry of an index and a sub-index.
+    ///
+    /// # Errors
+    /// `NoObject` where the index is unknown, `NoSubIndex` where only the sub-index is.
+    pub fn find(&self, index: u16, sub: u8) -> Result<&'static Entry, Abort> {
+        let key = u32::from(index) << 8 | u32::from(sub);
+        match self.entries.binary_search_by_key(&key, |entry| entry.key) {
+            Ok(at) => self.entries.get(at).ok_or(Abort::NoObject),
+            Err(at) => Err(self.missing(index, at)),
+        }
+    }
+
+    /// An index that exists has a neighbour of the place where the missing entry would be.
+    fn missing(&self, index: u16, at: usize) -> Abort {
+        let is_sibling = |at: usize| self.entries.get(at).is_some_and(|entry| entry.index() == index);
+        if is_sibling(at) || is_sibling(at.wrapping_sub(1)) { Abort::NoSubIndex } else { Abort::NoObject }
+    }
+
+    /// The place of a value, known at compile time.
+    ///
+    /// # Panics
+    /// During compilation, when there is no such entry.
+    #[must_use]
+    pub const fn field(&self, index: u16, sub: u8) -> Field {
+        let key = (index as u32) << 8 | sub as u32;
+        let mut i = 0;
+        while i < self.entries.len() {
+            if self.entries[i].key == key {
+                return self.entries[i].field;
+            }
+            i += 1;
+        }
+        panic!("no such entry")
+    }
+}

@@ -1,0 +1,66 @@
+//! The place of one value in the image of all values.
+
+/// Where a value lies in the image, and how long it is.
+///
+/// An image shorter than the dictionary says reads as zero and takes no write; nothing here can panic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    pub(crate) offset: u16,
+    pub(crate) size: u8,
+}
+
+impl Field {
+    /// The bytes of the value.
+    #[must_use]
+    pub fn get(self, image: &[u8]) -> &[u8] {
+        let start = usize::from(self.offset);
+        image.get(start..start + usize::from(self.size)).unwrap_or(&[])
+    }
+
+    /// Replaces the value. Fewer bytes than the value has are followed by zeros, more are cut.
+    pub fn set(self, image: &mut [u8], bytes: &[u8]) {
+        let start = usize::from(self.offset);
+        let Some(place) = image.get_mut(start..start + usize::from(self.size)) else { return };
+        for (i, byte) in place.iter_mut().enumerate() {
+            *byte = bytes.get(i).copied().unwrap_or(0);
+        }
+    }
+
+    /// The first `K` bytes from the start of the value.
+    #[must_use]
+    pub fn load<const K: usize>(self, image: &[u8]) -> [u8; K] {
+        image.get(usize::from(self.offset)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; K])
+    }
+
+    /// Replaces the first `K` bytes from the start of the value: `set` for values whose size the caller knows.
+    pub fn store<const K: usize>(self, image: &mut [u8], bytes: [u8; K]) {
+        if let Some(place) = image.get_mut(usize::from(self.offset)..).and_then(|rest| rest.first_chunk_mut())
+        {
+            *place = bytes;
+        }
+    }
+
+    /// The value of an UNSIGNED8.
+    #[must_use]
+    pub fn u8(self, image: &[u8]) -> u8 {
+        u8::from_le_bytes(self.load(image))
+    }
+
+    /// The value of an UNSIGNED16.
+    #[must_use]
+    pub fn u16(self, image: &[u8]) -> u16 {
+        u16::from_le_bytes(self.load(image))
+    }
+
+    /// The value of an UNSIGNED32.
+    #[must_use]
+    pub fn u32(self, image: &[u8]) -> u32 {
+        u32::from_le_bytes(self.load(image))
+    }
+
+    /// The value of a REAL32.
+    #[must_use]
+    pub fn f32(self, image: &[u8]) -> f32 {
+        f32::from_le_bytes(self.load(image))
+    }
+}

@@ -1,0 +1,217 @@
+//! One row of a dictionary table: everything there is to say about an entry, documentation included.
+
+use super::Type;
+
+/// Access by SDO (CiA 306).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Never changes.
+    Const,
+    /// Changes by itself.
+    ReadOnly,
+    /// A command.
+    WriteOnly,
+    /// A parameter.
+    ReadWrite,
+}
+
+impl Access {
+    /// Whether an SDO upload is allowed.
+    #[must_use]
+    pub const fn is_readable(self) -> bool {
+        !matches!(self, Access::WriteOnly)
+    }
+
+    /// Whether an SDO download is allowed.
+    #[must_use]
+    pub const fn is_writable(self) -> bool {
+        matches!(self, Access::WriteOnly | Access::ReadWrite)
+    }
+}
+
+/// Into which PDOs an entry can be mapped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mapping {
+    /// None.
+    No,
+    /// TPDOs only.
+    Tpdo,
+    /// RPDOs only.
+    Rpdo,
+}
+
+/// With which parameters an entry is saved and restored (objects 1010h, 1011h).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// Not saved.
+    Volatile,
+    /// Communication parameters, sub-index 2.
+    Communication,
+    /// Application parameters, sub-index 3.
+    Application,
+}
+
+/// The value after a reset with nothing saved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DefaultValue {
+    /// Of any integer type.
+    Integer(i64),
+    /// Of REAL32.
+    Real(f32),
+    /// Of `VISIBLE_STRING`.
+    Text(&'static str),
+    /// This plus the node-ID.
+    NodeId(u32),
+}
+
+/// What an entry does beyond holding a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// Nothing.
+    Plain,
+    /// 1003h:0, number of errors; writing 0 clears the list.
+    ErrorCount,
+    /// 1003h:1 and up, an error of the list.
+    ErrorEntry,
+    /// 1005h, COB-ID of SYNC.
+    SyncCobId,
+    /// 1014h, COB-ID of EMCY.
+    EmcyCobId,
+    /// 1017h, heartbeat producer time.
+    HeartbeatTime,
+    /// 1F80h, NMT start-up.
+    StartUp,
+    /// 1800h..:1, COB-ID of a TPDO.
+    TpdoCobId,
+    /// 1800h..:2, transmission type.
+    TpdoType,
+    /// 1800h..:3, inhibit time.
+    TpdoInhibit,
+    /// 1800h..:5, event timer.
+    TpdoEventTimer,
+    /// 1A00h..:0, number of mapped objects.
+    TpdoCount,
+    /// 1A00h..:1 and up, a mapped object.
+    TpdoSlot,
+    /// The application decides, by this number.
+    Application(u8),
+}
+
+impl Rule {
+    /// Whether the value lives elsewhere and takes no place in the image.
+    pub(crate) const fn is_computed(self) -> bool {
+        matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
+    }
+}
+
+/// One row: an entry with all its attributes.
+#[derive(Clone, Copy, Debug)]
+pub struct Object {
+    /// Index.
+    pub index: u16,
+    /// Sub-index.
+    pub sub: u8,
+    /// Name, for documents.
+    pub name: &'static str,
+    /// Data type.
+    pub kind: Type,
+    /// SDO access.
+    pub access: Access,
+    /// PDO mapping.
+    pub mapping: Mapping,
+    /// Smallest and largest value accepted, where narrower than the type.
+    pub limits: Option<(i64, i64)>,
+    /// Value after a reset.
+    pub default: DefaultValue,
+    /// Storage group.
+    pub group: Group,
+    /// Physical unit, for documents; empty where there is none.
+    pub unit: &'static str,
+    /// Special behaviour.
+    pub rule: Rule,
+}
+
+impl Object {
+    /// A row with default 0 and no special attribute.
+    #[must_use]
+    pub const fn new(index: u16, sub: u8, name: &'static str, kind: Type, access: Access) -> Object {
+        let default = match kind {
+            Type::Real32 => DefaultValue::Real(0.0),
+            Type::VisibleString(_) => DefaultValue::Text(""),
+            _ => DefaultValue::Integer(0),
+        };
+        let (mapping, group, rule) = (Mapping::No, Group::Volatile, Rule::Plain);
+        Object { index, sub, name, kind, access, mapping, limits: None, default, group, unit: "", rule }
+    }
+
+    /// Sub-index 0 of a record or an array: the highest sub-index.
+    #[must_use]
+    pub const fn highest(index: u16, highest: u8, name: &'static str) -> Object {
+        Object::new(index, 0, name, Type::Unsigned8, Access::ReadOnly).value(highest as i64)
+    }
+
+    /// Sets the default value.
+    #[must_use]
+    pub const fn default(mut self, default: DefaultValue) -> Object {
+        self.default = default;
+        self
+    }
+
+    /// Sets an integer default value.
+    #[must_use]
+    pub const fn value(self, value: i64) -> Object {
+        self.default(DefaultValue::Integer(value))
+    }
+
+    /// Sets a REAL32 default value.
+    #[must_use]
+    pub const fn real(self, value: f32) -> Object {
+        self.default(DefaultValue::Real(value))
+    }
+
+    /// Sets the limits.
+    #[must_use]
+    pub const fn limits(mut self, low: i64, high: i64) -> Object {
+        self.limits = Some((low, high));
+        self
+    }
+
+    /// Sets the storage group.
+    #[must_use]
+    pub const fn saved(mut self, group: Group) -> Object {
+        self.group = group;
+        self
+    }
+
+    /// Makes it mappable.
+    #[must_use]
+    pub const fn mappable(mut self, mapping: Mapping) -> Object {
+        self.mapping = mapping;
+        self
+    }
+
+    /// Sets the physical unit.
+    #[must_use]
+    pub const fn unit(mut self, unit: &'static str) -> Object {
+        self.unit = unit;
+        self
+    }
+
+    /// Sets the special behaviour.
+    #[must_use]
+    pub const fn rule(mut self, rule: Rule) -> Object {
+        self.rule = rule;
+        self
+    }
+
+    /// Index and sub-index as one number, in the order of the table.
+    #[must_use]
+    pub const fn key(&self) -> u32 {
+        (self.index as u32) << 8 | self.sub as u32
+    }
+
+    /// Bytes it takes in the image.
+    pub(crate) const fn stored_size(&self) -> usize {
+        if self.rule.is_computed() { 0 } else { self.kind.size() as usize }
+    }
+}

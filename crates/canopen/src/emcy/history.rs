@@ -1,0 +1,58 @@
+//! The pre-defined error field, object 1003h.
+
+/// How many errors are kept.
+const DEPTH: u8 = 10;
+
+/// The last errors, newest first, each as its four bytes in an upload.
+#[derive(Debug)]
+pub(crate) struct History {
+    count: u8,
+    errors: [[u8; 4]; DEPTH as usize],
+}
+
+impl History {
+    pub(crate) const fn new() -> History {
+        History { count: 0, errors: [[0; 4]; DEPTH as usize] }
+    }
+
+    pub(crate) fn push(&mut self, code: u16) {
+        self.errors.rotate_right(1);
+        if let Some(first) = self.errors.first_mut() {
+            *first = u32::from(code).to_le_bytes();
+        }
+        self.count = self.count.saturating_add(1).min(DEPTH);
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Sub-index 0.
+    pub(crate) fn count(&self) -> &u8 {
+        &self.count
+    }
+
+    /// Sub-index 1 and up; `None` beyond the last error.
+    pub(crate) fn error(&self, sub: u8) -> Option<&[u8; 4]> {
+        let at = sub.checked_sub(1).filter(|&at| at < self.count)?;
+        self.errors.get(usize::from(at))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_errors_newest_first() {
+        let mut history = History::new();
+        (1..=12).for_each(|code| history.push(code));
+        assert_eq!(*history.count(), 10);
+        assert_eq!(history.error(1), Some(&[12, 0, 0, 0]));
+        assert_eq!(history.error(10), Some(&[3, 0, 0, 0]));
+        assert_eq!(history.error(11), None);
+        assert_eq!(history.error(0), None);
+        history.clear();
+        assert_eq!((*history.count(), history.error(1)), (0, None));
+    }
+}

@@ -1,0 +1,10 @@
+//! EMCY: faults, what is sent about them and what is remembered (CiA 301, 7.2.7).
+
+mod fault;
+mod history;
+mod message;
+mod producer;
+
+pub use fault::Fault;
+pub use message::Message;
+pub(crate) use producer::{Producer, check_cob_id};

@@ -1,0 +1,121 @@
+//! The EMCY producer: keeps the set of faults, sends what changes.
+
+use super::history::History;
+use super::{Fault, Message};
+use crate::sdo::Abort;
+use crate::transmit::RETRY;
+use crate::{CobId, Frame, Instant, Transmit};
+use heapless::Deque;
+
+/// Messages that can wait for the queue or for the inhibit time; what comes on top of that is only in the history.
+const WAITING: usize = 8;
+
+/// Faults, their history and the messages about them.
+#[derive(Debug)]
+pub(crate) struct Producer {
+    /// 1014h; `None` while bit 31 says that there is no EMCY.
+    id: Option<CobId>,
+    active: u32,
+    history: History,
+    waiting: Deque<Message, WAITING>,
+    due: Instant,
+}
+
+impl Producer {
+    pub(crate) const fn new() -> Producer {
+        Producer { id: None, active: 0, history: History::new(), waiting: Deque::new(), due: Instant::NEVER }
+    }
+
+    /// Takes the COB-ID of 1014h. Bit 31 set means that EMCY does not exist.
+    pub(crate) fn configure(&mut self, value: u32) {
+        self.id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
+    }
+
+    /// After a reset: the list is empty, and the faults that are still there are news again.
+    pub(crate) fn restart(&mut self, now: Instant) {
+        self.history.clear();
+        self.waiting.clear();
+        self.due = Instant::NEVER;
+        let active = core::mem::take(&mut self.active);
+        for fault in Fault::ALL.into_iter().filter(|fault| active & fault.bit() != 0) {
+            self.raise(fault, now);
+        }
+    }
+
+    /// Whether it is a new fault.
+    pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
+        if self.active & fault.bit() != 0 {
+            return false;
+        }
+        self.active |= fault.bit();
+        self.history.push(fault.code());
+        self.report(fault.code(), now);
+        true
+    }
+
+    /// Code 0000h is sent when the last fault is gone.
+    pub(crate) fn clear(&mut self, fault: Fault, now: Instant) {
+        if self.active & fault.bit() == 0 {
+            return;
+        }
+        self.active &= !fault.bit();
+        if self.active == 0 {
+            self.report(0, now);
+        }
+    }
+
+    fn report(&mut self, code: u16, now: Instant) {
+        let message = Message { code, register: self.register(), detail: [0; 5] };
+        // A full queue keeps the older messages: they tell how the trouble began.
+        let _ = self.waiting.push_back(message);
+        self.due = self.due.min(now);
+    }
+
+    /// The error register, object 1001h.
+    pub(crate) fn register(&self) -> u8 {
+        let is_active = |fault: &Fault| self.active & fault.bit() != 0;
+        Fault::ALL.into_iter().filter(is_active).fold(0, |register, fault| register | fault.register())
+    }
+
+    pub(crate) fn history(&self) -> &History {
+        &self.history
+    }
+
+    pub(crate) fn clear_history(&mut self) {
+        self.history.clear();
+    }
+
+    /// The next instant at which a message is due.
+    pub(crate) fn due(&self) -> Instant {
+        self.due
+    }
+
+    /// Sends what waits. To be called in states that have EMCY only; what waits then waits on.
+    pub(crate) fn poll(&mut self, now: Instant, out: &mut impl Transmit) {
+        if now < self.due {
+            return;
+        }
+        let Some(cob_id) = self.id else {
+            self.waiting.clear();
+            self.due = Instant::NEVER;
+            return;
+        };
+        while let Some(message) = self.waiting.front() {
+            if out.send(Frame::data_frame(cob_id.id, 8, message.encode())).is_err() {
+                self.due = now + RETRY;
+                return;
+            }
+            let _ = self.waiting.pop_front();
+        }
+        self.due = Instant::NEVER;
+    }
+}
+
+/// Checks a new value of 1014h: its CAN-ID is configurable and changes only while EMCY does not exist (bit 31).
+pub(crate) fn check_cob_id(old: u32, new: u32) -> Result<(), Abort> {
+    let new = CobId::parse(new).filter(|cob_id| !cob_id.bit30).ok_or(Abort::InvalidValue)?;
+    let old = CobId::parse(old).ok_or(Abort::InvalidValue)?;
+    let stays = !old.bit31 && !new.bit31;
+    let moves = stays && old.id != new.id;
+    if moves || new.id.is_restricted() { Err(Abort::InvalidValue) } else { Ok(()) }
+}

@@ -1,0 +1,10 @@
+//! PDO: process data, mapped from and to the dictionary (CiA 301, 7.2.2).
+
+mod mapping;
+mod tpdo;
+mod transmission;
+
+pub use mapping::MappedObject;
+pub(crate) use mapping::{Direction, Layout, locate};
+pub(crate) use tpdo::{Settings, Tpdo};
+pub use transmission::Transmission;

@@ -1,0 +1,180 @@
+//! One TPDO: when it is sent.
+//!
+//! The event of the types 254 and 255: with an event timer, the timer alone sends (a measured value changes a
+//! thousand times a second); without one, every change of a mapped value does, at most once per inhibit time.
+//! Entering Operational is an event in both cases.
+
+use super::{Layout, Transmission};
+use crate::transmit::RETRY;
+use crate::{CanId, CobId, Duration, Frame, Instant, Transmit};
+
+/// What the objects 1800h.. and 1A00h.. say about a TPDO that is valid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Settings {
+    pub(crate) id: CanId,
+    /// Whether a remote frame is answered (bit 30 of the COB-ID is 0).
+    pub(crate) answers_remote: bool,
+    pub(crate) transmission: Transmission,
+    pub(crate) inhibit: Duration,
+    pub(crate) event: Duration,
+    pub(crate) layout: Layout,
+}
+
+impl Settings {
+    /// From a COB-ID and a transmission type as they are stored; `None` for a PDO that is not valid.
+    pub(crate) fn new(cob_id: u32, transmission: u8) -> Option<Settings> {
+        let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
+        Some(Settings {
+            id: cob_id.id,
+            answers_remote: !cob_id.bit30,
+            transmission: Transmission::parse(transmission)?,
+            inhibit: Duration(0),
+            event: Duration(0),
+            layout: Layout::default(),
+        })
+    }
+
+    fn sends_on_change(&self) -> bool {
+        self.transmission == Transmission::Event && self.event.is_zero()
+    }
+}
+
+/// A TPDO and its timers. Without settings it does not exist.
+#[derive(Debug)]
+pub(crate) struct Tpdo {
+    settings: Option<Settings>,
+    /// Something waits to be sent: an event within the inhibit time, or a frame that found the queue full.
+    pending: bool,
+    /// SYNCs since the last transmission.
+    syncs: u8,
+    /// Data as last sent, or as sampled with SYNC for type 252.
+    data: Option<[u8; 8]>,
+    /// When the event timer elapses.
+    event_due: Instant,
+    /// Before this, an event waits.
+    inhibited_until: Instant,
+}
+
+impl Tpdo {
+    pub(crate) const fn new() -> Tpdo {
+        Tpdo {
+            settings: None,
+            pending: false,
+            syncs: 0,
+            data: None,
+            event_due: Instant::NEVER,
+            inhibited_until: Instant(0),
+        }
+    }
+
+    /// Takes new settings and starts afresh.
+    pub(crate) fn configure(&mut self, settings: Option<Settings>) {
+        *self = Tpdo { settings, ..Tpdo::new() };
+    }
+
+    pub(crate) fn settings(&self) -> Option<&Settings> {
+        self.settings.as_ref()
+    }
+
+    /// Whether something waits to be sent.
+    pub(crate) fn is_pending(&self) -> bool {
+        self.pending
+    }
+
+    /// Entering Operational, or becoming valid in it.
+    pub(crate) fn start(&mut self) {
+        self.stop();
+        self.pending = self.settings.is_some_and(|settings| settings.transmission == Transmission::Event);
+    }
+
+    /// Leaving Operational: nothing is due, a PDO that waits is dropped.
+    pub(crate) fn stop(&mut self) {
+        (self.pending, self.syncs, self.data) = (false, 0, None);
+        (self.event_due, self.inhibited_until) = (Instant::NEVER, Instant(0));
+    }
+
+    /// The next instant at which something is due.
+    pub(crate) fn due(&self) -> Instant {
+        if self.pending { self.inhibited_until.min(self.event_due) } else { self.event_due }
+    }
+
+    /// A SYNC arrived.
+    pub(crate) fn on_sync(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+        let Some(settings) = &self.settings else { return };
+        match settings.transmission {
+            Transmission::SyncCyclic(every) => {
+                self.syncs = self.syncs.saturating_add(1);
+                if self.syncs >= every.get() {
+                    self.syncs = 0;
+                    self.send(image, now, out);
+                }
+            }
+            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, now, out),
+            Transmission::SyncRemote => self.data = Some(settings.layout.gather(image)),
+            _ => (),
+        }
+    }
+
+    /// A remote frame asks for it. The synchronous types 0 to 240 belong to the SYNC and do not answer.
+    pub(crate) fn on_remote(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+        let Some(settings) = self.settings.as_ref().filter(|settings| settings.answers_remote) else {
+            return;
+        };
+        match (settings.transmission, self.data) {
+            (Transmission::SyncRemote, Some(sampled)) => {
+                // The client asks again if the queue is full: a sample of the past need not be kept for it.
+                let _ = out.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+            }
+            (Transmission::Remote | Transmission::Event, _) => self.send(image, now, out),
+            _ => (),
+        }
+    }
+
+    /// Mapped values may have changed.
+    pub(crate) fn on_change(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+        if self.settings.as_ref().is_some_and(Settings::sends_on_change) && self.has_changed(image) {
+            self.pending = true;
+            self.poll(image, now, out);
+        }
+    }
+
+    fn has_changed(&self, image: &[u8]) -> bool {
+        self.settings.as_ref().is_some_and(|settings| self.data != Some(settings.layout.gather(image)))
+    }
+
+    /// Sends what is due.
+    pub(crate) fn poll(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+        let elapsed = now >= self.event_due;
+        self.pending |= elapsed;
+        if elapsed {
+            self.event_due = self.following_event(now);
+        }
+        if self.pending && now >= self.inhibited_until {
+            self.send(image, now, out);
+        }
+    }
+
+    /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
+    fn following_event(&self, now: Instant) -> Instant {
+        let Some(settings) = self.settings.filter(|settings| !settings.event.is_zero()) else {
+            return Instant::NEVER;
+        };
+        let next = self.event_due + settings.event;
+        if next > now && next < Instant::NEVER { next } else { now + settings.event }
+    }
+
+    /// Sends the present values. A full queue leaves it pending: when there is room, the values of then go out.
+    fn send(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+        let Some(settings) = &self.settings else { return };
+        let data = settings.layout.gather(image);
+        let sent = out.send(Frame::data_frame(settings.id, settings.layout.len(), data)).is_ok();
+        self.pending = !sent;
+        self.inhibited_until = now + if sent { settings.inhibit } else { RETRY };
+        if sent {
+            self.data = Some(data);
+        }
+        if settings.transmission == Transmission::Event && self.event_due == Instant::NEVER {
+            self.event_due = self.following_event(now);
+        }
+    }
+}

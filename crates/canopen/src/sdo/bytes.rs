@@ -1,0 +1,58 @@
+//! Up to `N` bytes, the rest zero.
+
+/// Up to `N` bytes (`N` below 256). What follows them is zero, so that equal content compares equal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bytes<const N: usize> {
+    len: u8,
+    data: [u8; N],
+}
+
+impl<const N: usize> Bytes<N> {
+    /// The first `len` bytes of `data`, at most all of them.
+    #[must_use]
+    pub fn new(mut data: [u8; N], len: u8) -> Bytes<N> {
+        for byte in data.iter_mut().skip(usize::from(len)) {
+            *byte = 0;
+        }
+        Bytes { len: len.min(Self::CAPACITY), data }
+    }
+
+    /// The first bytes of a slice, at most `N`.
+    #[must_use]
+    pub fn from_slice(bytes: &[u8]) -> Bytes<N> {
+        let mut data = [0; N];
+        let mut len = 0;
+        for (to, from) in data.iter_mut().zip(bytes) {
+            *to = *from;
+            len += 1;
+        }
+        Bytes { len, data }
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // N is below 256.
+    const CAPACITY: u8 = N as u8;
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> u8 {
+        self.len
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn as_slice(&self) -> &[u8] {
+        self.data.get(..usize::from(self.len)).unwrap_or(&[])
+    }
+
+    /// The bytes, then zeros.
+    #[must_use]
+    pub fn padded(&self) -> [u8; N] {
+        self.data
+    }
+}

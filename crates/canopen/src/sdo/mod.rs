@@ -1,0 +1,66 @@
+//! SDO: access to the dictionary (CiA 301, 7.2.4). The messages, and the server that answers them.
+
+mod abort;
+mod bytes;
+mod request;
+mod response;
+mod server;
+
+pub use abort::Abort;
+pub use bytes::Bytes;
+pub use request::{Initiate, Request};
+pub use response::Response;
+pub(crate) use server::{Objects, Server};
+
+/// What a transfer is about: index and sub-index, bytes 1 to 3 of the initiating frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Multiplexer {
+    /// Index.
+    pub index: u16,
+    /// Sub-index.
+    pub sub: u8,
+}
+
+impl Multiplexer {
+    const fn parse(frame: [u8; 8]) -> Multiplexer {
+        Multiplexer { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
+    }
+
+    /// A frame with it, its command specifier and four bytes.
+    const fn frame(self, command: u8, data: [u8; 4]) -> [u8; 8] {
+        let [low, high] = self.index.to_le_bytes();
+        [command, low, high, self.sub, data[0], data[1], data[2], data[3]]
+    }
+}
+
+/// One segment of a segmented transfer, the same in both directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Alternates from segment to segment, starting with 0.
+    pub toggle: bool,
+    /// No segment follows.
+    pub last: bool,
+    /// Its data.
+    pub data: Bytes<7>,
+}
+
+impl Segment {
+    fn parse(frame: [u8; 8]) -> Segment {
+        let [command, data @ ..] = frame;
+        let unused = command >> 1 & 7;
+        Segment { toggle: command & 0x10 != 0, last: command & 1 != 0, data: Bytes::new(data, 7 - unused) }
+    }
+
+    fn encode(self, command: u8) -> [u8; 8] {
+        let unused = 7 - self.data.len();
+        let mut frame = [command | u8::from(self.toggle) << 4 | unused << 1 | u8::from(self.last); 8];
+        let [_, data @ ..] = &mut frame;
+        *data = self.data.padded();
+        frame
+    }
+}
+
+/// Data bytes 4 to 7 of a frame.
+const fn tail(frame: [u8; 8]) -> [u8; 4] {
+    [frame[4], frame[5], frame[6], frame[7]]
+}

@@ -1,0 +1,62 @@
+//! What the server answers.
+
+use super::{Bytes, Multiplexer, Segment, tail};
+
+/// A response of an SDO server. An abort carries the bare code, as a client may meet any.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Response {
+    /// Written, or ready for segments.
+    Downloaded(Multiplexer),
+    /// Segment written.
+    DownloadedSegment {
+        /// Of the segment.
+        toggle: bool,
+    },
+    /// Read: all the data, one to four bytes.
+    Uploaded(Multiplexer, Bytes<4>),
+    /// Read: segments follow, of this many bytes in all.
+    UploadSegmented(Multiplexer, u32),
+    /// Read: the next segment.
+    UploadedSegment(Segment),
+    /// Refused or given up.
+    Abort(Multiplexer, u32),
+}
+
+impl Response {
+    /// `None` for an unknown command specifier.
+    #[must_use]
+    pub fn parse(frame: [u8; 8]) -> Option<Response> {
+        let multiplexer = Multiplexer::parse(frame);
+        match frame[0] >> 5 {
+            0 => Some(Response::UploadedSegment(Segment::parse(frame))),
+            1 => Some(Response::DownloadedSegment { toggle: frame[0] & 0x10 != 0 }),
+            2 => Response::parse_upload(multiplexer, frame),
+            3 => Some(Response::Downloaded(multiplexer)),
+            4 => Some(Response::Abort(multiplexer, u32::from_le_bytes(tail(frame)))),
+            _ => None,
+        }
+    }
+
+    fn parse_upload(multiplexer: Multiplexer, frame: [u8; 8]) -> Option<Response> {
+        match frame[0] & 0x03 {
+            0b11 => Some(Response::Uploaded(multiplexer, Bytes::new(tail(frame), 4 - (frame[0] >> 2 & 3)))),
+            0b01 => Some(Response::UploadSegmented(multiplexer, u32::from_le_bytes(tail(frame)))),
+            _ => None,
+        }
+    }
+
+    /// The frame's data.
+    #[must_use]
+    pub fn encode(self) -> [u8; 8] {
+        match self {
+            Response::Downloaded(multiplexer) => multiplexer.frame(0x60, [0; 4]),
+            Response::DownloadedSegment { toggle } => [0x20 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0],
+            Response::Uploaded(multiplexer, bytes) => {
+                multiplexer.frame(0x43 | (4 - bytes.len().max(1)) << 2, bytes.padded())
+            }
+            Response::UploadSegmented(multiplexer, size) => multiplexer.frame(0x41, size.to_le_bytes()),
+            Response::UploadedSegment(segment) => segment.encode(0x00),
+            Response::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),
+        }
+    }
+}
