@@ -1,0 +1,134 @@
+//! `cargo sim` itself: builds the world from the command line, lets it run, shows it, and sums up.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use canbus::{Record, Stamped, Time};
+
+use crate::cli::{Options, Speed};
+use crate::console::{self, Command};
+use crate::display::Display;
+use crate::gateway::{BUS_NAME, Gateway, Protocol};
+use crate::greeting::greeting;
+use crate::pace::Pace;
+use crate::setup;
+use crate::summary::Summary;
+use crate::world::World;
+
+/// Clients, commands and the display are looked at this often, in virtual time.
+const STEP: Time = Time::from_millis(1);
+
+/// A running simulation.
+struct App {
+    world: World,
+    gateway: Gateway,
+    display: Display,
+    commands: Option<Receiver<String>>,
+    candump: Option<BufWriter<File>>,
+    interrupted: Arc<AtomicBool>,
+    options: Options,
+}
+
+/// Runs until the time asked for is over, or the user ends it, and returns the summary.
+pub fn run(options: Options) -> Result<Summary> {
+    let mut app = App::open(options)?;
+    let started = Instant::now();
+    let outcome = app.run();
+    let host = started.elapsed().as_secs_f64();
+    app.close()?;
+    outcome?;
+    Ok(app.world.summary(host, app.gateway.lost()))
+}
+
+impl App {
+    fn open(options: Options) -> Result<App> {
+        let mut world = setup::world(&options)?;
+        let mut gateway = Gateway::new(setup::bits_per_second(options.bitrate));
+        let socketcand = gateway.listen(options.socketcand, Protocol::Socketcand)?;
+        let slcan = options.slcan.map(|address| gateway.listen(address, Protocol::Slcan)).transpose()?;
+        if let Some(interface) = &options.socketcan {
+            gateway.attach_interface(interface, &mut world)?;
+        }
+        let candump = options.candump.as_ref().map(|path| {
+            File::create(path).map(BufWriter::new).with_context(|| format!("cannot write {}", path.display()))
+        });
+        let candump = candump.transpose()?;
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&interrupted);
+        ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot catch Ctrl-C")?;
+        let display = Display::open(&greeting(&options, socketcand, slcan))?;
+        let commands = (!display.takes_commands()).then(console::lines);
+        Ok(App { world, gateway, display, commands, candump, interrupted, options })
+    }
+
+    fn run(&mut self) -> Result<()> {
+        let end = self.options.duration.unwrap_or(Time::NEVER);
+        let mut pace = (self.options.speed == Speed::Real).then(Pace::new);
+        while self.world.now() < end && !self.interrupted.load(Ordering::Relaxed) {
+            self.step(end)?;
+            if let Some(pace) = &mut pace {
+                pace.wait(self.world.now());
+            }
+        }
+        Ok(())
+    }
+
+    /// One millisecond of everything.
+    fn step(&mut self, end: Time) -> Result<()> {
+        self.gateway.poll(&mut self.world);
+        self.world.run_until(end.min(self.world.now() + STEP))?;
+        self.gateway.deliver(&mut self.world);
+        self.write_candump()?;
+        self.show()
+    }
+
+    fn write_candump(&mut self) -> Result<()> {
+        let frames = self.world.take_frames();
+        let Some(candump) = &mut self.candump else { return Ok(()) };
+        for Stamped { at, frame } in frames {
+            let record = Record { at, interface: BUS_NAME.to_owned(), frame };
+            writeln!(candump, "{record}").context("cannot write the candump file")?;
+        }
+        Ok(())
+    }
+
+    fn show(&mut self) -> Result<()> {
+        for line in self.world.take_log() {
+            if line.level >= self.options.log {
+                self.display.log(&line)?;
+            }
+        }
+        let typed = self.display.update(self.world.now(), || self.world.status())?;
+        if let Some(command) = typed {
+            self.obey(command);
+        }
+        while let Some(line) = self.commands.as_ref().and_then(|lines| lines.try_recv().ok()) {
+            match console::parse(&line) {
+                Some(Ok(command)) => self.obey(command),
+                Some(Err(error)) => self.display.say(error),
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::Quit => self.interrupted.store(true, Ordering::Relaxed),
+            Command::Stimulus(stimulus) => self.world.apply(&stimulus),
+        }
+    }
+
+    /// Keeps what is to be kept.
+    fn close(&mut self) -> Result<()> {
+        if let Some(candump) = &mut self.candump {
+            candump.flush().context("cannot write the candump file")?;
+        }
+        setup::keep_flash(&self.options, &self.world)
+    }
+}

@@ -1,0 +1,216 @@
+//! The command line.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use canbus::Time;
+use clap::{Parser, ValueEnum};
+use storage::DeviceRecord;
+
+use crate::personality::Personality;
+use crate::stimuli::{Stimulus, Targeted};
+
+/// Runs the firmware on emulated boards that share a CAN bus with your programs.
+#[derive(Debug, Parser)]
+#[command(name = "cargo sim", bin_name = "cargo sim", version, max_term_width = 100)]
+pub struct Options {
+    /// ELF file of the firmware.
+    #[arg(long, value_name = "PATH", hide = true)]
+    pub firmware: PathBuf,
+
+    /// ELF file of the bootloader; without one the firmware starts at once.
+    #[arg(long, value_name = "PATH", hide = true)]
+    pub bootloader: Option<PathBuf>,
+
+    /// A board with this node-ID and personality; may be given up to 127 times.
+    #[arg(long = "node", value_name = "ID:PERSONALITY", default_value = "1:pressure")]
+    pub nodes: Vec<Node>,
+
+    /// Serve socketcand here, with the bus name vcan0. Port 0 takes a free one.
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:29536", value_parser = address)]
+    pub socketcand: SocketAddr,
+
+    /// Serve slcan (LAWICEL) here. Port 0 takes a free one.
+    #[arg(long, value_name = "ADDR:PORT", value_parser = address)]
+    pub slcan: Option<SocketAddr>,
+
+    /// Attach to this SocketCAN interface of the host (Linux).
+    #[arg(long, value_name = "IFACE")]
+    pub socketcan: Option<String>,
+
+    /// Bit rate of the bus in kbit/s: 10, 20, 50, 125, 250, 500, 800 or 1000.
+    #[arg(long, value_name = "KBIT/S", default_value = "250", value_parser = bit_rate)]
+    pub bitrate: u16,
+
+    /// As fast as a real board, or as fast as this machine can.
+    #[arg(long, value_enum, default_value = "real")]
+    pub speed: Speed,
+
+    /// Stop after this much virtual time.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    pub duration: Option<Time>,
+
+    /// Keep the boards' flash in this directory between runs, one file a node.
+    #[arg(long, value_name = "DIR")]
+    pub flash: Option<PathBuf>,
+
+    /// Write every frame to this file in the format of candump -l.
+    #[arg(long, value_name = "FILE")]
+    pub candump: Option<PathBuf>,
+
+    /// Show log lines of this level and above.
+    #[arg(long, value_enum, default_value = "info")]
+    pub log: LogLevel,
+
+    /// Pressure at the sensor in Pa, e.g. const:250000 or sine:250000,100000,2.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("pressure", text))]
+    pub pressure: Vec<Targeted<Stimulus>>,
+
+    /// Temperature of the sensor in K, e.g. const:298.15.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("temperature", text))]
+    pub temperature: Vec<Targeted<Stimulus>>,
+
+    /// The encoder's shaft in revolutions, or its speed, e.g. const:0.25 or rpm:6000.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("shaft", text))]
+    pub shaft: Vec<Targeted<Stimulus>>,
+
+    /// A fault from a time on, e.g. open-sensor@2.5.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("fault", text))]
+    pub fault: Vec<Targeted<Stimulus>>,
+
+    /// Load the bus with foreign frames of the lowest priority, in percent of its time.
+    #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
+    pub load: u8,
+
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A board that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// Node-ID, 1 to 127.
+    pub id: u8,
+    /// What it measures.
+    pub personality: Personality,
+}
+
+impl FromStr for Node {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Node, String> {
+        let (id, personality) = text.split_once(':').unwrap_or((text, "pressure"));
+        let id = node_id(id).ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"))?;
+        Ok(Node { id, personality: personality.parse()? })
+    }
+}
+
+/// How virtual time relates to that of the host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Speed {
+    /// One virtual second takes one second.
+    Real,
+    /// As fast as possible.
+    Max,
+}
+
+/// Levels of the firmware's log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum LogLevel {
+    /// Everything.
+    Trace,
+    /// For its developers.
+    Debug,
+    /// What happens.
+    Info,
+    /// What should not happen.
+    Warn,
+    /// What must not happen.
+    Error,
+    /// Nothing.
+    Off,
+}
+
+/// A node-ID of CiA 301.
+pub(crate) fn node_id(text: &str) -> Option<u8> {
+    text.parse().ok().filter(|id| (1..=127).contains(id))
+}
+
+fn bit_rate(text: &str) -> Result<u16, String> {
+    let rate = text.parse().ok().filter(|rate| DeviceRecord::BIT_RATES.contains(rate));
+    rate.ok_or_else(|| format!("CANopen has these bit rates in kbit/s: {:?}", DeviceRecord::BIT_RATES))
+}
+
+/// An address may be a name, as localhost is.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let mut addresses = text.to_socket_addrs().map_err(|_| "it is not of the form ADDR:PORT".to_owned())?;
+    addresses.next().ok_or_else(|| "no such host".to_owned())
+}
+
+/// Virtual seconds; ten years are as good as for ever.
+fn seconds(text: &str) -> Result<Time, String> {
+    const MOST: f64 = 315_360_000.0;
+    let seconds = text.parse::<f64>().ok().filter(|seconds| (0.0..=MOST).contains(seconds));
+    let seconds = seconds.ok_or_else(|| format!("{text:?} is not a number of seconds"))?;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    Ok(Time::from_micros((seconds * 1e6).round() as u64))
+}
+
+/// The first paragraph of clap's message, which says what is wrong, without the usage that follows it.
+pub fn one_line(message: &str) -> String {
+    let words = message.lines().take_while(|line| !line.trim().is_empty()).flat_map(str::split_whitespace);
+    words.collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(flags: &str) -> Result<Options, String> {
+        let words = ["sim", "--firmware", "f"].into_iter().chain(flags.split_whitespace());
+        Options::try_parse_from(words).map_err(|error| one_line(&error.to_string()))
+    }
+
+    #[test]
+    fn the_defaults() {
+        let options = read("").unwrap();
+        assert_eq!(options.nodes, [Node { id: 1, personality: Personality::Pressure }]);
+        assert_eq!(options.socketcand.to_string(), "127.0.0.1:29536");
+        assert_eq!((options.bitrate, options.speed, options.duration), (250, Speed::Real, None));
+    }
+
+    #[test]
+    fn every_flag_of_the_manual() {
+        let flags = "--node 1:pressure --node 2:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
+             --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 \
+             --shaft 2=rpm:6000 --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
+        let options = read(flags).unwrap();
+        assert_eq!(options.nodes.len(), 2);
+        assert_eq!(options.duration, Some(Time::from_millis(2500)));
+        assert_eq!((options.shaft[0].node, options.pressure[0].node), (Some(2), None));
+    }
+
+    #[test]
+    fn mistakes_are_told_in_one_line() {
+        let wrong = [
+            ("--node 0:pressure", "0"),
+            ("--node 128:pressure", "128"),
+            ("--node 1:toaster", "it has: pressure"),
+            ("--bitrate 251", "250"),
+            ("--for -1", "-1"),
+            ("--for x", "not a number of seconds"),
+            ("--socketcand nowhere", "nowhere"),
+            ("--load 101", "101"),
+            ("--pressure 1=nonsense", "nonsense"),
+            ("--speed warp", "real, max"),
+            ("--wings", "--wings"),
+        ];
+        for (flags, reason) in wrong {
+            let message = read(flags).unwrap_err();
+            assert!(message.starts_with("error: ") && message.contains(reason), "{flags}: {message}");
+            assert!(!message.contains('\n'));
+        }
+    }
+}

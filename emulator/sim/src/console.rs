@@ -1,0 +1,58 @@
+//! Commands that are typed while the simulation runs.
+
+use std::io::BufRead;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+
+use crate::stimuli::{Stimulus, Targeted};
+
+/// What can be asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Another stimulus from now on.
+    Stimulus(Targeted<Stimulus>),
+    /// End the run, with its summary.
+    Quit,
+}
+
+/// How to write a command.
+pub const HELP: &str = "commands: pressure|temperature|shaft|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
+
+/// Reads one line; `None` for an empty one.
+pub fn parse(line: &str) -> Option<Result<Command, String>> {
+    let line = line.trim();
+    let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+    Some(match word {
+        "" => return None,
+        "quit" if rest.is_empty() => Ok(Command::Quit),
+        "help" => Err(HELP.to_owned()),
+        "pressure" | "temperature" | "shaft" | "fault" => Stimulus::parse(word, rest.trim()).map(Command::Stimulus),
+        _ => Err(format!("{word:?} is no command; {HELP}")),
+    })
+}
+
+/// Lines from the standard input, read by a thread of their own.
+pub fn lines() -> Receiver<String> {
+    let (sender, lines) = channel();
+    thread::spawn(move || {
+        let input = std::io::stdin().lock();
+        input.lines().map_while(Result::ok).take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
+    });
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_and_what_is_none() {
+        assert_eq!(parse("  "), None);
+        assert_eq!(parse(" quit "), Some(Ok(Command::Quit)));
+        let Some(Ok(Command::Stimulus(stimulus))) = parse("pressure 1=const:300000") else { panic!() };
+        assert_eq!(stimulus.node, Some(1));
+        for line in ["fly", "pressure", "pressure 1=", "pressure nonsense", "quit now", "shaft 200=const:1"] {
+            assert!(matches!(parse(line), Some(Err(_))), "{line}");
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! What the user sees: a live screen on a terminal, plain lines elsewhere.
+
+mod plain;
+mod screen;
+
+use std::io::{self, IsTerminal};
+
+use canbus::Time;
+
+use crate::console::Command;
+use crate::log::Line;
+use crate::status::{NodeStatus, Status};
+use plain::Plain;
+use screen::Screen;
+
+/// The one or the other.
+pub struct Display(Kind);
+
+enum Kind {
+    Screen(Box<Screen>),
+    Plain(Plain),
+}
+
+impl Display {
+    /// Shows `greeting` first. `heading` names what runs.
+    pub fn open(greeting: &[String]) -> io::Result<Display> {
+        let interactive = io::stdout().is_terminal() && io::stdin().is_terminal();
+        let kind = if interactive {
+            Kind::Screen(Box::new(Screen::open(greeting)?))
+        } else {
+            Kind::Plain(Plain::new(greeting)?)
+        };
+        Ok(Display(kind))
+    }
+
+    /// Whether commands are typed on the screen; if not, they come line by line on the standard input.
+    pub fn takes_commands(&self) -> bool {
+        matches!(self.0, Kind::Screen(_))
+    }
+
+    /// Shows a line of a board's log.
+    pub fn log(&mut self, line: &Line) -> io::Result<()> {
+        match &mut self.0 {
+            Kind::Screen(screen) => screen.log(log_line(line)),
+            Kind::Plain(plain) => plain.log(line)?,
+        }
+        Ok(())
+    }
+
+    /// Tells the user something about a command.
+    pub fn say(&mut self, text: String) {
+        match &mut self.0 {
+            Kind::Screen(screen) => screen.log(text),
+            Kind::Plain(_) => eprintln!("{text}"),
+        }
+    }
+
+    /// Shows the state of the nodes when it is time to, and returns what the user has typed.
+    pub fn update(&mut self, now: Time, status: impl FnOnce() -> Status) -> io::Result<Option<Command>> {
+        match &mut self.0 {
+            Kind::Screen(screen) => screen.update(status),
+            Kind::Plain(plain) => plain.update(now, status).map(|()| None),
+        }
+    }
+}
+
+fn log_line(line: &Line) -> String {
+    format!("{} node {} {:5} {}", line.at, line.node, format!("{:?}", line.level).to_lowercase(), line.text)
+}
+
+/// The process value as the node itself sends it.
+fn process_value(node: &NodeStatus) -> String {
+    node.heard.process_value.map_or_else(|| "no TPDO".to_owned(), |value| format!("{value:.3}"))
+}

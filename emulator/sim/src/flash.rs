@@ -1,0 +1,76 @@
+//! The boards' flash as files, so that parameters outlive a run.
+
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+/// Bytes of the STM32F446RE's flash.
+pub const SIZE: usize = 512 * 1024;
+
+/// One file a node.
+pub fn file(dir: &Path, node: u8) -> PathBuf {
+    dir.join(format!("node-{node}.flash"))
+}
+
+/// The kept contents of a board's flash; `None` when there are none yet.
+pub fn load(dir: &Path, node: u8) -> Result<Option<Vec<u8>>> {
+    let path = file(dir, node);
+    let bytes = match fs::read(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        bytes => bytes.with_context(|| format!("cannot read {}", path.display()))?,
+    };
+    ensure!(bytes.len() == SIZE, "{} has {} bytes; a flash has {SIZE}", path.display(), bytes.len());
+    Ok(Some(bytes))
+}
+
+/// Keeps the contents of a board's flash. A reader sees the old or the new contents, never a part.
+pub fn save(dir: &Path, node: u8, bytes: &[u8]) -> Result<()> {
+    let path = file(dir, node);
+    let temporary = path.with_extension("new");
+    let write = || {
+        fs::create_dir_all(dir)?;
+        let mut file = fs::File::create(&temporary)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&temporary, &path)
+    };
+    write().with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A directory of this test's own, empty.
+    fn dir(test: &str) -> PathBuf {
+        let dir = std::env::temp_dir().join(format!("sim-flash-{test}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&dir);
+        dir
+    }
+
+    #[test]
+    fn what_was_saved_is_loaded_and_nodes_are_apart() {
+        let dir = dir("roundtrip");
+        assert_eq!(load(&dir, 5).unwrap(), None);
+        save(&dir, 5, &vec![0xA5; SIZE]).unwrap();
+        save(&dir, 5, &vec![0x5A; SIZE]).unwrap();
+        assert_eq!(load(&dir, 5).unwrap(), Some(vec![0x5A; SIZE]));
+        assert_eq!(load(&dir, 6).unwrap(), None);
+        assert_eq!(fs::read_dir(&dir).unwrap().count(), 1, "no temporary file is left");
+        fs::remove_dir_all(dir).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_is_no_flash_is_an_error_of_one_line() {
+        let dir = dir("refused");
+        save(&dir, 1, &[0; 3]).unwrap();
+        let error = format!("{:#}", load(&dir, 1).unwrap_err());
+        assert!(error.contains("node-1.flash has 3 bytes") && !error.contains('\n'), "{error}");
+        fs::create_dir_all(file(&dir, 2)).unwrap();
+        assert!(format!("{:#}", load(&dir, 2).unwrap_err()).contains("node-2.flash"));
+        assert!(save(&file(&dir, 1), 1, &[]).is_err(), "a file is no directory");
+        fs::remove_dir_all(dir).unwrap();
+    }
+}

@@ -1,0 +1,283 @@
+//! slcan: the line protocol of the LAWICEL CAN232 and CANUSB adapters ("CANUSB Manual", version 1.0,
+//! chapter 3), which python-can, slcand and many tools speak.
+//!
+//! A command ends with a carriage return. Success is answered with a carriage return, refusal with a bell.
+
+use std::fmt::Write as _;
+
+use canbus::{ExtendedId, Frame, Id, StandardId, Time};
+
+use super::session::{Action, Session};
+use crate::port::Adapter;
+
+const OK: &str = "\r";
+const BELL: &str = "\x07";
+
+/// A longer line is refused; the longest valid one has 26 bytes.
+const MAX_LINE: usize = 64;
+
+/// Bit rates of S0 to S8 in bit/s.
+const BIT_RATES: [u32; 9] = [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
+
+/// One command of the protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// `S0` to `S8`: the bit rate, in bit/s.
+    BitRate(u32),
+    /// `O`: go on the bus.
+    Open,
+    /// `L`: go on the bus, only listening.
+    Listen,
+    /// `C`: leave the bus.
+    Close,
+    /// `t`, `T`, `r`, `R`: send a frame.
+    Send(Frame),
+    /// `V`: version of hardware and software.
+    Version,
+    /// `N`: serial number.
+    SerialNumber,
+    /// `F`: status flags.
+    Flags,
+    /// `Z0`, `Z1`: time stamps with received frames.
+    TimeStamps(bool),
+}
+
+/// Reads one line without its carriage return; `None` when it is not a command of the protocol.
+pub fn parse(line: &str) -> Option<Command> {
+    let (name, rest) = line.split_at_checked(1)?;
+    match (name, rest) {
+        ("S", digit) => BIT_RATES.get(hex(digit, 1)? as usize).copied().map(Command::BitRate),
+        ("O", "") => Some(Command::Open),
+        ("L", "") => Some(Command::Listen),
+        ("C", "") => Some(Command::Close),
+        ("V", "") => Some(Command::Version),
+        ("N", "") => Some(Command::SerialNumber),
+        ("F", "") => Some(Command::Flags),
+        ("Z", "0") => Some(Command::TimeStamps(false)),
+        ("Z", "1") => Some(Command::TimeStamps(true)),
+        ("t" | "r", rest) => {
+            let (digits, rest) = rest.split_at_checked(3)?;
+            let id = StandardId::new(u16::try_from(hex(digits, 3)?).ok()?)?;
+            parse_frame(id.into(), name == "r", rest)
+        }
+        ("T" | "R", rest) => {
+            let (digits, rest) = rest.split_at_checked(8)?;
+            parse_frame(ExtendedId::new(hex(digits, 8)?)?.into(), name == "R", rest)
+        }
+        _ => None,
+    }
+}
+
+fn parse_frame(id: Id, remote: bool, rest: &str) -> Option<Command> {
+    let (digit, data) = rest.split_at_checked(1)?;
+    let dlc = u8::try_from(hex(digit, 1)?).ok()?;
+    if remote {
+        return if data.is_empty() { Frame::remote(id, dlc).map(Command::Send) } else { None };
+    }
+    let pairs = data.as_bytes().chunks(2).map(|pair| std::str::from_utf8(pair).ok());
+    let bytes: Option<Vec<u8>> = pairs.map(|pair| u8::try_from(hex(pair?, 2)?).ok()).collect();
+    bytes.filter(|bytes| bytes.len() == usize::from(dlc)).and_then(|bytes| Frame::data(id, &bytes)).map(Command::Send)
+}
+
+/// A number of exactly `digits` hexadecimal digits.
+fn hex(text: &str, digits: usize) -> Option<u32> {
+    let plain = text.len() == digits && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if plain { u32::from_str_radix(text, 16).ok() } else { None }
+}
+
+/// A received frame as a line. The time stamp counts milliseconds and starts again every minute (manual, `Zn`).
+fn format_frame(frame: &Frame, at: Time, stamped: bool) -> String {
+    let mut line = String::new();
+    // Writing to a string cannot fail.
+    let _ = match (frame.id(), frame.is_remote()) {
+        (Id::Standard(id), false) => write!(line, "t{:03X}", id.as_raw()),
+        (Id::Standard(id), true) => write!(line, "r{:03X}", id.as_raw()),
+        (Id::Extended(id), false) => write!(line, "T{:08X}", id.as_raw()),
+        (Id::Extended(id), true) => write!(line, "R{:08X}", id.as_raw()),
+    };
+    let _ = write!(line, "{:X}", frame.dlc());
+    for byte in frame.bytes() {
+        let _ = write!(line, "{byte:02X}");
+    }
+    if stamped {
+        let _ = write!(line, "{:04X}", at.as_micros() / 1000 % 60_000);
+    }
+    line.push('\r');
+    line
+}
+
+/// One client.
+#[derive(Debug)]
+pub struct Slcan {
+    bit_rate: u32,
+    open: Option<Adapter>,
+    stamped: bool,
+    line: Vec<u8>,
+}
+
+impl Slcan {
+    /// A client whose adapter runs at `bit_rate` (bit/s) until it chooses another.
+    pub fn new(bit_rate: u32) -> Slcan {
+        Slcan { bit_rate, open: None, stamped: false, line: Vec::new() }
+    }
+
+    fn on_line(&mut self, line: &[u8], out: &mut Vec<Action>) {
+        let command = std::str::from_utf8(line).ok().and_then(parse);
+        if command.and_then(|command| self.serve(command, out)).is_none() {
+            out.push(Action::stream(BELL));
+        }
+    }
+
+    /// The manual says for each command whether it is allowed while the channel is open; `None` is a refusal.
+    fn serve(&mut self, command: Command, out: &mut Vec<Action>) -> Option<()> {
+        let mut reply = OK.to_owned();
+        match (command, self.open) {
+            (Command::BitRate(rate), None) => self.bit_rate = rate,
+            (Command::TimeStamps(on), None) => self.stamped = on,
+            (Command::Open, None) => self.attach(false, out),
+            (Command::Listen, None) => self.attach(true, out),
+            (Command::Close, _) => {
+                self.open = None;
+                out.push(Action::Detach);
+            }
+            (Command::Send(frame), Some(Adapter { silent: false, .. })) => {
+                out.push(Action::Send(frame));
+                reply.insert(0, if matches!(frame.id(), Id::Standard(_)) { 'z' } else { 'Z' });
+            }
+            (Command::Flags, Some(_)) => reply.insert_str(0, "F00"),
+            (Command::Version, _) => reply.insert_str(0, "V0101"),
+            (Command::SerialNumber, _) => reply.insert_str(0, "NSIM0"),
+            _ => return None,
+        }
+        out.push(Action::Stream(reply));
+        Some(())
+    }
+
+    fn attach(&mut self, silent: bool, out: &mut Vec<Action>) {
+        let adapter = Adapter { bit_rate: self.bit_rate, silent };
+        self.open = Some(adapter);
+        out.push(Action::Attach(adapter));
+    }
+}
+
+impl Session for Slcan {
+    fn greet(&mut self, _: &mut Vec<Action>) {}
+
+    fn on_bytes(&mut self, bytes: &[u8], out: &mut Vec<Action>) {
+        for &byte in bytes {
+            match byte {
+                // An empty line is how clients clear the adapter's buffer; it is not answered.
+                b'\r' | b'\n' if self.line.is_empty() => {}
+                b'\r' => {
+                    let line = std::mem::take(&mut self.line);
+                    self.on_line(&line, out);
+                }
+                _ if self.line.len() < MAX_LINE => self.line.push(byte),
+                // The line is refused at its end.
+                _ => {}
+            }
+        }
+    }
+
+    fn on_frame(&mut self, frame: &Frame, at: Time) -> Option<String> {
+        self.open.map(|_| format_frame(frame, at, self.stamped))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn talk(session: &mut Slcan, text: &str) -> Vec<Action> {
+        let mut out = Vec::new();
+        session.on_bytes(text.as_bytes(), &mut out);
+        out
+    }
+
+    fn ok() -> Action {
+        Action::stream("\r")
+    }
+
+    fn open() -> Slcan {
+        let mut session = Slcan::new(250_000);
+        talk(&mut session, "O\r");
+        session
+    }
+
+    #[test]
+    fn python_can_opens_with_a_bit_rate() {
+        let mut session = Slcan::new(250_000);
+        let attach = Action::Attach(Adapter { bit_rate: 1_000_000, silent: false });
+        assert_eq!(talk(&mut session, "C\rS8\r\rO\r"), [Action::Detach, ok(), ok(), attach, ok()]);
+    }
+
+    #[test]
+    fn frames_of_every_kind_are_sent() {
+        let standard = StandardId::new(0x123).unwrap();
+        let extended = ExtendedId::new(0x1234_5678).unwrap();
+        let sent = |text, frame: Option<Frame>, reply| {
+            assert_eq!(talk(&mut open(), text), [Action::Send(frame.unwrap()), Action::stream(reply)]);
+        };
+        sent("t1232ABcd\r", Frame::data(standard, &[0xAB, 0xCD]), "z\r");
+        sent("T123456780\r", Frame::data(extended, &[]), "Z\r");
+        sent("r1238\r", Frame::remote(standard, 8), "z\r");
+        sent("R123456781\r", Frame::remote(extended, 1), "Z\r");
+    }
+
+    #[test]
+    fn received_frames_with_and_without_time_stamps() {
+        let frame = Frame::data(StandardId::new(0x81).unwrap(), &[1, 0xFE]).unwrap();
+        let at = Time::from_millis(60_000 + 0x1234);
+        assert_eq!(open().on_frame(&frame, at).as_deref(), Some("t081201FE\r"));
+        let mut stamped = Slcan::new(250_000);
+        talk(&mut stamped, "Z1\rL\r");
+        assert_eq!(stamped.on_frame(&frame, at).as_deref(), Some("t081201FE1234\r"));
+        talk(&mut stamped, "C\r");
+        assert_eq!(stamped.on_frame(&frame, at), None);
+    }
+
+    #[test]
+    fn what_the_channel_state_forbids_is_refused() {
+        for text in ["t1230\r", "F\r"] {
+            assert_eq!(talk(&mut Slcan::new(250_000), text), [Action::stream("\x07")], "{text:?}");
+        }
+        for text in ["S4\r", "O\r", "L\r", "Z1\r", "t123\r", "t1231\r", "t12310\r", "t1239\r", "S9\r", "t8000\r", "q\r"] {
+            assert_eq!(talk(&mut open(), text), [Action::stream("\x07")], "{text:?}");
+        }
+        let mut listening = Slcan::new(250_000);
+        talk(&mut listening, "L\r");
+        assert_eq!(talk(&mut listening, "t1230\r"), [Action::stream("\x07")]);
+    }
+
+    #[test]
+    fn identification() {
+        assert_eq!(talk(&mut Slcan::new(1), "V\rN\r"), [Action::stream("V0101\r"), Action::stream("NSIM0\r")]);
+        assert_eq!(talk(&mut open(), "F\r"), [Action::stream("F00\r")]);
+    }
+
+    proptest! {
+        /// Every line gets exactly one answer to the client, whatever its bytes.
+        #[test]
+        fn every_line_is_answered_once(line in prop::collection::vec(any::<u8>(), 1..100)) {
+            prop_assume!(!line.contains(&b'\r') && line[0] != b'\n');
+            let mut out = Vec::new();
+            let mut session = open();
+            session.on_bytes(&line, &mut out);
+            prop_assert!(out.is_empty());
+            session.on_bytes(b"\r", &mut out);
+            let answers = out.iter().filter(|action| matches!(action, Action::Stream(_))).count();
+            prop_assert_eq!(answers, 1);
+        }
+
+        /// What one client sends is, letter by letter, what another receives.
+        #[test]
+        fn a_frame_goes_through_unchanged(id in 0u32..0x2000_0000, extended: bool, remote: bool, bytes in prop::collection::vec(any::<u8>(), 0..=8)) {
+            let id: Id = if extended { ExtendedId::new(id).unwrap().into() } else { StandardId::new(id as u16 & 0x7FF).unwrap().into() };
+            let frame = if remote { Frame::remote(id, bytes.len() as u8) } else { Frame::data(id, &bytes) }.unwrap();
+            let line = format_frame(&frame, Time::ZERO, false);
+            prop_assert_eq!(parse(line.trim_end()), Some(Command::Send(frame)));
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! The socketcand protocol: frames as text between angle brackets over TCP.
+//!
+//! Follows doc/protocol.md of <https://github.com/linux-can/socketcand>, its raw mode and the part of its
+//! broadcast-manager mode that needs no timers. What cannot be carried is left out as socketcand does:
+//! remote frames in both directions, and error frames.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use canbus::{ExtendedId, Frame, Id, StandardId, Time};
+
+use super::session::{Action, Session};
+use crate::port::Adapter;
+
+/// A message is refused above this length; the longest valid one has 47 bytes.
+const MAX_MESSAGE: usize = 200;
+
+/// What a client asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// `< open vcan0 >`
+    Open(String),
+    /// `< rawmode >`: every frame of the bus is reported.
+    RawMode,
+    /// `< bcmmode >`: subscribed identifiers are reported.
+    BcmMode,
+    /// `< echo >`: answered with itself.
+    Echo,
+    /// `< send ID DLC BYTES >`
+    Send(Frame),
+    /// `< subscribe SECONDS MICROSECONDS ID >`
+    Subscribe(Id),
+    /// `< unsubscribe ID >`
+    Unsubscribe(Id),
+}
+
+/// Why a message is refused; the text goes to the client in `< error .. >`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// Not `< word ... >`.
+    #[error("not a message")]
+    NotAMessage,
+    /// The word is not one of the protocol, or not one that this server offers.
+    #[error("unknown command")]
+    UnknownCommand,
+    /// The word is known, what follows is not.
+    #[error("bad arguments")]
+    BadArguments,
+    /// There is no bus of that name here.
+    #[error("no such bus")]
+    NoSuchBus,
+    /// Only `open` and `echo` are possible before a bus is open.
+    #[error("no bus is open")]
+    NotOpen,
+}
+
+/// Reads one message without its brackets.
+pub fn parse(text: &str) -> Result<Request, Refused> {
+    let mut words = text.split_ascii_whitespace();
+    let command = words.next().ok_or(Refused::NotAMessage)?;
+    let arguments: Vec<&str> = words.collect();
+    let bad = Refused::BadArguments;
+    match (command, arguments.as_slice()) {
+        ("open", [bus]) => Ok(Request::Open((*bus).to_owned())),
+        ("rawmode", []) => Ok(Request::RawMode),
+        ("bcmmode", []) => Ok(Request::BcmMode),
+        ("echo", []) => Ok(Request::Echo),
+        ("send", [id, dlc, bytes @ ..]) => parse_frame(id, dlc, bytes).map(Request::Send).ok_or(bad),
+        // An interval other than zero asks for throttling, which only the kernel's broadcast manager offers.
+        ("subscribe", ["0", "0", id]) => parse_id(id).map(Request::Subscribe).ok_or(bad),
+        ("unsubscribe", [id]) => parse_id(id).map(Request::Unsubscribe).ok_or(bad),
+        ("open" | "rawmode" | "bcmmode" | "echo" | "send" | "subscribe" | "unsubscribe", _) => Err(bad),
+        _ => Err(Refused::UnknownCommand),
+    }
+}
+
+/// Up to three digits are a standard identifier, eight are an extended one.
+fn parse_id(text: &str) -> Option<Id> {
+    let value = hex(text)?;
+    match text.len() {
+        1..=3 => StandardId::new(u16::try_from(value).ok()?).map(Id::Standard),
+        8 => ExtendedId::new(value).map(Id::Extended),
+        _ => None,
+    }
+}
+
+fn parse_frame(id: &str, dlc: &str, bytes: &[&str]) -> Option<Frame> {
+    let id = parse_id(id)?;
+    let bytes: Option<Vec<u8>> = bytes.iter().map(|byte| u8::try_from(hex(byte)?).ok()).collect();
+    let bytes = bytes?;
+    (hex(dlc)? as usize == bytes.len()).then(|| Frame::data(id, &bytes))?
+}
+
+/// Unlike `from_str_radix` this takes no sign.
+fn hex(text: &str) -> Option<u32> {
+    let plain = text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if plain { u32::from_str_radix(text, 16).ok() } else { None }
+}
+
+/// `< frame 123 1.000000 DEADBEEF >`; two spaces before the bracket when the frame is empty. In raw mode the
+/// bytes are contiguous, in broadcast-manager mode they are apart.
+fn format_frame(frame: &Frame, at: Time, separator: &str) -> String {
+    let bytes: Vec<String> = frame.bytes().iter().map(|byte| format!("{byte:02X}")).collect();
+    let mut text = String::from("< frame ");
+    // Writing to a string cannot fail.
+    let _ = match frame.id() {
+        Id::Standard(id) => write!(text, "{:03X}", id.as_raw()),
+        Id::Extended(id) => write!(text, "{:08X}", id.as_raw()),
+    };
+    let _ = write!(text, " {at} {} >", bytes.join(separator));
+    text
+}
+
+/// How frames of the bus are reported to the client.
+#[derive(Debug)]
+enum Mode {
+    Closed,
+    /// The mode after `open`.
+    Broadcast(BTreeSet<u32>),
+    Raw,
+}
+
+/// One client.
+#[derive(Debug)]
+pub struct Socketcand {
+    bus: &'static str,
+    bit_rate: u32,
+    mode: Mode,
+    input: Vec<u8>,
+}
+
+impl Socketcand {
+    /// A client of the bus with this name and bit rate (bit/s).
+    pub fn new(bus: &'static str, bit_rate: u32) -> Socketcand {
+        Socketcand { bus, bit_rate, mode: Mode::Closed, input: Vec::new() }
+    }
+
+    /// Acts on a message with its brackets, or on the noise before one.
+    fn on_message(&mut self, bytes: &[u8], out: &mut Vec<Action>) {
+        let text = std::str::from_utf8(bytes).ok();
+        let inner = text.and_then(|text| text.trim_ascii().strip_prefix('<')?.strip_suffix('>'));
+        let request = inner.ok_or(Refused::NotAMessage).and_then(parse);
+        if let Err(refused) = request.and_then(|request| self.serve(request, out)) {
+            out.push(Action::segment(format!("< error {refused} >")));
+        }
+    }
+
+    fn serve(&mut self, request: Request, out: &mut Vec<Action>) -> Result<(), Refused> {
+        match (request, &mut self.mode) {
+            (Request::Echo, _) => out.push(Action::segment("< echo >")),
+            (Request::Open(bus), _) if bus == self.bus => self.open(out),
+            (Request::Open(_), _) => return Err(Refused::NoSuchBus),
+            (_, Mode::Closed) => return Err(Refused::NotOpen),
+            (Request::RawMode, mode) => change(mode, Mode::Raw, out),
+            (Request::BcmMode, mode) => change(mode, Mode::Broadcast(BTreeSet::new()), out),
+            (Request::Send(frame), _) => out.push(Action::Send(frame)),
+            (Request::Subscribe(id), Mode::Broadcast(ids)) => drop(ids.insert(key(id))),
+            (Request::Unsubscribe(id), Mode::Broadcast(ids)) => drop(ids.remove(&key(id))),
+            (Request::Subscribe(_) | Request::Unsubscribe(_), Mode::Raw) => return Err(Refused::UnknownCommand),
+        }
+        Ok(())
+    }
+
+    fn open(&mut self, out: &mut Vec<Action>) {
+        out.push(Action::Attach(Adapter { bit_rate: self.bit_rate, silent: false }));
+        change(&mut self.mode, Mode::Broadcast(BTreeSet::new()), out);
+    }
+}
+
+fn change(mode: &mut Mode, to: Mode, out: &mut Vec<Action>) {
+    *mode = to;
+    out.push(Action::segment("< ok >"));
+}
+
+/// Standard and extended identifiers in one number.
+fn key(id: Id) -> u32 {
+    match id {
+        Id::Standard(id) => u32::from(id.as_raw()),
+        Id::Extended(id) => id.as_raw() | 1 << 31,
+    }
+}
+
+impl Session for Socketcand {
+    fn greet(&mut self, out: &mut Vec<Action>) {
+        out.push(Action::segment("< hi >"));
+    }
+
+    fn on_bytes(&mut self, bytes: &[u8], out: &mut Vec<Action>) {
+        for &byte in bytes {
+            // Some clients end a message with a line feed or a zero (Flash sockets did).
+            if self.input.is_empty() && (byte.is_ascii_whitespace() || byte == 0) {
+                continue;
+            }
+            self.input.push(byte);
+            if byte == b'>' || self.input.len() > MAX_MESSAGE {
+                let message = std::mem::take(&mut self.input);
+                self.on_message(&message, out);
+            }
+        }
+    }
+
+    fn on_frame(&mut self, frame: &Frame, at: Time) -> Option<String> {
+        match &self.mode {
+            _ if frame.is_remote() => None,
+            Mode::Raw => Some(format_frame(frame, at, "")),
+            Mode::Broadcast(ids) if ids.contains(&key(frame.id())) => Some(format_frame(frame, at, " ")),
+            Mode::Broadcast(_) | Mode::Closed => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn standard(id: u16, bytes: &[u8]) -> Frame {
+        Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
+    }
+
+    /// The replies and frames that come out when a client sends `text`.
+    fn talk(session: &mut Socketcand, text: &str) -> Vec<Action> {
+        let mut out = Vec::new();
+        session.on_bytes(text.as_bytes(), &mut out);
+        out
+    }
+
+    fn raw() -> Socketcand {
+        let mut session = Socketcand::new("vcan0", 250_000);
+        talk(&mut session, "< open vcan0 >< rawmode >");
+        session
+    }
+
+    #[test]
+    fn the_handshake_of_python_can() {
+        let mut session = Socketcand::new("vcan0", 250_000);
+        let mut out = Vec::new();
+        session.greet(&mut out);
+        assert_eq!(out, [Action::segment("< hi >")]);
+        let attach = Action::Attach(Adapter { bit_rate: 250_000, silent: false });
+        assert_eq!(talk(&mut session, "< open vcan0 >"), [attach, Action::segment("< ok >")]);
+        assert_eq!(talk(&mut session, "< rawmode >"), [Action::segment("< ok >")]);
+        assert_eq!(
+            talk(&mut session, "< send 601 8 40 0 10 0 0 0 0 0 >"),
+            [Action::Send(standard(0x601, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]))]
+        );
+    }
+
+    #[test]
+    fn frames_as_python_can_reads_them() {
+        let at = Time::from_micros(1_000_000);
+        let mut session = raw();
+        let text = session.on_frame(&standard(0x123, &[0xDE, 0xAD, 0xBE, 0xEF]), at);
+        assert_eq!(text.as_deref(), Some("< frame 123 1.000000 DEADBEEF >"));
+        let text = session.on_frame(&standard(0x80, &[]), at);
+        assert_eq!(text.as_deref(), Some("< frame 080 1.000000  >"));
+        let extended = Frame::data(ExtendedId::new(0x123).unwrap(), &[1]).unwrap();
+        assert_eq!(session.on_frame(&extended, at).as_deref(), Some("< frame 00000123 1.000000 01 >"));
+    }
+
+    #[test]
+    fn what_is_refused_and_how() {
+        let mut session = Socketcand::new("vcan0", 250_000);
+        let mut refused = |text, why| {
+            assert_eq!(talk(&mut session, text), [Action::segment(format!("< error {why} >"))], "{text}");
+        };
+        refused("< rawmode >", "no bus is open");
+        refused("< open can7 >", "no such bus");
+        refused("< open >", "bad arguments");
+        refused("< fly >", "unknown command");
+        refused("< >", "not a message");
+        refused("hello >", "not a message");
+        let mut session = raw();
+        let bad = ["< send 123 8  >", "< send 800 0 >", "< send 1234 0 >", "< send 123 1 100 >", "< send 1 1 +1 >"];
+        for text in bad {
+            assert_eq!(talk(&mut session, text), [Action::segment("< error bad arguments >")], "{text}");
+        }
+    }
+
+    #[test]
+    fn broadcast_mode_reports_what_was_subscribed() {
+        let mut session = Socketcand::new("vcan0", 250_000);
+        talk(&mut session, "< open vcan0 >< subscribe 0 0 701 >");
+        let heartbeat = standard(0x701, &[5, 6]);
+        let text = session.on_frame(&heartbeat, Time::ZERO);
+        assert_eq!(text.as_deref(), Some("< frame 701 0.000000 05 06 >"));
+        assert_eq!(session.on_frame(&standard(0x702, &[5]), Time::ZERO), None);
+        talk(&mut session, "< unsubscribe 701 >");
+        assert_eq!(session.on_frame(&heartbeat, Time::ZERO), None);
+    }
+
+    proptest! {
+        /// Whatever arrives, and however it is cut into segments, gives the same answers and at most one a message.
+        #[test]
+        fn any_bytes_are_served_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..600), cut in 0usize..600) {
+            let (mut whole, mut halves) = (raw(), raw());
+            let (mut one, mut two) = (Vec::new(), Vec::new());
+            whole.on_bytes(&bytes, &mut one);
+            let (head, tail) = bytes.split_at(cut.min(bytes.len()));
+            halves.on_bytes(head, &mut two);
+            halves.on_bytes(tail, &mut two);
+            prop_assert_eq!(&one, &two);
+            prop_assert!(whole.input.len() <= MAX_MESSAGE);
+        }
+
+        /// What a client sends is what the bus carries.
+        #[test]
+        fn every_frame_can_be_sent(id in 0u32..0x2000_0000, extended: bool, bytes in prop::collection::vec(any::<u8>(), 0..=8)) {
+            let id = if extended { Id::Extended(ExtendedId::new(id).unwrap()) } else { Id::Standard(StandardId::new(id as u16 & 0x7FF).unwrap()) };
+            let number = match id { Id::Standard(id) => format!("{:03X}", id.as_raw()), Id::Extended(id) => format!("{:08X}", id.as_raw()) };
+            let data: Vec<String> = bytes.iter().map(|byte| format!("{byte:x}")).collect();
+            let text = format!("< send {number} {:X} {} >", bytes.len(), data.join(" "));
+            prop_assert_eq!(talk(&mut raw(), &text), [Action::Send(Frame::data(id, &bytes).unwrap())]);
+        }
+
+        /// Every message that is not understood is answered with exactly one `< error .. >`.
+        #[test]
+        fn every_message_is_answered(text in "[ -;=?-~]{0,80}") {
+            let out = talk(&mut raw(), &format!("<{text}>"));
+            match parse(&text) {
+                Err(why) => prop_assert_eq!(out, [Action::segment(format!("< error {why} >"))]),
+                Ok(_) => prop_assert!(out.len() <= 2),
+            }
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! What a node is: the number that selects its dictionary.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::Serialize;
+
+/// The personalities of the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Personality {
+    /// Pressure and temperature transmitter (CiA 404).
+    Pressure,
+}
+
+impl Personality {
+    /// Every personality that the firmware has.
+    const ALL: [Personality; 1] = [Personality::Pressure];
+
+    /// The number in the device record.
+    pub fn number(self) -> u8 {
+        match self {
+            Personality::Pressure => 0,
+        }
+    }
+}
+
+impl fmt::Display for Personality {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Personality::Pressure => "pressure",
+        })
+    }
+}
+
+impl FromStr for Personality {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Personality, String> {
+        let known = Personality::ALL.into_iter().find(|known| known.to_string() == text);
+        known.ok_or_else(|| {
+            let names: Vec<String> = Personality::ALL.iter().map(ToString::to_string).collect();
+            format!("the firmware has no personality {text:?}; it has: {}", names.join(", "))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_read_as_it_is_written() {
+        for personality in Personality::ALL {
+            assert_eq!(personality.to_string().parse(), Ok(personality));
+        }
+        assert!("encoder".parse::<Personality>().unwrap_err().contains("it has: pressure"));
+    }
+}

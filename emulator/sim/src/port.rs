@@ -1,0 +1,91 @@
+//! A client's place on the bus.
+
+use canbus::{Attachment, Controller, ErrorReport, Frame, HostNode, Order, Stamped, Time};
+
+/// How a client's adapter takes part in the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Adapter {
+    /// In bit/s. Another rate than that of the bus destroys frames, as a real adapter would.
+    pub bit_rate: u32,
+    /// Only listens: sends and acknowledges nothing.
+    pub silent: bool,
+}
+
+/// A place on the bus: empty, or with an adapter whose driver sends in the order of the requests.
+#[derive(Debug, Default)]
+pub struct Port {
+    node: Option<HostNode>,
+}
+
+impl Port {
+    /// Goes on the bus, or leaves it with `None`. What waits to be sent is forgotten.
+    pub fn attach(&mut self, adapter: Option<Adapter>) {
+        self.node = adapter.map(|adapter| {
+            let node = HostNode::new(Time::of_cycle(adapter.bit_rate.into())).with_order(Order::Fifo);
+            if adapter.silent { node.silent() } else { node }
+        });
+    }
+
+    /// Queues a frame. Off the bus it is lost, as with an interface that is down.
+    pub fn send(&mut self, frame: Frame, now: Time) {
+        if let Some(node) = &mut self.node {
+            node.send(frame, now);
+        }
+    }
+
+    /// The oldest frame received and not taken yet, with its instant.
+    pub fn receive(&mut self) -> Option<Stamped> {
+        self.node.as_mut()?.receive()
+    }
+
+    /// Frames that wait to be sent.
+    pub fn backlog(&self) -> usize {
+        self.node.as_ref().map_or(0, HostNode::backlog)
+    }
+}
+
+impl Controller for Port {
+    fn attachment(&mut self, at: Time) -> Attachment {
+        self.node.as_mut().map_or(Attachment::Off, |node| node.attachment(at))
+    }
+
+    fn requested(&self) -> Option<Time> {
+        self.node.as_ref()?.requested()
+    }
+
+    fn pending(&mut self, at: Time) -> Option<Frame> {
+        self.node.as_mut()?.pending(at)
+    }
+
+    fn start_of_frame(&mut self, transmitting: bool, at: Time) {
+        self.tell(|node| node.start_of_frame(transmitting, at));
+    }
+
+    fn lost(&mut self, at: Time) {
+        self.tell(|node| node.lost(at));
+    }
+
+    fn sent(&mut self, at: Time) {
+        self.tell(|node| node.sent(at));
+    }
+
+    fn received(&mut self, frame: &Frame, at: Time) {
+        self.tell(|node| node.received(frame, at));
+    }
+
+    fn error(&mut self, report: &ErrorReport, at: Time) {
+        self.tell(|node| node.error(report, at));
+    }
+
+    fn idle(&mut self, since: Time) {
+        self.tell(|node| node.idle(since));
+    }
+}
+
+impl Port {
+    fn tell(&mut self, notice: impl FnOnce(&mut HostNode)) {
+        if let Some(node) = &mut self.node {
+            notice(node);
+        }
+    }
+}

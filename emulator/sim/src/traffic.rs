@@ -1,0 +1,175 @@
+//! What the frames on the bus tell of the nodes: nothing here looks into a board's memory.
+//!
+//! COB-IDs are those of the pre-defined connection set (CiA 301, 7.3.3).
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use canbus::{Frame, Id};
+use serde::Serialize;
+
+/// NMT states as a heartbeat tells them (CiA 301, 7.2.8.3.2.2).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NmtState {
+    /// Nothing was heard yet, or a code that is not defined.
+    #[default]
+    Unknown,
+    /// Boot-up was heard and no heartbeat since.
+    Initialising,
+    /// 4
+    Stopped,
+    /// 5
+    Operational,
+    /// 127
+    PreOperational,
+}
+
+impl NmtState {
+    fn from_code(code: u8) -> NmtState {
+        match code {
+            0 => NmtState::Initialising,
+            4 => NmtState::Stopped,
+            5 => NmtState::Operational,
+            127 => NmtState::PreOperational,
+            _ => NmtState::Unknown,
+        }
+    }
+}
+
+impl fmt::Display for NmtState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            NmtState::Unknown => "-",
+            NmtState::Initialising => "initialising",
+            NmtState::Stopped => "stopped",
+            NmtState::Operational => "operational",
+            NmtState::PreOperational => "pre-operational",
+        })
+    }
+}
+
+/// What was heard of one node.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Heard {
+    /// From the last heartbeat or boot-up.
+    pub state: NmtState,
+    /// Boot-up messages.
+    pub boot_ups: u64,
+    /// Heartbeats, boot-up not counted.
+    pub heartbeats: u64,
+    /// TPDO 1 to 4.
+    pub tpdos: u64,
+    /// SDO frames to the node and from it.
+    pub sdo_frames: u64,
+    /// EMCY messages that tell of an error.
+    pub emcys: u64,
+    /// Frames that the node has sent, by the count of all of the above that are its own.
+    pub sent: u64,
+    /// The error code of the last EMCY.
+    pub last_emcy: Option<u16>,
+    /// The first four bytes of the last TPDO 1 as REAL32: the process value of the first channel.
+    pub process_value: Option<f32>,
+}
+
+impl Heard {
+    fn on_heartbeat(&mut self, data: &[u8]) {
+        let &[code] = data else { return };
+        // The toggle bit of node guarding is not part of the state.
+        self.state = NmtState::from_code(code & 0x7F);
+        if code == 0 {
+            self.boot_ups += 1;
+        } else {
+            self.heartbeats += 1;
+        }
+    }
+
+    fn on_emcy(&mut self, data: &[u8]) {
+        let Some(code) = data.first_chunk().map(|code| u16::from_le_bytes(*code)) else { return };
+        self.last_emcy = Some(code);
+        // 0000h: an error has gone, or the last of them (CiA 301, 7.2.7).
+        self.emcys += u64::from(code != 0);
+    }
+
+    fn on_tpdo(&mut self, number: u16, data: &[u8]) {
+        self.tpdos += 1;
+        if number == 1 {
+            self.process_value = data.first_chunk().map(|value| f32::from_le_bytes(*value));
+        }
+    }
+}
+
+/// An observer of the bus.
+#[derive(Clone, Debug, Default)]
+pub struct Traffic {
+    nodes: BTreeMap<u8, Heard>,
+}
+
+impl Traffic {
+    /// A frame has ended on the bus.
+    pub fn on_frame(&mut self, frame: &Frame) {
+        let Id::Standard(id) = frame.id() else { return };
+        let (function, node) = (id.as_raw() & 0x780, (id.as_raw() & 0x7F) as u8);
+        if node == 0 || frame.is_remote() {
+            return;
+        }
+        match function {
+            0x080 => self.from_node(node).on_emcy(frame.bytes()),
+            0x180 | 0x280 | 0x380 | 0x480 => self.from_node(node).on_tpdo(function >> 8, frame.bytes()),
+            0x580 => self.from_node(node).sdo_frames += 1,
+            0x600 => self.nodes.entry(node).or_default().sdo_frames += 1,
+            0x700 => self.from_node(node).on_heartbeat(frame.bytes()),
+            _ => {}
+        }
+    }
+
+    fn from_node(&mut self, node: u8) -> &mut Heard {
+        let heard = self.nodes.entry(node).or_default();
+        heard.sent += 1;
+        heard
+    }
+
+    /// What was heard of this node.
+    pub fn node(&self, node: u8) -> Heard {
+        self.nodes.get(&node).cloned().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use canbus::StandardId;
+
+    use super::*;
+
+    fn hear(traffic: &mut Traffic, id: u16, bytes: &[u8]) {
+        traffic.on_frame(&Frame::data(StandardId::new(id).unwrap(), bytes).unwrap());
+    }
+
+    #[test]
+    fn every_service_of_a_node_is_counted() {
+        let mut traffic = Traffic::default();
+        hear(&mut traffic, 0x705, &[0]);
+        assert_eq!(traffic.node(5).state, NmtState::Initialising);
+        hear(&mut traffic, 0x705, &[127]);
+        hear(&mut traffic, 0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]);
+        hear(&mut traffic, 0x585, &[0x43, 0, 0x10, 0, 0x94, 1, 2, 0]);
+        hear(&mut traffic, 0x085, &[0x06, 0x50, 1, 0, 0, 0, 0, 0]);
+        hear(&mut traffic, 0x085, &[0, 0, 0, 0, 0, 0, 0, 0]);
+        hear(&mut traffic, 0x185, &250_000f32.to_le_bytes());
+        hear(&mut traffic, 0x285, &[1]);
+        let heard = traffic.node(5);
+        assert_eq!(heard.state, NmtState::PreOperational);
+        assert_eq!((heard.boot_ups, heard.heartbeats, heard.tpdos), (1, 1, 2));
+        assert_eq!((heard.sdo_frames, heard.emcys, heard.sent), (2, 1, 7));
+        assert_eq!((heard.last_emcy, heard.process_value), (Some(0), Some(250_000.0)));
+    }
+
+    #[test]
+    fn what_is_no_message_of_a_node_is_passed_over() {
+        let mut traffic = Traffic::default();
+        for (id, bytes) in [(0x000, &[1u8, 5][..]), (0x080, &[]), (0x705, &[]), (0x085, &[1]), (0x7E5, &[4])] {
+            hear(&mut traffic, id, bytes);
+        }
+        assert_eq!(traffic.node(5), Heard { sent: 2, ..Heard::default() });
+    }
+}

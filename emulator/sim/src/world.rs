@@ -1,0 +1,181 @@
+//! The simulation: boards, the bus and everything else that is wired to it, in one virtual time.
+//!
+//! The loop is the one that the documentation of [`canbus`] describes. With one board it is exact; with several,
+//! a board may be ahead of a start of frame by [`QUANTUM_BITS`], too little to miss anything of the frame.
+
+use canbus::{Babbler, Bus, Controller, Event, Stamped, Time};
+
+use crate::board::Board;
+use crate::log::Line;
+use crate::port::Port;
+use crate::status::{Status, share};
+use crate::stimuli::{Stimulus, Targeted};
+use crate::summary::{BusSummary, Summary};
+use crate::traffic::Traffic;
+
+/// Any number of bits is causal up to this one, which is less than the shortest frame has.
+const QUANTUM_BITS: u64 = 43;
+/// Of the foreign traffic: any number will do, the same one gives the same traffic.
+const SEED: u64 = 1;
+
+/// Names a place on the bus for a client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PortId(usize);
+
+/// Boards, a bus, foreign traffic and clients.
+pub struct World {
+    now: Time,
+    bit_rate: u16,
+    bit: Time,
+    bus: Bus,
+    boards: Vec<Board>,
+    load: Option<Babbler>,
+    /// Places are used again but never given up: the bus knows its participants by their order.
+    ports: Vec<Place>,
+    records: Records,
+}
+
+/// A port and whether a client has it.
+#[derive(Default)]
+struct Place {
+    port: Port,
+    taken: bool,
+}
+
+/// What was seen of the bus.
+#[derive(Default)]
+struct Records {
+    traffic: Traffic,
+    frames: Vec<Stamped>,
+    log: Vec<Line>,
+    good: u64,
+    bad: u64,
+}
+
+impl World {
+    /// Boards on a bus that runs at `bit_rate` (kbit/s), with `load` percent of foreign traffic.
+    pub fn new(boards: Vec<Board>, bit_rate: u16, load: u8) -> World {
+        let bit = Time::of_cycle(u64::from(bit_rate) * 1000);
+        let load = (load > 0).then(|| Babbler::new(bit, f64::from(load) / 100.0, Babbler::foreign(), SEED));
+        let (bus, records) = (Bus::new(), Records::default());
+        World { now: Time::ZERO, bit_rate, bit, bus, boards, load, ports: Vec::new(), records }
+    }
+
+    /// Virtual time.
+    pub fn now(&self) -> Time {
+        self.now
+    }
+
+    /// The boards, in the order of the command line.
+    pub fn boards(&self) -> &[Board] {
+        &self.boards
+    }
+
+    /// The bus, for bit errors.
+    pub fn bus(&mut self) -> &mut Bus {
+        &mut self.bus
+    }
+
+    /// A place on the bus for a client; it takes part once it is attached.
+    pub fn open_port(&mut self) -> PortId {
+        let index = self.ports.iter().position(|place| !place.taken).unwrap_or(self.ports.len());
+        if index == self.ports.len() {
+            self.ports.push(Place::default());
+        }
+        self.ports[index].taken = true;
+        PortId(index)
+    }
+
+    /// The place of a client.
+    pub fn port(&mut self, id: PortId) -> &mut Port {
+        &mut self.ports[id.0].port
+    }
+
+    /// The client is gone, with all that it had still to send.
+    pub fn close_port(&mut self, id: PortId) {
+        self.ports[id.0] = Place::default();
+    }
+
+    /// Gives the boards another stimulus from now on.
+    pub fn apply(&mut self, stimulus: &Targeted<Stimulus>) {
+        for board in self.boards.iter_mut().filter(|board| stimulus.is_for(board.id())) {
+            board.apply(&stimulus.what, self.now);
+        }
+    }
+
+    /// Lets everything up to `end` happen. An error is a fault of the emulator, not of the firmware.
+    pub fn run_until(&mut self, end: Time) -> anyhow::Result<()> {
+        loop {
+            let next = self.step_bus();
+            if self.now >= end {
+                break;
+            }
+            let quantum = if self.boards.len() > 1 { self.now + self.bit * QUANTUM_BITS } else { Time::NEVER };
+            let mut limit = end.min(next).min(quantum);
+            for board in &mut self.boards {
+                limit = limit.min(board.run_until(limit)?);
+            }
+            self.now = limit;
+        }
+        let Records { log, .. } = &mut self.records;
+        self.boards.iter_mut().for_each(|board| board.read_log(log));
+        Ok(())
+    }
+
+    /// Lets the bus catch up with the boards; returns when something will next happen on it.
+    fn step_bus(&mut self) -> Time {
+        let boards = self.boards.iter_mut().map(|board| board.controller());
+        let load = self.load.iter_mut().map(|load| load as &mut dyn Controller);
+        let ports = self.ports.iter_mut().map(|place| &mut place.port as &mut dyn Controller);
+        let mut participants: Vec<&mut dyn Controller> = boards.chain(load).chain(ports).collect();
+        let records = &mut self.records;
+        self.bus.step(&mut participants, self.now, &mut |event| records.on_event(&event))
+    }
+
+    /// The frames since the last call, each with the end of its end of frame.
+    pub fn take_frames(&mut self) -> Vec<Stamped> {
+        std::mem::take(&mut self.records.frames)
+    }
+
+    /// The boards' log since the last call.
+    pub fn take_log(&mut self) -> Vec<Line> {
+        std::mem::take(&mut self.records.log)
+    }
+
+    /// What the bus tells of the nodes.
+    pub fn traffic(&self) -> &Traffic {
+        &self.records.traffic
+    }
+
+    /// The present state of everything.
+    pub fn status(&self) -> Status {
+        let nodes = self.boards.iter().map(|board| board.status(self.records.traffic.node(board.id())));
+        Status { at: self.now, bus_busy: self.bus.busy(self.now), nodes: nodes.collect() }
+    }
+
+    /// What can be said of the whole run, which took the host `host_seconds`.
+    pub fn summary(&self, host_seconds: f64, lost_by_clients: u64) -> Summary {
+        let bus = BusSummary {
+            bit_rate: self.bit_rate,
+            frames: self.records.good,
+            errors: self.records.bad,
+            load: share(self.bus.busy(self.now), self.now),
+            lost_by_clients,
+        };
+        let nodes = self.boards.iter().map(|board| board.summary(self.records.traffic.node(board.id())));
+        Summary { virtual_seconds: self.now.as_secs_f64(), host_seconds, bus, nodes: nodes.collect() }
+    }
+}
+
+impl Records {
+    fn on_event(&mut self, event: &Event) {
+        match event {
+            &Event::Frame { end: at, frame, .. } => {
+                self.good += 1;
+                self.traffic.on_frame(&frame);
+                self.frames.push(Stamped { at, frame });
+            }
+            Event::Error { .. } => self.bad += 1,
+        }
+    }
+}
