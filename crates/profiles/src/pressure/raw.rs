@@ -20,10 +20,10 @@ pub struct RawSample {
 /// Conversions that the chip's maker took at VDDA = 3.3 V and left in system memory (STM32F446 datasheet, 6.3.22 and 6.3.24).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FactoryCalibration {
-    /// TS_CAL1: temperature sensor at 30 degC.
+    /// `TS_CAL1`: temperature sensor at 30 degC.
     pub ts_cal1: u16,
-    /// TS_CAL2: temperature sensor at 110 degC.
+    /// `TS_CAL2`: temperature sensor at 110 degC.
     pub ts_cal2: u16,
-    /// VREFINT_CAL: voltage reference at 30 degC.
+    /// `VREFINT_CAL`: voltage reference at 30 degC.
     pub vrefint_cal: u16,
 }

@@ -1,0 +1,114 @@
+//! The transmitter: sensor, pressure channel, temperature channel.
+
+use super::{Calibration, Channel, ChannelParameters, ChannelValues, RawSample, Span, Unit};
+
+/// Samples in a second: how often a sensor break is looked for (CiA 404 leaves it to the device).
+const SAMPLES_PER_SECOND: u16 = 1000;
+
+/// All parameters of the transmitter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    /// Sub-index 1 of the profile's objects.
+    pub pressure: ChannelParameters,
+    /// Sub-index 2 of the profile's objects.
+    pub temperature: ChannelParameters,
+    /// Characteristic of the transducer.
+    pub calibration: Calibration,
+}
+
+impl Default for Parameters {
+    fn default() -> Parameters {
+        Parameters {
+            pressure: ChannelParameters::new(Unit::BAR, Span { start: 0.0, end: 10.0 }),
+            temperature: ChannelParameters::new(Unit::CELSIUS, Span { start: -40.0, end: 125.0 }),
+            calibration: Calibration::default(),
+        }
+    }
+}
+
+/// What is wrong with the sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Conditions {
+    /// The transducer or its wiring is broken; looked for once a second.
+    pub sensor_break: bool,
+    /// The pressure input is at a rail of the converter.
+    pub pressure_rail: bool,
+    /// The temperature is not measured: input at a rail, or no factory calibration.
+    pub temperature_rail: bool,
+}
+
+/// What the transmitter gives for one sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Snapshot {
+    /// Sub-index 1 of the profile's objects.
+    pub pressure: ChannelValues,
+    /// Sub-index 2 of the profile's objects.
+    pub temperature: ChannelValues,
+    /// What is wrong with the sensor.
+    pub conditions: Conditions,
+}
+
+/// The whole chain with its state.
+#[derive(Clone, Copy, Debug)]
+pub struct Transmitter {
+    calibration: Calibration,
+    pressure: Channel,
+    temperature: Channel,
+    sensor_break: bool,
+    /// Samples until the next look for a sensor break.
+    until_check: u16,
+}
+
+impl Default for Transmitter {
+    fn default() -> Transmitter {
+        Transmitter::new(&Parameters::default())
+    }
+}
+
+impl Transmitter {
+    /// A chain that has not measured yet.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> Transmitter {
+        Transmitter {
+            calibration: parameters.calibration,
+            pressure: Channel::new(&parameters.pressure),
+            temperature: Channel::new(&parameters.temperature),
+            sensor_break: false,
+            until_check: 0,
+        }
+    }
+
+    /// Takes over parameters from the next sample on.
+    pub fn apply(&mut self, parameters: &Parameters) {
+        self.calibration = parameters.calibration;
+        self.pressure.apply(&parameters.pressure);
+        self.temperature.apply(&parameters.temperature);
+    }
+
+    /// Processes the sums of one millisecond.
+    pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
+        let ratio = raw.ratio();
+        self.check_break(ratio);
+        // A temperature that is not measured is 0 K, as for a transmitter without a temperature sensor.
+        let kelvin = raw.temperature().unwrap_or(0.0);
+        let conditions = Conditions {
+            sensor_break: self.sensor_break,
+            pressure_rail: raw.is_rail(raw.pressure),
+            temperature_rail: raw.temperature().is_none() || raw.is_rail(raw.temperature),
+        };
+        let pressure_valid = !conditions.sensor_break && !conditions.pressure_rail;
+        Snapshot {
+            pressure: self.pressure.sample(self.calibration.pressure(ratio), pressure_valid),
+            temperature: self.temperature.sample(kelvin, !conditions.temperature_rail),
+            conditions,
+        }
+    }
+
+    fn check_break(&mut self, ratio: f32) {
+        if self.until_check == 0 {
+            self.until_check = SAMPLES_PER_SECOND;
+            self.sensor_break = self.calibration.is_break(ratio);
+        }
+        self.until_check -= 1;
+    }
+}

@@ -1,0 +1,112 @@
+//! Physical units of the process value, object 6131h (CiA 303-2 codes, and the codes A0h.. that CiA leaves to profiles).
+
+/// How a field value in Pa or K becomes a process value: `value / divisor - zero`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    divisor: f32,
+    zero: f32,
+}
+
+/// Standard acceleration of gravity in m/s2, exact.
+const GRAVITY: f64 = 9.806_65;
+/// Largest prefix, as a power of ten, either way.
+const MAX_PREFIX: i8 = 18;
+
+impl Unit {
+    /// bar, the default of the pressure channel.
+    pub const BAR: Unit = Unit { divisor: 100_000.0, zero: 0.0 };
+    /// Degree Celsius, the default of the temperature channel.
+    pub const CELSIUS: Unit = Unit { divisor: 1.0, zero: 273.15 };
+
+    /// A pressure unit by the value of 6131h:1; `None` for any that is not supported.
+    #[must_use]
+    pub fn pressure(code: u32) -> Option<Unit> {
+        let (unit, prefix) = split(code)?;
+        let pascal = match unit {
+            0x22 => 1.0,
+            0x4E => 100_000.0,
+            // Pound-force per square inch, of the international pound and inch.
+            0xAB => 0.453_592_37 * GRAVITY / (0.0254 * 0.0254),
+            // Millimetre of mercury at 0 degC, 13 595.1 kg/m3.
+            0xA0 => 13.595_1 * GRAVITY,
+            // Technical atmosphere, kgf/cm2.
+            0xA1 => 10_000.0 * GRAVITY,
+            // Millimetre of water at 4 degC, 999.972 kg/m3.
+            0xA2 => 0.999_972 * GRAVITY,
+            0xA4 => 101_325.0,
+            _ => return None,
+        };
+        Some(Unit::prefixed(pascal, 0.0, prefix))
+    }
+
+    /// A temperature unit by the value of 6131h:2; `None` for any that is not supported.
+    #[must_use]
+    pub fn temperature(code: u32) -> Option<Unit> {
+        let (unit, prefix) = split(code)?;
+        match unit {
+            0x05 => Some(Unit::prefixed(1.0, 0.0, prefix)),
+            0x2D => Some(Unit::prefixed(1.0, 273.15, prefix)),
+            0xAC => Some(Unit::prefixed(5.0 / 9.0, 459.67, prefix)),
+            _ => None,
+        }
+    }
+
+    /// Computed in double precision and rounded once.
+    #[allow(clippy::cast_possible_truncation)]
+    fn prefixed(divisor: f64, zero: f64, prefix: i8) -> Unit {
+        let power = power_of_ten(prefix);
+        Unit { divisor: (divisor * power) as f32, zero: (zero / power) as f32 }
+    }
+
+    /// The value of Pa or K in this unit.
+    #[must_use]
+    pub fn of(&self, value: f32) -> f32 {
+        value / self.divisor - self.zero
+    }
+}
+
+/// Unit code and prefix of a value of 6131h. Bits 0 to 15 (denominator) are not used.
+fn split(code: u32) -> Option<(u8, i8)> {
+    let [0, 0, unit, prefix] = code.to_le_bytes() else { return None };
+    let prefix = i8::from_le_bytes([prefix]);
+    (prefix.unsigned_abs() <= MAX_PREFIX.unsigned_abs()).then_some((unit, prefix))
+}
+
+/// Exact up to 10^22 in double precision, so exact for every prefix and its reciprocal correctly rounded.
+pub(super) fn power_of_ten(exponent: i8) -> f64 {
+    let power = (0..exponent.unsigned_abs()).fold(1.0, |power, _| power * 10.0);
+    if exponent < 0 { 1.0 / power } else { power }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_what_their_codes_say() {
+        assert_eq!(Unit::pressure(0x004E_0000), Some(Unit::BAR));
+        assert_eq!(Unit::temperature(0x002D_0000), Some(Unit::CELSIUS));
+    }
+
+    #[test]
+    fn a_prefix_divides() {
+        let millibar = Unit::pressure(0xFD4E_0000).unwrap().of(101_325.0);
+        let kilopascal = Unit::pressure(0x0322_0000).unwrap().of(101_325.0);
+        assert_eq!(
+            (millibar.to_bits(), kilopascal.to_bits()),
+            (1013.25_f32.to_bits(), 101.325_f32.to_bits())
+        );
+    }
+
+    #[test]
+    fn units_of_the_other_channel_and_stray_bits_are_refused() {
+        assert_eq!(Unit::pressure(0x002D_0000), None);
+        assert_eq!(Unit::temperature(0x004E_0000), None);
+        assert_eq!(Unit::pressure(0x004E_0001), None);
+        assert_eq!(Unit::pressure(0x004E_0100), None);
+        assert_eq!(Unit::pressure(0x1322_0000), None);
+        assert_eq!(Unit::pressure(0xED22_0000), None);
+        assert!(Unit::pressure(0x1222_0000).is_some() && Unit::pressure(0xEE22_0000).is_some());
+        assert_eq!(Unit::pressure(0x8022_0000), None);
+    }
+}
