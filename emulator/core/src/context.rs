@@ -1,0 +1,208 @@
+//! Exception entry and return: the frames on the stack (ARMv7-M, B1.5.6 to B1.5.8).
+
+use chip::Peripherals;
+use unicorn_engine::RegisterARM;
+
+use crate::cost;
+use crate::engine;
+use crate::exception::Exception;
+use crate::fault::Fault;
+use crate::machine::Machine;
+use crate::mechanism::Mechanism;
+
+/// The integer registers of a frame, in its order.
+const INTEGER: [RegisterARM; 6] =
+    [RegisterARM::R0, RegisterARM::R1, RegisterARM::R2, RegisterARM::R3, RegisterARM::R12, RegisterARM::LR];
+
+/// Words of a basic frame, and of one with floating-point registers.
+const BASIC: u32 = 8;
+const EXTENDED: u32 = 26;
+
+/// xPSR: Thumb state, the frame was aligned to eight bytes, the IT state.
+const THUMB: u32 = 1 << 24;
+const ALIGNED: u32 = 1 << 9;
+const IT: u32 = 0x0600_FC00;
+
+/// CONTROL: Thread mode uses the process stack; floating-point registers are in use.
+const SPSEL: u32 = 1 << 1;
+const FPCA: u32 = 1 << 2;
+
+/// EXC_RETURN: no floating-point registers in the frame; return to Thread mode; return to the process stack.
+const NO_FLOATS: u32 = 1 << 4;
+const TO_THREAD: u32 = 1 << 3;
+const TO_PROCESS: u32 = 1 << 2;
+
+impl<P: Peripherals + 'static> Machine<P> {
+    /// Registers as after a reset.
+    pub(crate) fn reset_registers(&mut self, stack: u32, entry: u32) {
+        for register in
+            [RegisterARM::PRIMASK, RegisterARM::FAULTMASK, RegisterARM::BASEPRI, RegisterARM::CONTROL]
+        {
+            self.set(register, 0);
+        }
+        self.set_xpsr(THUMB);
+        self.set(RegisterARM::CONTROL, 0);
+        self.set(RegisterARM::SP, stack & !3);
+        self.set(RegisterARM::LR, 0xFFFF_FFFF);
+        self.set(RegisterARM::PC, entry & !1);
+    }
+
+    /// Takes an exception.
+    pub(crate) fn enter(&mut self, exception: Exception) {
+        let pc = self.pc();
+        let (frame, exc_return) = self.push_frame(pc);
+        let pended = self.cpu.get_data().pended[usize::from(exception.0)];
+        let taken = match frame {
+            Ok(()) => exception,
+            Err(fault) => self.derived(fault, exception),
+        };
+        self.vector(taken, exc_return, cost::ENTRY);
+        let core = self.cpu.get_data_mut();
+        let latency = core.now.since(pended);
+        core.stats.entered(taken, latency, core.now, pc);
+    }
+
+    /// Starts the handler of an exception whose frame is on the stack.
+    fn vector(&mut self, exception: Exception, exc_return: u32, cycles: u32) {
+        let _ = engine::clear_monitor(&mut self.cpu);
+        let core = self.cpu.get_data_mut();
+        core.nvic.activate(exception);
+        core.spend(0, cycles);
+        let base = if core.scb.vtor == 0 { self.model().flash.start } else { self.cpu.get_data().scb.vtor };
+        let handler = self.word(base + 4 * u32::from(exception.0));
+        // Also back to the main stack: Handler mode knows no other.
+        self.set_xpsr(u32::from(exception.0) | THUMB);
+        let control = self.register(RegisterARM::CONTROL);
+        self.set(RegisterARM::CONTROL, control & !FPCA);
+        self.rebuild_flags(0);
+        self.set(RegisterARM::LR, exc_return);
+        match handler {
+            Some(handler) => self.set(RegisterARM::PC, handler & !1),
+            None => self.lock_up(base),
+        }
+    }
+
+    /// Saves the context. The stack pointer moves even when a word cannot be written.
+    fn push_frame(&mut self, pc: u32) -> (Result<(), Fault>, u32) {
+        let control = self.register(RegisterARM::CONTROL);
+        let xpsr = self.register(RegisterARM::XPSR);
+        let handler = xpsr & 0x1FF != 0;
+        let floats = control & FPCA != 0 && !self.cpu.get_data().lacks(Mechanism::FloatFrame);
+        let words = if floats { EXTENDED } else { BASIC };
+        let stack = self.register(RegisterARM::SP);
+        let padded = if stack & 4 != 0 { ALIGNED } else { 0 };
+        let top = stack.wrapping_sub(words * 4) & !7;
+        self.set(RegisterARM::SP, top);
+        let result = self.write_frame(top, pc, xpsr & !ALIGNED | padded, floats);
+        let process = !handler && control & SPSEL != 0;
+        let mut exc_return = 0xFFFF_FFE1;
+        exc_return |= if floats { 0 } else { NO_FLOATS };
+        exc_return |= if handler { 0 } else { TO_THREAD };
+        exc_return |= if process { TO_PROCESS } else { 0 };
+        (result.map_err(|()| Fault::stacking(pc)), exc_return)
+    }
+
+    fn write_frame(&mut self, top: u32, pc: u32, xpsr: u32, floats: bool) -> Result<(), ()> {
+        let mut words: Vec<u32> = INTEGER.iter().map(|register| self.register(*register)).collect();
+        words.extend([pc, xpsr]);
+        if floats {
+            words.extend((0..16).map(|n| self.float(n)));
+            words.extend([self.register(RegisterARM::FPSCR), 0]);
+        }
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        if !self.model().ram.contains(&top) {
+            return Err(());
+        }
+        self.cpu.mem_write(top.into(), &bytes).map_err(|_| ())
+    }
+
+    /// Ends the active exception: the core has branched to an EXC_RETURN value.
+    pub(crate) fn leave(&mut self) {
+        let exc_return = self.register(RegisterARM::PC) | 1;
+        let ending = Exception((self.register(RegisterARM::XPSR) & 0x7F) as u8);
+        if !self.cpu.get_data().nvic.is_active(ending) || exc_return & 0xFFFF_FFE0 != 0xFFFF_FFE0 {
+            return self.take_fault(Fault::bad_return(exc_return));
+        }
+        let core = self.cpu.get_data_mut();
+        core.nvic.deactivate(ending);
+        core.stamp(core.nvic.pending_set() & ending.bit());
+        core.stats.left();
+        if ending != Exception::NMI {
+            self.set(RegisterARM::FAULTMASK, 0);
+        }
+        if let Some(next) = self.follower() {
+            return self.chain(next, exc_return);
+        }
+        self.pop_frame(exc_return);
+        self.cpu.get_data_mut().spend(0, cost::EXIT);
+    }
+
+    /// The exception that follows without unstacking.
+    fn follower(&self) -> Option<Exception> {
+        let core = self.cpu.get_data();
+        let next = core.nvic.to_take(engine::masks(&self.cpu))?;
+        (!core.lacks(Mechanism::TailChain)).then_some(next)
+    }
+
+    fn chain(&mut self, exception: Exception, exc_return: u32) {
+        let pended = self.cpu.get_data().pended[usize::from(exception.0)];
+        self.vector(exception, exc_return, cost::TAIL_CHAIN);
+        let core = self.cpu.get_data_mut();
+        let latency = core.now.since(pended);
+        core.stats.tail_chained += 1;
+        core.stats.entered(exception, latency, core.now, exc_return);
+    }
+
+    fn pop_frame(&mut self, exc_return: u32) {
+        let floats = exc_return & NO_FLOATS == 0;
+        let process = exc_return & TO_PROCESS != 0;
+        let bank = if process { RegisterARM::PSP } else { RegisterARM::MSP };
+        let top = self.register(bank);
+        let count = if floats { EXTENDED } else { BASIC };
+        let words: Option<Vec<u32>> = (0..count).map(|n| self.word(top.wrapping_add(4 * n))).collect();
+        let Some(words) = words else { return self.take_fault(Fault::unstacking(top)) };
+        let _ = engine::clear_monitor(&mut self.cpu);
+        let xpsr = words[7];
+        let padding = if xpsr & ALIGNED != 0 { 4 } else { 0 };
+        self.set(bank, top.wrapping_add(4 * count) + padding);
+        self.set_xpsr(xpsr & !ALIGNED);
+        self.restore_control(exc_return, floats);
+        for (register, word) in INTEGER.iter().zip(&words) {
+            self.set(*register, *word);
+        }
+        if floats {
+            (0..16).for_each(|n| self.set_float(n, words[8 + n as usize]));
+            self.set(RegisterARM::FPSCR, words[24]);
+        }
+        self.set(RegisterARM::PC, words[6] & !1);
+    }
+
+    fn restore_control(&mut self, exc_return: u32, floats: bool) {
+        let mut control = self.register(RegisterARM::CONTROL) & !(FPCA | SPSEL);
+        control |= if floats { FPCA } else { 0 };
+        control |= if exc_return & TO_PROCESS != 0 { SPSEL } else { 0 };
+        self.set(RegisterARM::CONTROL, control);
+        let flags = self.register(RegisterARM::XPSR);
+        self.rebuild_flags(flags);
+    }
+
+    /// Writes all of xPSR. It holds the exception number, so this is also the switch between the modes.
+    fn set_xpsr(&mut self, value: u32) {
+        let value = if self.cpu.get_data().lacks(Mechanism::ItState) { value & !IT } else { value };
+        self.set(RegisterARM::XPSR_NZCVQG, value);
+        self.rebuild_flags(value);
+    }
+
+    /// A write of the condition flags makes the library look at the mode again.
+    fn rebuild_flags(&mut self, xpsr: u32) {
+        self.set(RegisterARM::APSR_NZCV, xpsr & 0xF000_0000);
+    }
+
+    fn float(&self, number: i32) -> u32 {
+        self.cpu.reg_read(RegisterARM::S0 as i32 + number).unwrap_or(0) as u32
+    }
+
+    fn set_float(&mut self, number: i32, value: u32) {
+        let _ = self.cpu.reg_write(RegisterARM::S0 as i32 + number, value.into());
+    }
+}

@@ -1,0 +1,109 @@
+//! What a block of code costs in cycles of a Cortex-M4.
+//!
+//! Instructions are counted exactly; cycles are a model: no pipeline, no bus contention, flash wait states hidden by
+//! the accelerator. Figures from the Cortex-M4 technical reference manual, table 3-1; the sum is good to about 30 %.
+
+/// Instructions and cycles of a block, when it runs to its end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Cost {
+    pub(crate) instructions: u32,
+    pub(crate) cycles: u32,
+}
+
+/// Adds up the Thumb instructions in `code`.
+pub(crate) fn of_block(code: &[u8]) -> Cost {
+    let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
+    let mut cost = Cost::default();
+    while let Some(first) = halves.next() {
+        cost.instructions += 1;
+        cost.cycles += match first >> 11 {
+            0b11101..=0b11111 => wide(first, halves.next().unwrap_or(0)),
+            _ => narrow(first),
+        };
+    }
+    cost
+}
+
+/// Cycles of a 16-bit instruction.
+fn narrow(op: u16) -> u32 {
+    match op >> 12 {
+        // PC-relative load; BX and BLX refill the pipeline.
+        0b0100 if op >> 11 == 0b01001 => 2,
+        0b0100 if op >> 8 == 0b0100_0111 => 3,
+        // Register offset: the upper half of the range loads.
+        0b0101 => {
+            if op >> 9 & 7 >= 3 {
+                2
+            } else {
+                1
+            }
+        }
+        0b0110..=0b1001 => {
+            if op & 1 << 11 != 0 {
+                2
+            } else {
+                1
+            }
+        }
+        0b1011 => miscellaneous(op),
+        // LDM and STM.
+        0b1100 => 1 + (op & 0xFF).count_ones(),
+        // Branches: taken more often than not.
+        0b1101 => 2,
+        0b1110 => 3,
+        _ => 1,
+    }
+}
+
+fn miscellaneous(op: u16) -> u32 {
+    match op >> 8 & 0xF {
+        0b0100 | 0b0101 => 1 + (op & 0x1FF).count_ones(),
+        0b1100 => 1 + (op & 0xFF).count_ones(),
+        0b1101 => 1 + (op & 0xFF).count_ones() + 3,
+        // CBZ and CBNZ.
+        0b0001 | 0b0011 | 0b1001 | 0b1011 => 2,
+        _ => 1,
+    }
+}
+
+/// Cycles of a 32-bit instruction.
+fn wide(first: u16, second: u16) -> u32 {
+    let load = first & 1 << 4 != 0;
+    match (first >> 11 & 3, first >> 9 & 3) {
+        // LDM, STM, LDRD, STRD, exclusive, table branch.
+        (0b01, 0b00) if first & 1 << 6 == 0 => {
+            1 + second.count_ones() + if second >> 15 == 1 && load { 3 } else { 0 }
+        }
+        (0b01, 0b00) if first & 0xFFF0 == 0xE8D0 && second & 0xF0E0 == 0xF000 => 4,
+        (0b01, 0b00) => 3,
+        // Floating point: loads and stores of registers, VDIV and VSQRT, VMLA.
+        (0b01 | 0b11, 0b10 | 0b11) if second >> 9 & 7 == 0b101 => floating(first, second),
+        // Branch with link, long branches.
+        (0b10, _) if second >> 15 == 1 => 3,
+        (0b11, 0b00) if first & 0x0100 == 0 || first >> 8 == 0xF9 => {
+            if load {
+                2
+            } else {
+                1
+            }
+        }
+        // SDIV and UDIV.
+        (0b11, 0b01) if first & 0xFFD0 == 0xFB90 => 7,
+        _ => 1,
+    }
+}
+
+fn floating(first: u16, second: u16) -> u32 {
+    match first >> 8 & 0xF {
+        0b1100 | 0b1101 if first >> 4 & 1 == 1 || first >> 7 & 1 == 1 => 1 + u32::from(second & 0xFF).max(1),
+        0b1110 if first >> 7 & 1 == 1 && first >> 4 & 3 == 0 => 14,
+        0b1110 if first >> 4 & 0xB == 0xB && second & 0x00C0 == 0x00C0 && first & 0xF == 1 => 14,
+        0b1110 if first >> 4 & 0xB == 0 => 3,
+        _ => 1,
+    }
+}
+
+/// Cycles of exception entry, tail-chaining and exit (technical reference manual, 3.9).
+pub(crate) const ENTRY: u32 = 12;
+pub(crate) const TAIL_CHAIN: u32 = 6;
+pub(crate) const EXIT: u32 = 12;

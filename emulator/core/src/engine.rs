@@ -1,0 +1,239 @@
+//! The CPU library: memory map, hooks and registers. What it stops for is told in `Core::halt`.
+
+use chip::{Effect, Peripherals};
+use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, Unicorn};
+
+use crate::core::{Core, Halt, Unmapped};
+use crate::cost;
+use crate::machine::{Error, Model};
+use crate::mechanism::Mechanism;
+use crate::nvic::Masks;
+use crate::ppb;
+
+pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
+
+/// A page of our own, outside everything the chip has, for code that the emulator itself runs.
+const HIDDEN: u64 = 0xFFFF_F000;
+/// `clrex; wfi`
+const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
+
+const NOT_IMPLEMENTED_HINTS: [u16; 3] = [0xBF10, 0xBF20, 0xBF40];
+
+/// Makes a CPU with the memory of `model`.
+pub(crate) fn new<P: Peripherals + 'static>(model: &Model, core: Core<P>) -> Result<Cpu<P>, Error> {
+    let mut cpu = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, core)?;
+    cpu.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
+    let length = |range: &std::ops::Range<u32>| u64::from(range.end - range.start);
+    cpu.mem_map(model.flash.start.into(), length(&model.flash), Prot::READ | Prot::EXEC)?;
+    cpu.mem_map(model.ram.start.into(), length(&model.ram), Prot::ALL)?;
+    cpu.mem_map(HIDDEN, 0x1000, Prot::READ | Prot::EXEC)?;
+    cpu.mem_write(HIDDEN, &CLREX)?;
+    for range in &model.peripherals {
+        map_peripherals(&mut cpu, range.start, range.end - range.start)?;
+    }
+    map_bit_band(&mut cpu, 0x4200_0000, 0x4000_0000)?;
+    map_system(&mut cpu)?;
+    add_hooks(&mut cpu, model)?;
+    Ok(cpu)
+}
+
+fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Result<(), Error> {
+    cpu.add_block_hook(1, 0, on_block)?;
+    cpu.add_intr_hook(on_interrupt)?;
+    cpu.add_insn_invalid_hook(on_invalid)?;
+    cpu.add_mem_hook(HookType::MEM_UNMAPPED, 1, 0, on_unmapped)?;
+    let flash = model.flash.clone();
+    cpu.add_mem_hook(HookType::MEM_WRITE_PROT, flash.start.into(), (flash.end - 1).into(), on_flash_write)?;
+    Ok(())
+}
+
+/// The clock: charges a block before it runs, or stops before it when something is due.
+fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
+    if address >= HIDDEN {
+        return;
+    }
+    let core = cpu.get_data();
+    if core.halt.is_some() || core.needs_attention() || core.nvic.wants_attention() && preempts(cpu) {
+        cpu.get_data_mut().halt.get_or_insert(Halt::Attention);
+        let _ = cpu.emu_stop();
+        return;
+    }
+    let key = (address as u32, size);
+    let cost = match cpu.get_data().costs.get(&key) {
+        Some(cost) => *cost,
+        None => {
+            let mut code = vec![0; size as usize];
+            let _ = cpu.mem_read(address, &mut code);
+            let cost = cost::of_block(&code);
+            cpu.get_data_mut().costs.insert(key, cost);
+            cost
+        }
+    };
+    cpu.get_data_mut().spend(cost.instructions, cost.cycles);
+}
+
+fn preempts<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> bool {
+    cpu.get_data().nvic.to_take(masks(cpu)).is_some()
+}
+
+/// The masking registers, less what a test has switched off.
+pub(crate) fn masks<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> Masks {
+    let read = |register| cpu.reg_read(register).unwrap_or(0);
+    Masks {
+        primask: read(RegisterARM::PRIMASK) & 1 != 0,
+        faultmask: read(RegisterARM::FAULTMASK) & 1 != 0,
+        basepri: if cpu.get_data().lacks(Mechanism::Basepri) { 0 } else { read(RegisterARM::BASEPRI) as u8 },
+    }
+}
+
+fn on_interrupt<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, number: u32) {
+    // QEMU's numbers of exceptions, target/arm/cpu.h.
+    cpu.get_data_mut().halt = Some(match number {
+        2 => Halt::SupervisorCall,
+        7 => Halt::Breakpoint,
+        8 => Halt::ExceptionReturn,
+        _ => return,
+    });
+    let _ = cpu.emu_stop();
+}
+
+/// WFE, SEV and YIELD reach us as invalid instructions. They are hints: going on is always allowed.
+fn on_invalid<P>(cpu: &mut Unicorn<Core<P>>) -> bool {
+    let pc = cpu.pc_read().unwrap_or(0) & !1;
+    let mut op = [0; 2];
+    if cpu.mem_read(pc, &mut op).is_err() || !NOT_IMPLEMENTED_HINTS.contains(&u16::from_le_bytes(op)) {
+        return false;
+    }
+    cpu.set_pc((pc + 2) | 1).is_ok()
+}
+
+fn on_unmapped<P>(cpu: &mut Unicorn<Core<P>>, kind: MemType, address: u64, _: usize, _: i64) -> bool {
+    let fetch = matches!(kind, MemType::FETCH_UNMAPPED);
+    cpu.get_data_mut().unmapped = Some(Unmapped { address: address as u32, fetch });
+    false
+}
+
+/// A store into flash: the flash controller decides what becomes of it; the raw store is dropped.
+fn on_flash_write<P: Peripherals>(
+    cpu: &mut Unicorn<Core<P>>,
+    _: MemType,
+    address: u64,
+    size: usize,
+    value: i64,
+) -> bool {
+    let mut old = [0; 8];
+    let Some(old) = old.get_mut(..size) else { return true };
+    let _ = cpu.mem_read(address, old);
+    let new = &value.to_le_bytes()[..size];
+    let core = cpu.get_data_mut();
+    let result = core.chip.program(address as u32, old, new, core.now);
+    finish(core, address as u32, result.ok());
+    true
+}
+
+/// After a call into the chip or the system space: effects and interrupts, or a fault when nothing answered.
+fn finish<P: Peripherals>(core: &mut Core<P>, address: u32, answer: Option<()>) {
+    if answer.is_none() {
+        core.halt = Some(Halt::DataFault(address));
+    }
+    core.settle();
+}
+
+fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: u32) -> Result<(), Error> {
+    let read = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize| {
+        let core = cpu.get_data_mut();
+        let address = base + offset as u32;
+        let value = core.chip.read(address, size as u8, core.now);
+        finish(core, address, value.ok().map(|_| ()));
+        u64::from(value.unwrap_or(0))
+    };
+    let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize, value: u64| {
+        let core = cpu.get_data_mut();
+        let address = base + offset as u32;
+        let result = core.chip.write(address, size as u8, value as u32, core.now);
+        finish(core, address, result.ok());
+    };
+    cpu.mmio_map(base.into(), size.into(), Some(read), Some(write))?;
+    Ok(())
+}
+
+/// The alias in which every word is one bit of a peripheral register (ARMv7-M, B3.1; PM0214, 2.2.5).
+fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u32) -> Result<(), Error> {
+    let target = move |offset: u64| (base + (offset as u32 >> 5 & !3), offset as u32 >> 2 & 31);
+    let read = move |cpu: &mut Unicorn<Core<P>>, offset: u64, _: usize| {
+        let (address, bit) = target(offset);
+        let core = cpu.get_data_mut();
+        let value = core.chip.read(address, 4, core.now);
+        finish(core, address, value.ok().map(|_| ()));
+        u64::from(value.unwrap_or(0) >> bit & 1)
+    };
+    let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, _: usize, value: u64| {
+        let (address, bit) = target(offset);
+        let core = cpu.get_data_mut();
+        let old = core.chip.read(address, 4, core.now);
+        let new = old.map(|old| old & !(1 << bit) | (value as u32 & 1) << bit);
+        let result = new.and_then(|new| core.chip.write(address, 4, new, core.now));
+        finish(core, address, result.ok());
+    };
+    cpu.mmio_map(alias.into(), 0x0200_0000, Some(read), Some(write))?;
+    Ok(())
+}
+
+fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
+    let read = |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize| {
+        let ipsr = cpu.reg_read(RegisterARM::IPSR).unwrap_or(0) as u32 & 0x1FF;
+        let address = ppb::BASE + offset as u32;
+        let core = cpu.get_data_mut();
+        let word = core.ppb_read(address & !3, ipsr);
+        finish(core, address, word.map(|_| ()));
+        let value = word.unwrap_or(0) >> (8 * (address & 3));
+        u64::from(if size < 4 { value & ((1 << (8 * size)) - 1) } else { value })
+    };
+    let write = |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize, value: u64| {
+        let address = ppb::BASE + offset as u32;
+        let core = cpu.get_data_mut();
+        let word = if size == 4 { Some(value as u32) } else { merged(core, address, size, value as u32) };
+        let result = word.and_then(|word| core.ppb_write(address & !3, word));
+        finish(core, address, result);
+    };
+    cpu.mmio_map(ppb::BASE.into(), ppb::SIZE.into(), Some(read), Some(write))?;
+    Ok(())
+}
+
+/// A byte or halfword put into its word; the priority registers are written so.
+fn merged<P: Peripherals>(core: &mut Core<P>, address: u32, size: usize, value: u32) -> Option<u32> {
+    let shift = 8 * (address & 3);
+    let mask = ((1_u32 << (8 * size)) - 1) << shift;
+    Some(core.ppb_read(address & !3, 0)? & !mask | value << shift & mask)
+}
+
+/// Clears the exclusive monitor, as exception entry and return do (ARMv7-M, A3.4).
+pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Error> {
+    if !cpu.get_data().lacks(Mechanism::ExclusiveMonitor) {
+        cpu.emu_start(HIDDEN | 1, 0, 0, 0)?;
+    }
+    Ok(())
+}
+
+/// Writes memory behind the back of the CPU and forgets what was translated from it.
+pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]) -> Result<(), Error> {
+    cpu.mem_write(address.into(), bytes)?;
+    if !cpu.get_data().lacks(Mechanism::Retranslation) {
+        let end = u64::from(address) + bytes.len() as u64;
+        cpu.ctl_remove_cache(address.into(), end)?;
+        let touched = |start: u32, size: u32| {
+            u64::from(start) < end && u64::from(start) + u64::from(size) > address.into()
+        };
+        cpu.get_data_mut().costs.retain(|(start, size), _| !touched(*start, *size));
+    }
+    Ok(())
+}
+
+/// Whether an effect needs the memory.
+pub(crate) fn apply<P: Peripherals>(cpu: &mut Cpu<P>, effect: Effect) -> Result<Option<Effect>, Error> {
+    match effect {
+        Effect::Store { address, bytes } => store(cpu, address, &bytes).map(|()| None),
+        Effect::Fill { range, byte } => store(cpu, range.start, &vec![byte; range.len()]).map(|()| None),
+        other => Ok(Some(other)),
+    }
+}
