@@ -101,5 +101,6 @@ fn the_stack_is_at_the_very_start_of_ram() {
     let regions = regions();
     assert_eq!(regions["STACK"].start, RAM.start);
     assert_eq!(regions["STACK"].end, regions["RAM"].start);
-    assert_eq!(regions["RAM"].end, RAM.end);
+    assert_eq!(regions["RAM"].end, regions["RETAINED"].start);
+    assert_eq!(regions["RETAINED"].end, RAM.end);
 }

@@ -1,1 +1,28 @@
+//! Board support: everything that touches a register of the STM32F4, and the only crate with `unsafe`.
+//!
+//! What is pure logic (bit timing, filter packing, the transmit queue, the extension of the counter, supervision, the
+//! crash record) has modules of its own without hardware, which are built and tested on the host as well. The rest is
+//! built for the target only.
 #![no_std]
+// On the host, where only the modules without hardware are: values are cut to the width of a register everywhere else.
+#![cfg_attr(not(target_os = "none"), warn(clippy::pedantic))]
+#![warn(clippy::undocumented_unsafe_blocks)]
+
+pub mod bit_timing;
+pub mod bus_state;
+pub mod crash_record;
+pub mod extension;
+pub mod filters;
+pub mod losses;
+pub mod mailbox;
+pub mod reset_cause;
+pub mod serial_number;
+pub mod supervision;
+pub mod transmit_queue;
+pub mod vectors;
+
+#[cfg(target_os = "none")]
+mod hardware;
+
+#[cfg(target_os = "none")]
+pub use hardware::*;

@@ -1,0 +1,183 @@
+//! What is left of a crash for the next start: a few words in RAM that no start-up code touches, sealed with a CRC.
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
+/// Without a table: it runs once, after a crash, and must be small.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+const MAGIC: u32 = 0x4352_5348;
+const FAULT: u32 = 1;
+const PANIC: u32 = 2;
+const FILE_WORDS: usize = 8;
+
+/// Words of a sealed record.
+pub const WORDS: usize = 4 + FILE_WORDS;
+
+/// The sealed form.
+pub type Sealed = [u32; WORDS];
+
+/// A crash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Crash {
+    /// The core took a fault.
+    Fault(Fault),
+    /// The program gave up.
+    Panic(Place),
+}
+
+/// Registers at a fault (PM0214, 4.4). Program counter and link register are 0 when the stack could not be read, as
+/// after an overflow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Fault {
+    /// Where it happened.
+    pub pc: u32,
+    /// Where that was called from.
+    pub lr: u32,
+    /// The stack pointer on entry.
+    pub sp: u32,
+    /// Configurable fault status.
+    pub cfsr: u32,
+    /// Hard fault status.
+    pub hfsr: u32,
+    /// The address of the access, when CFSR says that it is valid.
+    pub address: u32,
+}
+
+/// Where a panic was raised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    line: u32,
+    file: [u8; FILE_WORDS * 4],
+}
+
+impl Place {
+    /// A line of a source file, of whose name the end is kept.
+    #[must_use]
+    pub fn new(file: &str, line: u32) -> Place {
+        let mut kept = [0; FILE_WORDS * 4];
+        kept.iter_mut().rev().zip(file.bytes().rev()).for_each(|(to, from)| *to = from);
+        Place { line, file: kept }
+    }
+
+    /// The line.
+    #[must_use]
+    pub fn line(&self) -> u32 {
+        self.line
+    }
+
+    /// The end of the file's name; empty when it was cut inside of a character.
+    #[must_use]
+    pub fn file(&self) -> &str {
+        let name = self.file.iter().position(|&byte| byte != 0).and_then(|start| self.file.get(start..));
+        name.and_then(|bytes| core::str::from_utf8(bytes).ok()).unwrap_or_default()
+    }
+}
+
+impl Crash {
+    /// The record to leave in RAM.
+    #[must_use]
+    pub fn seal(&self) -> Sealed {
+        let mut words = [0; WORDS];
+        let (kind, content) = self.content();
+        let body = [MAGIC, kind].into_iter().chain(content);
+        words.iter_mut().zip(body).for_each(|(to, from)| *to = from);
+        words[WORDS - 1] = checksum(&words);
+        words
+    }
+
+    /// The crash in `words`; `None` when they are not a sealed record, as after power-on.
+    #[must_use]
+    pub fn open(words: &Sealed) -> Option<Crash> {
+        let [MAGIC, kind, content @ .., sum] = words else { return None };
+        if *sum != checksum(words) {
+            return None;
+        }
+        match *kind {
+            FAULT => Some(Crash::Fault(fault(content))),
+            PANIC => Some(Crash::Panic(place(content))),
+            _ => None,
+        }
+    }
+
+    fn content(&self) -> (u32, [u32; 1 + FILE_WORDS]) {
+        match self {
+            Crash::Fault(f) => (FAULT, [f.pc, f.lr, f.sp, f.cfsr, f.hfsr, f.address, 0, 0, 0]),
+            Crash::Panic(place) => (PANIC, place_words(place)),
+        }
+    }
+}
+
+fn place_words(place: &Place) -> [u32; 1 + FILE_WORDS] {
+    let mut words = [place.line; 1 + FILE_WORDS];
+    let (chunks, _) = place.file.as_chunks::<4>();
+    words.iter_mut().skip(1).zip(chunks).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
+    words
+}
+
+fn place(content: &[u32]) -> Place {
+    let mut words = content.iter();
+    let line = words.next().copied().unwrap_or_default();
+    let mut file = [0; FILE_WORDS * 4];
+    let (chunks, _) = file.as_chunks_mut::<4>();
+    chunks.iter_mut().zip(words).for_each(|(to, from)| *to = from.to_le_bytes());
+    Place { line, file }
+}
+
+fn fault(content: &[u32]) -> Fault {
+    match *content {
+        [pc, lr, sp, cfsr, hfsr, address, ..] => Fault { pc, lr, sp, cfsr, hfsr, address },
+        _ => Fault::default(),
+    }
+}
+
+/// CRC-32 of all words but the last.
+fn checksum(words: &Sealed) -> u32 {
+    let mut digest = CRC.digest();
+    words.iter().take(WORDS - 1).for_each(|word| digest.update(&word.to_le_bytes()));
+    digest.finalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAULTED: Crash = Crash::Fault(Fault {
+        pc: 0x0801_2345,
+        lr: 0x0801_1111,
+        sp: 0x2000_3F00,
+        cfsr: 0x8200,
+        hfsr: 0x4000_0000,
+        address: 0xDEAD_BEEF,
+    });
+
+    #[test]
+    fn a_crash_survives() {
+        let panicked = Crash::Panic(Place::new("crates/canopen/src/sdo.rs", 77));
+        for crash in [FAULTED, panicked] {
+            assert_eq!(Crash::open(&crash.seal()), Some(crash));
+        }
+    }
+
+    #[test]
+    fn any_flipped_bit_voids_it() {
+        let good = FAULTED.seal();
+        for bit in 0..WORDS * 32 {
+            let mut bad = good;
+            bad[bit / 32] ^= 1 << (bit % 32);
+            assert_eq!(Crash::open(&bad), None, "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn what_ram_holds_after_power_on_is_no_crash() {
+        assert_eq!(Crash::open(&[0; WORDS]), None);
+        assert_eq!(Crash::open(&[u32::MAX; WORDS]), None);
+    }
+
+    #[test]
+    fn of_a_long_file_name_the_end_is_kept() {
+        let place = Place::new("/home/somebody/project/crates/bsp/src/transmit_queue.rs", 1);
+        assert_eq!(place.file(), "crates/bsp/src/transmit_queue.rs");
+        assert_eq!(Place::new("main.rs", 1).file(), "main.rs");
+    }
+}

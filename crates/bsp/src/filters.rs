@@ -1,0 +1,124 @@
+//! Which identifiers go to which receive FIFO, packed into the filter banks of bxCAN (RM0390, 30.7.4).
+//!
+//! A bank holds two pairs of identifier and mask of 16 bits. A pair, and not an entry of a list, because it takes the
+//! data frame and the remote frame of one identifier. What no bank accepts never reaches the core.
+
+use heapless::Vec;
+
+/// Banks of CAN1 when CAN2 has none.
+pub const BANKS: usize = 28;
+
+/// Where a frame goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fifo {
+    /// FIFO 0: NMT, SYNC and RPDO.
+    Process,
+    /// FIFO 1: everything else.
+    Services,
+}
+
+/// One pair of a bank: a frame passes when `(its identifier ^ id) & mask == 0`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// Identifier, 11 bits.
+    pub id: u16,
+    /// The bits that must agree.
+    pub mask: u16,
+}
+
+impl Pair {
+    const ANY: Pair = Pair { id: 0, mask: 0 };
+
+    fn exactly(id: u16) -> Pair {
+        Pair { id: id & 0x7FF, mask: 0x7FF }
+    }
+}
+
+/// One filter bank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bank {
+    /// Where its frames go.
+    pub fifo: Fifo,
+    /// What passes: the one or the other.
+    pub pairs: [Pair; 2],
+}
+
+/// The banks in order. Of two that accept a frame the first decides (RM0390, 30.7.4, filter priority rules).
+pub type Banks = Vec<Bank, BANKS>;
+
+/// Packs identifiers into banks. When there are more than fit, the last bank passes every base frame to FIFO 1 and the
+/// protocol sorts them out; none is lost.
+pub fn pack(process: impl Iterator<Item = u16>, services: impl Iterator<Item = u16>) -> Banks {
+    let mut banks = Banks::new();
+    let complete = fill(&mut banks, Fifo::Process, process) && fill(&mut banks, Fifo::Services, services);
+    if !complete {
+        banks.pop();
+        let _ = banks.push(Bank { fifo: Fifo::Services, pairs: [Pair::ANY; 2] });
+    }
+    banks
+}
+
+/// Adds banks for `ids`; false when there is no bank left.
+fn fill(banks: &mut Banks, fifo: Fifo, mut ids: impl Iterator<Item = u16>) -> bool {
+    while let Some(first) = ids.next() {
+        let second = ids.next().unwrap_or(first);
+        let pairs = [Pair::exactly(first), Pair::exactly(second)];
+        if banks.push(Bank { fifo, pairs }).is_err() {
+            return false;
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the hardware does with a frame.
+    fn route(banks: &Banks, id: u16) -> Option<Fifo> {
+        let passes = |pair: &Pair| (id ^ pair.id) & pair.mask == 0;
+        banks.iter().find(|bank| bank.pairs.iter().any(passes)).map(|bank| bank.fifo)
+    }
+
+    #[test]
+    fn each_identifier_reaches_its_fifo_and_no_other_passes() {
+        let process = [0x000, 0x080, 0x201];
+        let services = [0x601, 0x7E5];
+        let banks = pack(process.into_iter(), services.into_iter());
+        for id in 0..=0x7FF {
+            let wanted = match id {
+                id if process.contains(&id) => Some(Fifo::Process),
+                id if services.contains(&id) => Some(Fifo::Services),
+                _ => None,
+            };
+            assert_eq!(route(&banks, id), wanted, "{id:#x}");
+        }
+    }
+
+    #[test]
+    fn an_identifier_in_both_lists_is_process_data() {
+        let banks = pack([0x200].into_iter(), [0x200].into_iter());
+        assert_eq!(route(&banks, 0x200), Some(Fifo::Process));
+    }
+
+    #[test]
+    fn all_banks_can_be_used() {
+        let banks = pack(0..4, 0x700..0x700 + 52);
+        assert_eq!(banks.len(), BANKS);
+        assert_eq!(route(&banks, 0x700 + 51), Some(Fifo::Services));
+        assert_eq!(route(&banks, 0x700 + 52), None);
+    }
+
+    #[test]
+    fn with_too_many_identifiers_none_is_lost() {
+        let banks = pack(0..4, 0x700..0x700 + 54);
+        assert_eq!(banks.len(), BANKS);
+        assert!((0..4).all(|id| route(&banks, id) == Some(Fifo::Process)));
+        assert!((0x700..0x700 + 54).all(|id| route(&banks, id) == Some(Fifo::Services)));
+    }
+
+    #[test]
+    fn no_identifiers_need_no_bank() {
+        assert!(pack([].into_iter(), [].into_iter()).is_empty());
+    }
+}

@@ -1,0 +1,31 @@
+//! The application slot as the bootloader sees it.
+
+use cortex_m::peripheral::SCB;
+
+use super::memory;
+use crate::vectors::Vectors;
+
+/// The vectors of the application; `None` when the slot holds nothing that could be started.
+pub fn vectors() -> Option<Vectors> {
+    let image = memory::application();
+    // SAFETY: the first two words of the slot: flash, readable whatever it holds.
+    let words = unsafe { (image.start as *const [u32; 2]).read_volatile() };
+    Vectors::check(words, &memory::ram(), &image)
+}
+
+/// Starts the application as a reset would. Nothing of the caller goes on: interrupts are off until the application has
+/// its own vector table, and its stack replaces the caller's.
+///
+/// The caller must not have started a peripheral that writes to memory by itself; the bootloader starts none.
+pub fn start(scb: &SCB, vectors: Vectors) -> ! {
+    let table = memory::application().start;
+    cortex_m::interrupt::disable();
+    // SAFETY: the slot is aligned as VTOR wants it (memory.x), `vectors` is checked, and this function does not return, so
+    // nobody misses the stack. Interrupts are enabled again as a reset leaves them; none of them is in the NVIC.
+    unsafe {
+        scb.vtor.write(table);
+        cortex_m::asm::dsb();
+        cortex_m::interrupt::enable();
+        cortex_m::asm::bootstrap(vectors.stack() as *const u32, vectors.reset() as *const u32)
+    }
+}

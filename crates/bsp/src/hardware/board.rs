@@ -1,0 +1,97 @@
+//! Bring-up of the whole board in one place: clocks, pins, and who owns which peripheral.
+
+use stm32f4xx_hal::pac::{DBGMCU, Peripherals, RCC};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::{Config, Rcc};
+
+use super::can::{Controller, Transmitter};
+use super::led::Led;
+use super::sampling::{Parts, Sampling};
+use super::time_base::{self, Alarm, TimeInterrupt};
+use super::watchdog::Watchdog;
+use crate::bit_timing::APB1_HZ;
+use crate::reset_cause::ResetCause;
+
+/// The board's name, object 1009h.
+#[cfg(feature = "stm32f446")]
+pub const NAME: &str = "NUCLEO-F446RE";
+/// The board's name, object 1009h.
+#[cfg(not(feature = "stm32f446"))]
+pub const NAME: &str = "STM32F405/407";
+
+/// Everything the application uses of the board.
+pub struct Board {
+    /// Why the chip was reset.
+    pub reset_cause: ResetCause,
+    /// Runs already.
+    pub watchdog: Watchdog,
+    /// The interrupt of the time base.
+    pub time: TimeInterrupt,
+    /// The alarms of process data and services.
+    pub alarms: [Alarm; 2],
+    /// The CAN controller, not yet on the bus.
+    pub can: Controller,
+    /// Its transmit mailboxes.
+    pub transmitter: Transmitter,
+    /// The front end, running.
+    pub sampling: Sampling,
+    /// The status LED.
+    pub led: Led,
+}
+
+impl Board {
+    /// Starts everything but the bus. The watchdog comes first: a crystal that does not start ends in a reset too.
+    #[must_use]
+    pub fn start(device: Peripherals) -> Board {
+        let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
+        let reset_cause = reset_cause(&device.RCC);
+        keep_debugger(&device.DBGMCU);
+        let mut rcc = clocks(device.RCC);
+        let (time, alarms) = time_base::start(device.TIM2, &mut rcc);
+        let gpioa = device.GPIOA.split(&mut rcc);
+        let gpiob = device.GPIOB.split(&mut rcc);
+        let (can, transmitter) = Controller::new(device.CAN1, gpiob.pb9, gpiob.pb8, &mut rcc);
+        let front_end = Parts {
+            adc: device.ADC1,
+            common: device.ADC_COMMON,
+            dma: device.DMA2,
+            timer: device.TIM3,
+            pressure: gpioa.pa0.into_analog(),
+            supply: gpioa.pa1.into_analog(),
+        };
+        let sampling = Sampling::start(front_end, &mut rcc);
+        let led = Led::new(gpioa.pa5);
+        Board { reset_cause, watchdog, time, alarms, can, transmitter, sampling, led }
+    }
+}
+
+/// The LED alone, with the clock as it is after a reset: the bootloader needs no more.
+pub fn led(device: Peripherals) -> Led {
+    let mut rcc = device.RCC.constrain();
+    Led::new(device.GPIOA.split(&mut rcc).pa5)
+}
+
+/// Frequency of the core after a reset, in hertz (HSI).
+pub const RESET_CLOCK_HZ: u32 = 16_000_000;
+
+/// Reads and clears the flags, so that the next reset tells its own cause only.
+fn reset_cause(rcc: &RCC) -> ResetCause {
+    let cause = ResetCause::from_csr(rcc.csr().read().bits());
+    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    cause
+}
+
+/// Keeps the debug port clocked while the core sleeps: RTT is read then.
+fn keep_debugger(debug: &DBGMCU) {
+    debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
+}
+
+/// 144 MHz from HSE, APB1 at 36 MHz for the sake of the bit rates, APB2 at 72 MHz.
+fn clocks(rcc: RCC) -> Rcc {
+    let config = Config::hse(8.MHz()).sysclk(144.MHz()).pclk1(36.MHz()).pclk2(72.MHz());
+    // The NUCLEO gets its 8 MHz from the ST-LINK, boards with the other chips have a crystal.
+    let config = if cfg!(feature = "stm32f446") { config.bypass_hse_oscillator() } else { config };
+    let rcc = rcc.freeze(config);
+    assert_eq!(rcc.clocks.pclk1().raw(), APB1_HZ);
+    rcc
+}

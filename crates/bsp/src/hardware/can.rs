@@ -1,0 +1,153 @@
+//! CAN1: bring-up, filters, state, and the transmit mailboxes.
+
+use bxcan::filter::Mask16;
+use bxcan::{Data, Interrupts, StandardId};
+use canopen::Frame;
+use stm32f4xx_hal::can::Can as Pins;
+use stm32f4xx_hal::gpio::{PB8, PB9};
+use stm32f4xx_hal::pac::{CAN1, can1};
+use stm32f4xx_hal::rcc::Rcc;
+
+use crate::bit_timing::BitTiming;
+use crate::bus_state::BusState;
+use crate::filters::{BANKS, Bank, Banks, Fifo, Pair};
+use crate::transmit_queue::{Mailboxes, Offer};
+
+/// The registers as bxcan wants them.
+pub(crate) struct Registers;
+
+// SAFETY: CAN1 is owned by `Controller`. The parts that share its registers use disjoint ones: the controller those of
+// mode, timing, errors and filters, the transmitter those of the transmit mailboxes, each receiver those of its FIFO.
+unsafe impl bxcan::Instance for Registers {
+    const REGISTERS: *mut bxcan::RegisterBlock = CAN1::ptr().cast_mut().cast();
+}
+
+// SAFETY: CAN1 owns all banks of the pair CAN1 and CAN2 (RM0390, 30.7.4).
+unsafe impl bxcan::FilterOwner for Registers {
+    const NUM_FILTER_BANKS: u8 = BANKS as u8;
+}
+
+// SAFETY: as above; CAN2 is the slave and stays off.
+unsafe impl bxcan::MasterInstance for Registers {}
+
+pub(crate) fn registers() -> &'static can1::RegisterBlock {
+    // SAFETY: see the implementation of `Instance`; whoever calls this keeps to its own registers.
+    unsafe { &*CAN1::ptr() }
+}
+
+/// Mode, timing, filters and errors of the controller.
+pub struct Controller {
+    can: bxcan::Can<Registers>,
+    _pins: Pins<CAN1>,
+}
+
+impl Controller {
+    /// Takes the peripheral and its pins, and leaves the bus alone until [`Controller::start`].
+    pub(crate) fn new(can: CAN1, tx: PB9, rx: PB8, rcc: &mut Rcc) -> (Controller, Transmitter) {
+        let pins = Pins::new(can, (tx, rx), rcc);
+        let (transmit, ..) = bxcan::Can::builder(Registers).leave_disabled().split();
+        let can = bxcan::Can::builder(Registers).leave_disabled();
+        (Controller { can, _pins: pins }, Transmitter(transmit))
+    }
+
+    /// Goes on the bus, again when it was there: drops what is in the mailboxes and takes new timing and filters. Error
+    /// counters start from zero. It does not wait for the bus: one that is stuck must not keep the node from starting.
+    pub fn start(&mut self, timing: BitTiming, banks: &Banks) {
+        registers().tsr().write(|w| w.abrq0().set_bit().abrq1().set_bit().abrq2().set_bit());
+        self.can.modify_config().set_bit_timing(timing.btr()).leave_disabled();
+        self.set_filters(banks);
+        self.enable_interrupts();
+        // Clears the sleep request; the controller joins after 11 recessive bits, and also leaves bus-off by itself (ABOM).
+        let _ = self.can.enable_non_blocking();
+    }
+
+    /// Replaces the filters. Frames that end meanwhile, a few microseconds, are not received.
+    pub fn set_filters(&mut self, banks: &Banks) {
+        let mut filters = self.can.modify_filters();
+        filters.set_split(BANKS as u8).clear();
+        for (index, bank) in (0..).zip(banks) {
+            filters.enable_bank(index, fifo(bank.fifo), masks(bank));
+        }
+    }
+
+    /// State of the fault confinement; acknowledges the error interrupt.
+    pub fn state(&mut self) -> BusState {
+        registers().msr().write(|w| w.erri().set_bit());
+        BusState::from_esr(registers().esr().read().bits())
+    }
+
+    fn enable_interrupts(&mut self) {
+        self.can.enable_interrupts(
+            Interrupts::TRANSMIT_MAILBOX_EMPTY
+                | Interrupts::FIFO0_MESSAGE_PENDING
+                | Interrupts::FIFO1_MESSAGE_PENDING
+                | Interrupts::ERROR,
+        );
+        // What counts as an error for that last one, which bxcan does not know.
+        registers().ier().modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit());
+    }
+}
+
+fn fifo(fifo: Fifo) -> bxcan::Fifo {
+    match fifo {
+        Fifo::Process => bxcan::Fifo::Fifo0,
+        Fifo::Services => bxcan::Fifo::Fifo1,
+    }
+}
+
+fn masks(bank: &Bank) -> [Mask16; 2] {
+    bank.pairs.map(|Pair { id, mask }| Mask16::frames_with_std_id(standard(id), standard(mask)))
+}
+
+fn standard(id: u16) -> StandardId {
+    StandardId::new(id).unwrap_or(StandardId::MAX)
+}
+
+/// The transmit mailboxes.
+pub struct Transmitter(bxcan::Tx<Registers>);
+
+impl Transmitter {
+    /// Acknowledges the transmit interrupt. To be called before the queue is pumped: a mailbox that becomes free later
+    /// interrupts again.
+    pub fn acknowledge(&mut self) {
+        self.0.clear_interrupt_flags();
+    }
+}
+
+impl Mailboxes for Transmitter {
+    fn offer(&mut self, frame: &Frame) -> Offer {
+        if would_wait() {
+            return Offer::Refused;
+        }
+        match self.0.transmit(&outgoing(frame)) {
+            Err(_) => Offer::Refused,
+            Ok(status) => status.dequeued_frame().and_then(replaced).map_or(Offer::Taken, Offer::Replaced),
+        }
+    }
+}
+
+/// With all mailboxes full bxcan takes a pending frame back, and when that frame is on the wire it waits for its end, up to
+/// 13 ms at 10 kbit/s. So nothing is taken back while the controller transmits; the interrupt at the end comes soon.
+fn would_wait() -> bool {
+    let status = registers().tsr().read();
+    let full = status.tme0().bit_is_clear() && status.tme1().bit_is_clear() && status.tme2().bit_is_clear();
+    full && registers().msr().read().txm().bit_is_set()
+}
+
+fn outgoing(frame: &Frame) -> bxcan::Frame {
+    let id = standard(frame.id());
+    if frame.is_remote() {
+        bxcan::Frame::new_remote(id, frame.len() as u8)
+    } else {
+        bxcan::Frame::new_data(id, Data::new(frame.data()).unwrap_or(Data::empty()))
+    }
+}
+
+/// A frame that bxcan hands back: always one that [`outgoing`] made.
+fn replaced(frame: &bxcan::Frame) -> Option<Frame> {
+    let bxcan::Id::Standard(id) = frame.id() else { return None };
+    match frame.data() {
+        Some(data) => Frame::new(id.as_raw(), data),
+        None => Frame::remote(id.as_raw(), frame.dlc()),
+    }
+}

@@ -1,0 +1,71 @@
+//! The handlers of what must never happen: every fault, and interrupts that nobody asked for.
+//!
+//! The stack lies at the very start of RAM, so that one that overflows leaves RAM and faults. The handler of that fault
+//! has no stack to run on: it takes a small one of its own before anything else.
+
+use core::arch::naked_asm;
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+
+use cortex_m::peripheral::SCB;
+
+use super::{crash, memory};
+use crate::crash_record::{Crash, Fault};
+
+const EMERGENCY_BYTES: usize = 1024;
+
+#[repr(align(8))]
+struct EmergencyStack(
+    #[expect(dead_code, reason = "used by its address")] UnsafeCell<MaybeUninit<[u8; EMERGENCY_BYTES]>>,
+);
+
+// SAFETY: only the fault handler uses it, which nothing interrupts and which does not return.
+unsafe impl Sync for EmergencyStack {}
+
+#[unsafe(link_section = ".uninit.emergency_stack")]
+static EMERGENCY: EmergencyStack = EmergencyStack(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// Every fault: none of the configurable ones is enabled, so all escalate to this (PM0214, 2.4.2).
+///
+/// cortex-m-rt's own trampoline pushes to the stack that may just have overflowed, so this replaces it.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn HardFault() -> ! {
+    naked_asm!(
+        "mov r0, sp",
+        "movw r1, #:lower16:({stack} + {size})",
+        "movt r1, #:upper16:({stack} + {size})",
+        "mov sp, r1",
+        "b {record}",
+        stack = sym EMERGENCY,
+        size = const EMERGENCY_BYTES,
+        record = sym record,
+    )
+}
+
+/// `sp` is where the core pushed the registers of the program, if it could.
+extern "C" fn record(sp: u32) -> ! {
+    // SAFETY: reads of system control registers, by the only code that still runs.
+    let scb = unsafe { &*SCB::PTR };
+    let cfsr = scb.cfsr.read();
+    let [lr, pc] = stacked(sp).unwrap_or_default();
+    let address = if cfsr & BFAR_VALID != 0 { scb.bfar.read() } else { scb.mmfar.read() };
+    crash::restart(&Crash::Fault(Fault { pc, lr, sp, cfsr, hfsr: scb.hfsr.read(), address }))
+}
+
+/// CFSR: BFAR holds the address of a bus fault.
+const BFAR_VALID: u32 = 1 << 15;
+
+/// LR and PC of the eight words that the core pushes (PM0214, 2.3.7), when they lie in the stack.
+fn stacked(sp: u32) -> Option<[u32; 2]> {
+    let stack = memory::stack();
+    let readable = sp.is_multiple_of(4) && sp >= stack.start && sp.checked_add(32)? <= stack.end;
+    // SAFETY: the words lie in the stack, whose owner has ended.
+    readable.then(|| unsafe { ((sp + 20) as *const [u32; 2]).read_volatile() })
+}
+
+/// An interrupt without a handler: the program enabled what it does not serve.
+#[cortex_m_rt::exception]
+unsafe fn DefaultHandler(number: i16) -> ! {
+    panic!("unexpected exception {number}")
+}

@@ -1,0 +1,26 @@
+//! The modules that touch hardware.
+
+pub mod application;
+pub mod board;
+pub mod can;
+pub mod crash;
+pub mod factory;
+mod fault;
+pub mod led;
+pub mod memory;
+mod receive;
+mod sampling;
+mod time_base;
+mod watchdog;
+
+pub use board::Board;
+pub use receive::{Frames, ReceiveQueue, Received, Receiver};
+pub use sampling::{Sampling, Sums};
+pub use stm32f4xx_hal::pac;
+pub use time_base::{Alarm, Clock, TimeInterrupt};
+pub use watchdog::Watchdog;
+
+// The logger of every image.
+use defmt_rtt as _;
+
+defmt::timestamp!("{=u64:us}", Clock::now().0);

@@ -1,0 +1,85 @@
+//! A receive FIFO and the queue that its interrupt drains it into.
+
+use canopen::{Frame, Instant};
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use super::can::registers;
+use super::time_base::Clock;
+use crate::losses::Losses;
+use crate::mailbox::Mailbox;
+
+/// Frames that wait for their task. At 1 Mbit/s the shortest frame takes 47 us, so this is 1.5 ms of nothing but them.
+const CAPACITY: usize = 32;
+
+/// The queue between the interrupt and the task.
+pub type ReceiveQueue = Queue<Received, CAPACITY>;
+
+/// A frame and when its interrupt came.
+#[derive(Clone, Copy, Debug)]
+pub struct Received {
+    /// The frame.
+    pub frame: Frame,
+    /// The time stamp.
+    pub at: Instant,
+}
+
+/// The interrupt's side of one FIFO.
+pub struct Receiver {
+    fifo: usize,
+    queue: Producer<'static, Received>,
+    lost: &'static Losses,
+}
+
+/// The task's side.
+pub type Frames = Consumer<'static, Received>;
+
+impl Receiver {
+    /// The two sides of FIFO 0 or 1.
+    pub fn new(fifo: usize, queue: &'static mut ReceiveQueue, lost: &'static Losses) -> (Receiver, Frames) {
+        let (producer, consumer) = queue.split();
+        (Receiver { fifo, queue: producer, lost }, consumer)
+    }
+
+    /// Empties the FIFO, whose three places at 1 Mbit/s fill in 141 us. A frame that finds no place, in the FIFO or in the
+    /// queue, is counted.
+    pub fn drain(&mut self) {
+        let at = Clock::now();
+        while let Some(mailbox) = self.next() {
+            if let Some(frame) = mailbox.frame() {
+                let full = self.queue.enqueue(Received { frame, at }).is_err();
+                self.count(full);
+            }
+        }
+    }
+
+    fn next(&mut self) -> Option<Mailbox> {
+        let state = registers().rfr(self.fifo);
+        let now = state.read();
+        if now.fovr().bit_is_set() {
+            state.write(|w| w.fovr().clear());
+            self.count(true);
+        }
+        (now.fmp().bits() > 0).then(|| self.release())
+    }
+
+    /// Reads the oldest frame and gives its place back.
+    fn release(&mut self) -> Mailbox {
+        let output = registers().rx(self.fifo);
+        let mailbox = Mailbox {
+            rir: output.rir().read().bits(),
+            rdtr: output.rdtr().read().bits(),
+            rdlr: output.rdlr().read().bits(),
+            rdhr: output.rdhr().read().bits(),
+        };
+        registers().rfr(self.fifo).write(|w| w.rfom().set_bit());
+        // The next frame is at the output when the hardware has cleared the request, a few clocks later.
+        while registers().rfr(self.fifo).read().rfom().bit_is_set() {}
+        mailbox
+    }
+
+    fn count(&self, lost: bool) {
+        if lost {
+            self.lost.count();
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! The sampling front end: TIM3 starts a scan of ADC1 16,000 times a second, DMA2 collects it, and the interrupt comes
+//! once a millisecond. When each conversion begins is decided by hardware alone; the core can only be late to collect.
+
+use core::sync::atomic::{AtomicU16, Ordering};
+
+use stm32f4xx_hal::gpio::{Analog, PA0, PA1};
+use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, DMA2, TIM3};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+use crate::losses::Losses;
+
+/// Channels of one scan: pressure, its supply, temperature sensor, VREFINT.
+const CHANNELS: [u8; 4] = [0, 1, TEMPERATURE, 17];
+/// Scans in a millisecond.
+const SCANS: usize = 16;
+/// Conversions in a half of the buffer.
+const HALF: usize = SCANS * CHANNELS.len();
+/// Counts of TIM3 between two scans: 72 MHz / 16 kHz.
+const PERIOD: u16 = 4500;
+
+/// Channel of the temperature sensor (RM0390, 13.10; RM0090, 13.10).
+#[cfg(feature = "stm32f446")]
+const TEMPERATURE: u8 = 18;
+#[cfg(not(feature = "stm32f446"))]
+const TEMPERATURE: u8 = 16;
+
+/// SMPx codes and what they take: 28 cycles suit a source below 15 kohm, 480 give the internal sensors the 10 us they
+/// need (STM32F446 datasheet, 6.3.22 to 6.3.24).
+const EXTERNAL: (u8, u32) = (2, 28);
+const INTERNAL: (u8, u32) = (7, 480);
+/// Cycles of the successive approximation, 12 bits.
+const CONVERSION: u32 = 12;
+
+const _: () = {
+    let scan = 2 * (EXTERNAL.1 + CONVERSION) + 2 * (INTERNAL.1 + CONVERSION);
+    // The ADC runs at a quarter of APB2, which is the clock of TIM3: both 72 MHz.
+    assert!(scan * 4 < PERIOD as u32, "a scan must end before the next begins");
+    assert!(SCANS as u32 * PERIOD as u32 == 72_000, "the interrupt must come once a millisecond");
+};
+
+/// What the DMA controller writes and the core reads. Atomic, because two bus masters share it.
+static BUFFER: [AtomicU16; 2 * HALF] = [const { AtomicU16::new(0) }; 2 * HALF];
+
+/// Sums over the scans of one millisecond.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sums {
+    /// Per channel: pressure, supply, temperature sensor, VREFINT.
+    pub channels: [u32; 4],
+}
+
+impl Sums {
+    /// Conversions in each sum.
+    pub const COUNT: u16 = SCANS as u16;
+}
+
+/// The running front end.
+pub struct Sampling {
+    dma: DMA2,
+    lost: Losses,
+    _parts: (ADC1, TIM3, PA0<Analog>, PA1<Analog>),
+}
+
+/// What the front end is made of.
+pub(crate) struct Parts {
+    pub(crate) adc: ADC1,
+    pub(crate) common: ADC_COMMON,
+    pub(crate) dma: DMA2,
+    pub(crate) timer: TIM3,
+    pub(crate) pressure: PA0<Analog>,
+    pub(crate) supply: PA1<Analog>,
+}
+
+impl Sampling {
+    /// Configures everything, in the order of the flow of data from its end: a trigger finds all of it ready.
+    pub(crate) fn start(parts: Parts, rcc: &mut Rcc) -> Sampling {
+        start_dma(&parts.dma, &parts.adc, rcc);
+        start_adc(&parts.adc, &parts.common, rcc);
+        start_timer(&parts.timer, rcc);
+        let Parts { adc, dma, timer, pressure, supply, .. } = parts;
+        Sampling { dma, lost: Losses::new(), _parts: (adc, timer, pressure, supply) }
+    }
+
+    /// The sums of the millisecond that has just ended. `None` when there is none, as after an interrupt of an error.
+    pub fn take(&mut self) -> Option<Sums> {
+        let flags = self.dma.lisr().read();
+        self.dma.lifcr().write(|w| w.chtif0().set_bit().ctcif0().set_bit().cteif0().set_bit());
+        let half = match (flags.htif0().bit(), flags.tcif0().bit()) {
+            (false, false) => return None,
+            (true, false) => 0,
+            (false, true) => 1,
+            (true, true) => self.latest_of_two(),
+        };
+        BUFFER.as_chunks::<HALF>().0.get(half).map(sum)
+    }
+
+    /// Milliseconds that nobody collected in time, since the last call.
+    pub fn lost(&self) -> u32 {
+        self.lost.take()
+    }
+
+    /// Both halves are complete: the older one is being overwritten, so it is given up.
+    fn latest_of_two(&self) -> usize {
+        self.lost.count();
+        let remaining = usize::from(self.dma.st(0).ndtr().read().ndt().bits());
+        usize::from(remaining > HALF)
+    }
+}
+
+fn sum(half: &[AtomicU16; HALF]) -> Sums {
+    let mut sums = Sums::default();
+    for scan in half.as_chunks::<{ CHANNELS.len() }>().0 {
+        for (sum, value) in sums.channels.iter_mut().zip(scan) {
+            *sum += u32::from(value.load(Ordering::Relaxed));
+        }
+    }
+    sums
+}
+
+/// DMA2 stream 0, channel 0: ADC1 to the buffer, round and round, an interrupt at each half (RM0390, 9.3).
+fn start_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
+    DMA2::enable(rcc);
+    DMA2::reset(rcc);
+    let stream = dma.st(0);
+    let source = adc.dr().as_ptr() as u32;
+    let target = BUFFER.as_ptr() as u32;
+    // SAFETY: the transfer goes from the data register into BUFFER and never beyond its end, and both exist for ever.
+    unsafe {
+        stream.par().write(|w| w.pa().bits(source));
+        stream.m0ar().write(|w| w.m0a().bits(target));
+    }
+    stream.ndtr().write(|w| w.ndt().set(BUFFER.len() as u16));
+    stream.cr().write(|w| {
+        w.chsel().set(0).pl().very_high().msize().bits16().psize().bits16();
+        w.minc().set_bit().circ().set_bit().htie().set_bit().tcie().set_bit()
+    });
+    stream.cr().modify(|_, w| w.en().set_bit());
+}
+
+/// ADC1: scan on each trigger of TIM3, a DMA request for each conversion for ever (RM0390, 13.8.1).
+fn start_adc(adc: &ADC1, common: &ADC_COMMON, rcc: &mut Rcc) {
+    ADC1::enable(rcc);
+    ADC1::reset(rcc);
+    common.ccr().write(|w| w.adcpre().div4().tsvrefe().set_bit());
+    adc.cr1().write(|w| w.scan().set_bit());
+    // SAFETY: any sampling time and any existing channel may be set.
+    unsafe {
+        adc.smpr1().write(|w| w.bits(times(&CHANNELS, 10, INTERNAL.0)));
+        adc.smpr2().write(|w| w.bits(times(&CHANNELS, 0, EXTERNAL.0)));
+        adc.sqr3().write(|w| w.bits(sequence(&CHANNELS)));
+    }
+    adc.sqr1().write(|w| w.l().set(CHANNELS.len() as u8 - 1));
+    adc.cr2().write(|w| {
+        w.exten().rising_edge().extsel().tim3trgo();
+        w.dds().set_bit().dma().set_bit().adon().set_bit()
+    });
+    // t_STAB is 3 us at most, 432 cycles.
+    cortex_m::asm::delay(500);
+}
+
+/// TIM3: its update event is the trigger.
+fn start_timer(timer: &TIM3, rcc: &mut Rcc) {
+    TIM3::enable(rcc);
+    TIM3::reset(rcc);
+    timer.arr().write(|w| w.arr().set(PERIOD - 1));
+    timer.cr2().write(|w| w.mms().update());
+    timer.cr1().write(|w| w.cen().set_bit());
+}
+
+/// Value of the SMPR register that begins with channel `first`: `code` for each of the ten channels that is used.
+fn times(channels: &[u8], first: u8, code: u8) -> u32 {
+    let own = channels.iter().filter(|channel| (first..first + 10).contains(channel));
+    own.fold(0, |register, channel| register | u32::from(code) << (3 * (channel - first)))
+}
+
+/// Value of SQR3: the channels in the order of conversion.
+fn sequence(channels: &[u8]) -> u32 {
+    channels.iter().rev().fold(0, |register, &channel| register << 5 | u32::from(channel))
+}

@@ -1,0 +1,82 @@
+//! TIM2 as the time base: one microsecond a count, extended to 64 bits, with two alarms.
+
+use canopen::{Duration, Instant};
+use stm32f4xx_hal::pac::{TIM2, tim2};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+use crate::extension::Extension;
+
+static EXTENSION: Extension = Extension::new();
+
+/// Half a period: no alarm is set further ahead, so that a compare value means one instant only.
+const FARTHEST: Duration = Duration(1 << 31);
+
+fn registers() -> &'static tim2::RegisterBlock {
+    // SAFETY: TIM2 is given to `start`, so only this module uses it. Of its registers CNT is read only, each CCR belongs to
+    // one alarm, EGR and SR are written without being read back; nothing is read, changed and written by two priorities.
+    unsafe { &*TIM2::ptr() }
+}
+
+/// Starts TIM2 at 1 MHz. Its interrupt comes at each alarm and twice a period for the extension.
+pub(crate) fn start(_tim2: TIM2, rcc: &mut Rcc) -> (TimeInterrupt, [Alarm; 2]) {
+    TIM2::enable(rcc);
+    TIM2::reset(rcc);
+    let prescaler = rcc.clocks.timclk1().to_MHz().saturating_sub(1);
+    let tim2 = registers();
+    tim2.psc().write(|w| w.psc().set(prescaler as u16));
+    tim2.arr().write(|w| w.arr().set(u32::MAX));
+    tim2.ccr3().write(|w| w.ccr().set(1 << 31));
+    // The prescaler takes effect with an update, which must not look like the end of a period.
+    tim2.egr().write(|w| w.ug().set_bit());
+    tim2.sr().reset();
+    tim2.dier().write(|w| w.uie().set_bit().cc1ie().set_bit().cc2ie().set_bit().cc3ie().set_bit());
+    tim2.cr1().write(|w| w.cen().set_bit());
+    (TimeInterrupt(()), [Alarm { compare: 0 }, Alarm { compare: 1 }])
+}
+
+/// Time since start-up.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock;
+
+impl Clock {
+    /// The present instant, right at every priority.
+    #[must_use]
+    pub fn now() -> Instant {
+        Instant(EXTENSION.read(|| registers().cnt().read().cnt().bits()))
+    }
+}
+
+/// One compare channel.
+#[derive(Debug)]
+pub struct Alarm {
+    compare: usize,
+}
+
+impl Alarm {
+    /// Raises the timer's interrupt at `deadline`, at once when that is past, and in any case within half a period, when
+    /// whoever set it must look again.
+    #[expect(clippy::cast_possible_truncation, reason = "the hardware compares the low half")]
+    pub fn set(&mut self, deadline: Instant) {
+        let deadline = deadline.min(Clock::now() + FARTHEST);
+        registers().ccr(self.compare).write(|w| w.ccr().set(deadline.0 as u32));
+        // The counter may have passed the value before it was written: then no match comes for 71 minutes.
+        if Clock::now() >= deadline {
+            registers().egr().write(|w| w.ccg(self.compare as u8).set_bit());
+        }
+    }
+}
+
+/// The timer's interrupt.
+#[derive(Debug)]
+pub struct TimeInterrupt(());
+
+impl TimeInterrupt {
+    /// Acknowledges it and keeps the extension up to date. Tells which alarms went off.
+    pub fn acknowledge(&mut self) -> [bool; 2] {
+        let flags = registers().sr().read();
+        // SAFETY: every bit of SR is cleared by writing 0 and left alone by writing 1, reserved bits included.
+        registers().sr().write(|w| unsafe { w.bits(!flags.bits()) });
+        EXTENSION.follow(registers().cnt().read().cnt().bits());
+        [flags.cc1if().bit(), flags.cc2if().bit()]
+    }
+}

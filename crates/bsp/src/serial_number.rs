@@ -1,0 +1,29 @@
+//! The serial number of 1018h sub-index 4 from the unique identifier of the chip.
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// 32 bits of the 96 of the unique identifier (RM0390, 34.1): its CRC-32.
+///
+/// Two of a thousand boards share one with a probability of about 1 in 10,000. Where that is too much the production
+/// line must store a number of its own.
+#[must_use]
+pub fn serial_number(unique_id: &[u8; 12]) -> u32 {
+    CRC.checksum(unique_id)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chips_that_differ_in_any_bit_have_different_numbers() {
+        let id = *b"\x12\x00\x34\x00\x0B51Q123 ";
+        for bit in 0..96 {
+            let mut other = id;
+            other[bit / 8] ^= 1 << (bit % 8);
+            assert_ne!(serial_number(&id), serial_number(&other));
+        }
+    }
+}

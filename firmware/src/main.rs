@@ -1,0 +1,166 @@
+//! The application: wiring only. Every task is bound to one interrupt; a task that wants another one to look pends its
+//! interrupt. A task that is asked again while it runs then runs again, so no request is lost.
+//!
+//! | priority | task | why there |
+//! |---|---|---|
+//! | 6 | `receive_process`, `receive_services` | a FIFO of three places fills in 141 us at 1 Mbit/s |
+//! | 5 | `sample` | above everything whose run time depends on the traffic, but for the moving of frames |
+//! | 4 | `transmit` | the mailboxes hold three frames; locking the queue delays no sample |
+//! | 3 | `process` | SYNC, RPDO, TPDO: never behind an SDO transfer |
+//! | 2 | `serve` | SDO, NMT, heartbeat, EMCY, errors of the bus |
+//! | 0 | `idle` | sleeps |
+//!
+//! Priority 1 is kept for what waits for flash. Log lines mask no interrupt, whatever the priority: see the features of
+//! defmt-rtt in the workspace.
+#![no_std]
+#![no_main]
+
+mod bus;
+mod configuration;
+mod process;
+mod services;
+mod shared;
+
+use bsp::pac::Interrupt;
+
+/// Pended by whoever has work for the process data task.
+const PROCESS: Interrupt = Interrupt::TIM2;
+/// Pended by whoever has work for the services task.
+const SERVICES: Interrupt = Interrupt::CAN1_SCE;
+/// Pended by whoever has put a frame into the transmit queue.
+const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
+
+#[rtic::app(device = bsp::pac, peripherals = true)]
+mod app {
+    use bsp::can::Transmitter;
+    use bsp::losses::Losses;
+    use bsp::supervision::Part;
+    use bsp::transmit_queue::TransmitQueue;
+    use bsp::{Board, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
+    use node::{FactoryCalibration, Measurement, Parameters, Protocol, Snapshot};
+
+    use crate::process::Process;
+    use crate::services::Services;
+    use crate::shared::Shared as _;
+    use crate::{PROCESS, SERVICES, configuration};
+
+    #[shared]
+    struct Shared {
+        protocol: Protocol,
+        transmit: TransmitQueue,
+        /// The latest, until the process data task has taken it.
+        snapshot: Option<Snapshot>,
+        /// New ones, until the sampling task has taken them.
+        parameters: Option<Parameters>,
+        watchdog: Watchdog,
+    }
+
+    #[local]
+    struct Local {
+        receiver_process: Receiver,
+        receiver_services: Receiver,
+        sampling: Sampling,
+        measurement: Measurement,
+        factory: FactoryCalibration,
+        transmitter: Transmitter,
+        time: TimeInterrupt,
+        process: Process,
+        services: Services,
+    }
+
+    #[init(local = [
+        process_queue: ReceiveQueue = ReceiveQueue::new(),
+        services_queue: ReceiveQueue = ReceiveQueue::new(),
+        lost: Losses = Losses::new(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        let board = Board::start(cx.device);
+        let (setup, timing) = configuration::load();
+        configuration::log(&setup, board.reset_cause);
+        let lost: &'static Losses = cx.local.lost;
+        let (receiver_process, process_frames) = Receiver::new(0, cx.local.process_queue, lost);
+        let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
+        let [process_alarm, services_alarm] = board.alarms;
+        rtic::pend(SERVICES);
+        let shared = Shared {
+            protocol: Protocol::new(&setup),
+            transmit: TransmitQueue::new(),
+            snapshot: None,
+            parameters: None,
+            watchdog: board.watchdog,
+        };
+        let local = Local {
+            receiver_process,
+            receiver_services,
+            sampling: board.sampling,
+            measurement: Measurement::new(),
+            factory: configuration::calibration(),
+            transmitter: board.transmitter,
+            time: board.time,
+            process: Process { frames: process_frames, alarm: process_alarm },
+            services: Services::new(board.can, timing, service_frames, lost, services_alarm, board.led),
+        };
+        (shared, local)
+    }
+
+    #[idle]
+    fn idle(_: idle::Context) -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+
+    #[task(binds = CAN1_RX0, priority = 6, local = [receiver_process])]
+    fn receive_process(cx: receive_process::Context) {
+        cx.local.receiver_process.drain();
+        rtic::pend(PROCESS);
+    }
+
+    #[task(binds = CAN1_RX1, priority = 6, local = [receiver_services])]
+    fn receive_services(cx: receive_services::Context) {
+        cx.local.receiver_services.drain();
+        rtic::pend(SERVICES);
+    }
+
+    /// Once a millisecond, when the DMA controller has filled a half of its buffer.
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, measurement, factory],
+           shared = [snapshot, parameters, &watchdog])]
+    fn sample(mut cx: sample::Context) {
+        let Some(sums) = cx.local.sampling.take() else { return };
+        if let Some(parameters) = cx.shared.parameters.lock(Option::take) {
+            cx.local.measurement.apply(&parameters);
+        }
+        let raw = configuration::raw_sample(sums, *cx.local.factory);
+        let snapshot = cx.local.measurement.sample(&raw);
+        cx.shared.snapshot.lock(|latest| *latest = Some(snapshot));
+        cx.shared.watchdog.progress(Part::Sampling);
+        rtic::pend(PROCESS);
+    }
+
+    #[task(binds = CAN1_TX, priority = 4, local = [transmitter], shared = [transmit])]
+    fn transmit(mut cx: transmit::Context) {
+        cx.local.transmitter.acknowledge();
+        cx.shared.transmit.lock(|queue| queue.pump(cx.local.transmitter));
+    }
+
+    #[task(binds = TIM2, priority = 3, local = [time, process], shared = [protocol, transmit, snapshot])]
+    fn process(mut cx: process::Context) {
+        let [_, services_due] = cx.local.time.acknowledge();
+        if services_due {
+            rtic::pend(SERVICES);
+        }
+        let snapshot = cx.shared.snapshot.lock(Option::take);
+        cx.local.process.run(snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
+    }
+
+    #[task(binds = CAN1_SCE, priority = 2, local = [services],
+           shared = [protocol, transmit, parameters, &watchdog])]
+    fn serve(mut cx: serve::Context) {
+        let mut node = (cx.shared.protocol, cx.shared.transmit);
+        cx.local.services.run(&mut node);
+        if let Some(new) = node.call(|protocol, _| protocol.take_parameters()) {
+            cx.shared.parameters.lock(|parameters| *parameters = Some(new));
+        }
+        cx.shared.watchdog.progress(Part::Services);
+    }
+}

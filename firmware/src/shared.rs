@@ -1,0 +1,26 @@
+//! The protocol and the transmit queue, which process data and services share.
+
+use bsp::transmit_queue::TransmitQueue;
+use node::Protocol;
+use rtic::mutex_prelude::*;
+
+use crate::TRANSMIT;
+
+/// The one way into the protocol: for the time of one call, and with a look at the transmit queue after it.
+pub(crate) trait Shared {
+    /// Calls into the protocol, then wakes the transmit task when frames wait.
+    fn call<R>(&mut self, f: impl FnOnce(&mut Protocol, &mut TransmitQueue) -> R) -> R;
+}
+
+impl<P: Mutex<T = Protocol>, Q: Mutex<T = TransmitQueue>> Shared for (P, Q) {
+    fn call<R>(&mut self, f: impl FnOnce(&mut Protocol, &mut TransmitQueue) -> R) -> R {
+        let (protocol, queue) = self;
+        (protocol, queue).lock(|protocol, queue| {
+            let result = f(protocol, queue);
+            if !queue.is_empty() {
+                rtic::pend(TRANSMIT);
+            }
+            result
+        })
+    }
+}
