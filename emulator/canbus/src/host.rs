@@ -140,12 +140,8 @@ impl Controller for HostNode {
     }
 
     fn requested(&self) -> Option<Time> {
-        let oldest = self.transmit.iter().map(|queued| queued.at).min();
-        match oldest? {
-            _ if self.silent => None,
-            oldest if self.is_off() => Some(oldest.max(self.monitor.due(self.bit))),
-            oldest => Some(oldest),
-        }
+        let oldest = self.transmit.iter().map(|queued| queued.at).min().filter(|_| !self.silent)?;
+        Some(oldest.max(self.monitor.ready(self.bit)))
     }
 
     fn pending(&mut self, at: Time) -> Option<Frame> {

@@ -10,6 +10,8 @@ const SEQUENCE_BITS: u64 = 11;
 pub struct Monitor {
     recessive: Option<Time>,
     wait: Option<Wait>,
+    /// When the last wait ended.
+    ended: Time,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +34,7 @@ impl Monitor {
 
     /// On a wire that is recessive since power-on; waits for nothing.
     pub fn new() -> Monitor {
-        Monitor { recessive: Some(Time::ZERO), wait: None }
+        Monitor { recessive: Some(Time::ZERO), wait: None, ended: Time::ZERO }
     }
 
     /// Whether it waits.
@@ -79,11 +81,17 @@ impl Monitor {
         }
     }
 
+    /// When the controller may take part: the end of the wait, or of the last one. It begins no frame before it.
+    pub fn ready(&self, bit: Time) -> Time {
+        if self.is_waiting() { self.due(bit) } else { self.ended }
+    }
+
     /// Whether the wait has ended by `now`; then it is over.
     pub fn poll(&mut self, now: Time, bit: Time) -> bool {
-        let done = self.due(bit) <= now && now != Time::NEVER;
+        let due = self.due(bit);
+        let done = due <= now && due != Time::NEVER;
         if done {
-            self.wait = None;
+            (self.wait, self.ended) = (None, due);
         }
         done
     }

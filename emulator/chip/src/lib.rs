@@ -1,6 +1,7 @@
 //! Register-level models of the STM32F4 peripherals that the node uses.
 
 mod access;
+pub mod can;
 mod clocks;
 mod dbgmcu;
 mod flash;

@@ -1,0 +1,69 @@
+//! A receive FIFO of three mailboxes (RM0390, bxCAN reception handling).
+
+use std::collections::VecDeque;
+
+use super::mailbox::Registers;
+use crate::register::{bit, flag};
+
+const DEPTH: usize = 3;
+const FULL: u32 = 3;
+const FOVR: u32 = 4;
+const RFOM: u32 = 5;
+
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Fifo {
+    mailboxes: VecDeque<Registers>,
+    /// What the output mailbox showed last, for reads while it is empty.
+    output: Registers,
+    full: bool,
+    overrun: bool,
+}
+
+impl Fifo {
+    /// Stores a frame that has passed a filter. When three wait, the newest of them is replaced or, `locked`, kept.
+    pub(crate) fn store(&mut self, frame: Registers, locked: bool) {
+        if self.mailboxes.len() < DEPTH {
+            self.mailboxes.push_back(frame);
+            self.full |= self.mailboxes.len() == DEPTH;
+        } else {
+            self.overrun = true;
+            if let (Some(last), false) = (self.mailboxes.back_mut(), locked) {
+                *last = frame;
+            }
+        }
+        self.show();
+    }
+
+    /// CAN_RFxR.
+    pub(crate) fn status(&self) -> u32 {
+        self.mailboxes.len() as u32 | flag(self.full, FULL) | flag(self.overrun, FOVR)
+    }
+
+    /// Writes CAN_RFxR: clears flags, releases the output mailbox.
+    pub(crate) fn write_status(&mut self, value: u32) {
+        self.full &= !bit(value, FULL);
+        self.overrun &= !bit(value, FOVR);
+        if bit(value, RFOM) {
+            self.mailboxes.pop_front();
+            self.show();
+        }
+    }
+
+    /// The mailbox that software sees.
+    pub(crate) fn output(&self) -> &Registers {
+        &self.output
+    }
+
+    /// Level of the interrupt line for the three enable bits FMPIE, FFIE and FOVIE.
+    pub(crate) fn interrupt(&self, enable: u32) -> bool {
+        bit(enable, 0) && !self.mailboxes.is_empty()
+            || bit(enable, 1) && self.full
+            || bit(enable, 2) && self.overrun
+    }
+
+    fn show(&mut self) {
+        if let Some(first) = self.mailboxes.front() {
+            self.output = *first;
+        }
+    }
+}

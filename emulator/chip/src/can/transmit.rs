@@ -1,0 +1,257 @@
+//! The three transmit mailboxes and the scheduler (RM0390, bxCAN transmission handling).
+
+use canbus::{Frame, Time};
+
+use super::mailbox::Registers;
+use crate::register::{bit, flag};
+
+const MAILBOXES: usize = 3;
+const TXRQ: u32 = 0;
+/// Places in the byte of CAN_TSR that each mailbox has.
+const RQCP: u32 = 0;
+const TXOK: u32 = 1;
+const ALST: u32 = 2;
+const TERR: u32 = 3;
+const ABRQ: u32 = 7;
+/// Bits that software can set in CAN_TDTxR: TIME, TGT, DLC.
+const CONTROL_WRITABLE: u32 = 0xFFFF_010F;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum State {
+    #[default]
+    Empty,
+    /// Pending or, the one with the highest priority, scheduled.
+    Pending,
+    /// On the wire.
+    Transmit,
+}
+
+/// How an attempt ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Outcome {
+    #[default]
+    None,
+    Sent,
+    Lost,
+    Failed,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Mailbox {
+    registers: Registers,
+    state: State,
+    requested: Time,
+    /// Place in the order of all requests.
+    turn: u64,
+    abort: bool,
+    completed: bool,
+    outcome: Outcome,
+}
+
+impl Mailbox {
+    /// The request is over: sent, aborted, or failed without retransmission.
+    fn complete(&mut self) {
+        self.state = State::Empty;
+        self.abort = false;
+        self.completed = true;
+    }
+
+    /// An attempt has failed; with `give_up`, or after an abort request, it was the last.
+    fn fail(&mut self, outcome: Outcome, give_up: bool) {
+        self.outcome = outcome;
+        self.state = State::Pending;
+        if give_up || self.abort {
+            self.complete();
+        }
+    }
+
+    fn abort(&mut self) {
+        match self.state {
+            State::Empty => {}
+            State::Pending => {
+                self.outcome = Outcome::None;
+                self.complete();
+            }
+            State::Transmit => self.abort = true,
+        }
+    }
+
+    fn status(&self) -> u32 {
+        flag(self.completed, RQCP)
+            | flag(self.outcome == Outcome::Sent, TXOK)
+            | flag(self.outcome == Outcome::Lost, ALST)
+            | flag(self.outcome == Outcome::Failed, TERR)
+            | flag(self.abort, ABRQ)
+    }
+
+    /// Writes its byte of CAN_TSR.
+    fn write_status(&mut self, value: u32) {
+        let own = match self.outcome {
+            Outcome::None => false,
+            Outcome::Sent => bit(value, TXOK),
+            Outcome::Lost => bit(value, ALST),
+            Outcome::Failed => bit(value, TERR),
+        };
+        // Clearing RQCP clears the other three too.
+        if own || bit(value, RQCP) {
+            self.outcome = Outcome::None;
+        }
+        self.completed &= !bit(value, RQCP);
+        if bit(value, ABRQ) {
+            self.abort();
+        }
+    }
+}
+
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Transmitter {
+    mailboxes: [Mailbox; MAILBOXES],
+    turns: u64,
+}
+
+impl Transmitter {
+    /// CAN_TSR. With `fifo` the order of requests decides (TXFP), else the identifiers.
+    pub(crate) fn status(&self, fifo: bool) -> u32 {
+        let each = self.mailboxes.iter().enumerate().fold(0, |word, (n, mailbox)| {
+            let empty = flag(mailbox.state == State::Empty, 26 + n as u32);
+            word | mailbox.status() << (8 * n) | empty
+        });
+        let low = self.lowest(fifo).map_or(0, |n| 1 << (29 + n));
+        each | low | (self.code(fifo) as u32) << 24
+    }
+
+    /// CAN_TSR.CODE: the next free mailbox, or the one of lowest priority when none is free.
+    fn code(&self, fifo: bool) -> usize {
+        let free = self.mailboxes.iter().position(|mailbox| mailbox.state == State::Empty);
+        free.or_else(|| self.lowest(fifo)).unwrap_or(0)
+    }
+
+    /// The mailbox of lowest priority, when more than one is pending.
+    fn lowest(&self, fifo: bool) -> Option<usize> {
+        let pending: Vec<usize> = self.occupied().collect();
+        pending.iter().copied().max_by_key(|n| self.priority(*n, fifo)).filter(|_| pending.len() > 1)
+    }
+
+    fn occupied(&self) -> impl Iterator<Item = usize> {
+        (0..MAILBOXES).filter(|n| self.mailboxes[*n].state != State::Empty)
+    }
+
+    /// The lower one goes first; mailboxes of equal priority go by their number.
+    fn priority(&self, n: usize, fifo: bool) -> (u64, usize) {
+        let mailbox = &self.mailboxes[n];
+        let key = if fifo { mailbox.turn } else { mailbox.registers.frame().arbitration().into() };
+        (key, n)
+    }
+
+    /// Writes CAN_TSR.
+    pub(crate) fn write_status(&mut self, value: u32) {
+        for (n, mailbox) in self.mailboxes.iter_mut().enumerate() {
+            mailbox.write_status(value >> (8 * n) & 0xFF);
+        }
+    }
+
+    /// Reads the register at `offset` from CAN_TI0R.
+    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+        let mailbox = self.mailboxes.get(offset as usize / 16)?;
+        let request = offset.is_multiple_of(16) && mailbox.state != State::Empty;
+        Some(mailbox.registers.read(offset % 16)? | flag(request, TXRQ))
+    }
+
+    /// Writes the register at `offset` from CAN_TI0R. Only an empty mailbox can be written.
+    pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
+        let mailbox = self.mailboxes.get_mut(offset as usize / 16)?;
+        let registers = &mut mailbox.registers;
+        let target = match offset % 16 {
+            0x0 => &mut registers.identifier,
+            0x4 => &mut registers.control,
+            0x8 => &mut registers.low,
+            0xC => &mut registers.high,
+            _ => return None,
+        };
+        if mailbox.state != State::Empty {
+            return Some(());
+        }
+        match offset % 16 {
+            0x0 => {
+                *target = value & !(1 << TXRQ);
+                if bit(value, TXRQ) {
+                    self.request(offset as usize / 16, now);
+                }
+            }
+            0x4 => *target = value & CONTROL_WRITABLE,
+            _ => *target = value,
+        }
+        Some(())
+    }
+
+    fn request(&mut self, n: usize, now: Time) {
+        self.turns += 1;
+        let registers = self.mailboxes[n].registers;
+        self.mailboxes[n] = Mailbox {
+            registers,
+            state: State::Pending,
+            requested: now,
+            turn: self.turns,
+            ..Mailbox::default()
+        };
+    }
+
+    /// When the oldest pending request was made.
+    pub(crate) fn requested(&self) -> Option<Time> {
+        self.pending().map(|n| self.mailboxes[n].requested).min()
+    }
+
+    fn pending(&self) -> impl Iterator<Item = usize> {
+        (0..MAILBOXES).filter(|n| self.mailboxes[*n].state == State::Pending)
+    }
+
+    /// The scheduled mailbox's frame, of the requests made up to `at`.
+    pub(crate) fn scheduled(&self, fifo: bool, at: Time) -> Option<Frame> {
+        self.schedule(fifo, at).map(|n| self.mailboxes[n].registers.frame())
+    }
+
+    fn schedule(&self, fifo: bool, at: Time) -> Option<usize> {
+        let ready = self.pending().filter(|n| self.mailboxes[*n].requested <= at);
+        ready.min_by_key(|n| self.priority(*n, fifo))
+    }
+
+    /// The scheduled mailbox goes on the wire.
+    pub(crate) fn begin(&mut self, fifo: bool, at: Time) {
+        if let Some(n) = self.schedule(fifo, at) {
+            self.mailboxes[n].state = State::Transmit;
+        }
+    }
+
+    /// Whether a mailbox is on the wire.
+    pub(crate) fn is_transmitting(&self) -> bool {
+        self.mailboxes.iter().any(|mailbox| mailbox.state == State::Transmit)
+    }
+
+    fn on_wire(&mut self) -> Option<&mut Mailbox> {
+        self.mailboxes.iter_mut().find(|mailbox| mailbox.state == State::Transmit)
+    }
+
+    pub(crate) fn sent(&mut self) {
+        if let Some(mailbox) = self.on_wire() {
+            mailbox.outcome = Outcome::Sent;
+            mailbox.complete();
+        }
+    }
+
+    pub(crate) fn lost(&mut self, give_up: bool) {
+        if let Some(mailbox) = self.on_wire() {
+            mailbox.fail(Outcome::Lost, give_up);
+        }
+    }
+
+    pub(crate) fn failed(&mut self, give_up: bool) {
+        if let Some(mailbox) = self.on_wire() {
+            mailbox.fail(Outcome::Failed, give_up);
+        }
+    }
+
+    /// Whether a request has completed and software has not seen it yet.
+    pub(crate) fn interrupt(&self) -> bool {
+        self.mailboxes.iter().any(|mailbox| mailbox.completed)
+    }
+}
