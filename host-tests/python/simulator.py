@@ -1,0 +1,103 @@
+"""A running `cargo sim`, and what the tests hear of it.
+
+Virtual time runs as fast as the host can (`--speed max`), so no test may look at a clock of the host: what is
+asserted are the virtual time stamps that come with every frame.
+"""
+
+import json
+import os
+import queue
+import re
+import subprocess
+from pathlib import Path
+
+import can
+import canopen
+
+#: Host seconds after which a frame that does not come is a failure. It passes in no test that succeeds.
+PATIENCE = 20.0
+
+BOOT_UP = b"\x00"
+
+
+class Simulator:
+    """The `sim` program with one pressure node, served on free ports."""
+
+    def __init__(self, *flags: str):
+        images = Path(os.environ["NODE_IMAGES"])
+        for name in ("bootloader", "firmware"):
+            assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images` builds it"
+        command = [os.environ["SIM_COMMAND"], "--bootloader", images / "bootloader", "--firmware", images / "firmware"]
+        command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", "max", "--json", *flags]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.socketcand = self._port(r"socketcand on 127\.0\.0\.1:(\d+)")
+        self.slcan = self._port(r"slcan on 127\.0\.0\.1:(\d+)")
+
+    def _port(self, pattern: str) -> int:
+        for line in self.process.stdout:
+            if found := re.search(pattern, line):
+                return int(found[1])
+        raise AssertionError("the simulator has ended without serving clients")
+
+    def command(self, line: str) -> None:
+        """Types a command, as on the terminal."""
+        print(line, file=self.process.stdin, flush=True)
+
+    def quit(self) -> dict:
+        """Ends the run and returns its summary."""
+        self.command("quit")
+        output, _ = self.process.communicate(timeout=PATIENCE)
+        assert self.process.returncode == 0
+        return json.loads(output.splitlines()[-1])
+
+    def bus(self) -> can.BusABC:
+        """A python-can bus over socketcand."""
+        return can.Bus(interface="socketcand", host="127.0.0.1", port=self.socketcand, channel="vcan0")
+
+    def slcan_bus(self, **options) -> can.BusABC:
+        """A python-can bus over slcan."""
+        channel = f"socket://127.0.0.1:{self.slcan}"
+        return can.Bus(interface="slcan", channel=channel, sleep_after_open=0, **options)
+
+
+class Master:
+    """A stock python-canopen network with node 1, and the frames that were heard."""
+
+    def __init__(self, simulator: Simulator):
+        self.simulator = simulator
+        self.network = canopen.Network()
+        self.network.connect(interface="socketcand", host="127.0.0.1", port=simulator.socketcand, channel="vcan0")
+        self.node = self.network.add_node(1, canopen.ObjectDictionary())
+        self.node.sdo.RESPONSE_TIMEOUT = PATIENCE
+
+    def close(self) -> None:
+        self.network.disconnect()
+
+    def listen(self, cob_id: int) -> "Listener":
+        """Collects what comes with this COB-ID from now on."""
+        return Listener(self.network, cob_id)
+
+    def read(self, index: int, subindex: int = 0) -> int:
+        return int.from_bytes(self.node.sdo.upload(index, subindex), "little")
+
+    def write(self, index: int, subindex: int, value: int, size: int) -> None:
+        self.node.sdo.download(index, subindex, value.to_bytes(size, "little"))
+
+
+class Listener:
+    """Frames of one COB-ID, in their order."""
+
+    def __init__(self, network: canopen.Network, cob_id: int):
+        self._frames: queue.Queue[tuple[float, bytes]] = queue.Queue()
+        network.subscribe(cob_id, lambda _, data, time: self._frames.put((time, bytes(data))))
+
+    def next(self) -> tuple[float, bytes]:
+        """The next frame: its virtual time in seconds and its data."""
+        return self._frames.get(timeout=PATIENCE)
+
+    def until(self, wanted) -> tuple[float, bytes]:
+        """The next frame whose data are as wanted."""
+        while True:
+            time, data = self.next()
+            if wanted(data):
+                return time, data

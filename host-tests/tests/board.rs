@@ -1,0 +1,195 @@
+//! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
+
+use std::path::{Path, PathBuf};
+
+use canbus::{Frame, StandardId, Time};
+use clap::Parser;
+use sim::cli::Options;
+use sim::port::Adapter;
+use sim::summary::Summary;
+use sim::traffic::NmtState;
+use sim::world::{PortId, World};
+
+const SECOND: Time = Time::from_millis(1000);
+/// SDO server and client, NMT, SYNC (CiA 301, 7.3.3).
+const SDO_REQUEST: u16 = 0x601;
+const SDO_RESPONSE: u16 = 0x581;
+const SYNC: u16 = 0x080;
+const START_ALL: (u16, [u8; 2]) = (0x000, [1, 0]);
+
+/// Where the ELF files are: $NODE_IMAGES, or where cargo puts them.
+fn images() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("target"),
+        PathBuf::from,
+    );
+    let built = || target.join("thumbv7em-none-eabihf/release");
+    let dir = std::env::var_os("NODE_IMAGES").map_or_else(built, PathBuf::from);
+    for name in ["bootloader", "firmware"] {
+        assert!(dir.join(name).exists(), "no {name} in {}; run `cargo xtask images` to build it", dir.display());
+    }
+    dir
+}
+
+/// A world as `cargo sim` with these flags has it, without its sockets.
+fn world(flags: &str) -> World {
+    let dir = images();
+    let (bootloader, firmware) = (dir.join("bootloader"), dir.join("firmware"));
+    let images = ["sim", "--bootloader", bootloader.to_str().unwrap(), "--firmware", firmware.to_str().unwrap()];
+    let options = Options::try_parse_from(images.into_iter().chain(flags.split_whitespace())).unwrap();
+    sim::setup::world(&options).unwrap()
+}
+
+fn frame(id: u16, bytes: &[u8]) -> Frame {
+    Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
+}
+
+/// A client on the bus at 1 Mbit/s.
+struct Master {
+    port: PortId,
+}
+
+impl Master {
+    fn join(world: &mut World) -> Master {
+        let port = world.open_port();
+        world.port(port).attach(Some(Adapter { bit_rate: 1_000_000, silent: false }));
+        Master { port }
+    }
+
+    fn send(&self, world: &mut World, id: u16, bytes: &[u8]) {
+        let now = world.now();
+        world.port(self.port).send(frame(id, bytes), now);
+    }
+
+    /// What came with this identifier since the last call; the rest is dropped.
+    fn heard(&self, world: &mut World, id: u16) -> Vec<Frame> {
+        let port = world.port(self.port);
+        let all = std::iter::from_fn(|| port.receive()).map(|stamped| stamped.frame);
+        all.filter(|frame| frame.id() == StandardId::new(id).unwrap().into()).collect()
+    }
+}
+
+/// Runs on for a time and sums up what happened since power-on.
+fn run(world: &mut World, span: Time) -> Summary {
+    let started = std::time::Instant::now();
+    world.run_until(world.now() + span).unwrap();
+    world.summary(started.elapsed().as_secs_f64(), 0)
+}
+
+/// Nothing happened that must not happen.
+fn assert_clean(summary: &Summary) {
+    assert_eq!(summary.bus.errors, 0);
+    for node in &summary.nodes {
+        assert_eq!((node.heard.boot_ups, node.heard.emcys), (1, 0), "{summary}");
+        assert!(node.resets.is_empty() && node.unmodelled.is_empty(), "{summary}");
+    }
+}
+
+/// `cargo sim --node 1:pressure --for 10 --speed max`: the summary shows heartbeats and TPDOs.
+#[test]
+fn a_node_alone_boots_and_sends_heartbeats_and_tpdos() {
+    let mut world = world("--node 1:pressure");
+    let summary = run(&mut world, Time::from_millis(10_000));
+    println!("{summary}");
+    assert_clean(&summary);
+    let node = &summary.nodes[0];
+    assert!((9..=10).contains(&node.heard.heartbeats), "{summary}");
+    assert!((8..=11).contains(&node.heard.tpdos), "{summary}");
+}
+
+/// A full bus of foreign frames at 1 Mbit/s, SYNC every millisecond, and SDO requests as fast as they are answered:
+/// sampling keeps its pace, and nothing that is meant for the node is lost.
+#[test]
+fn sampling_keeps_its_pace_on_a_full_bus() {
+    const SYNCS: u64 = 2000;
+    let mut world = world("--bitrate 1000 --load 100 --pressure const:250000");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND).unwrap();
+    master.send(&mut world, SDO_REQUEST, &[0x2F, 0x00, 0x18, 0x02, 1, 0, 0, 0]);
+    world.run_until(SECOND + Time::from_millis(10)).unwrap();
+    assert_eq!(master.heard(&mut world, SDO_RESPONSE), [frame(SDO_RESPONSE, &[0x60, 0x00, 0x18, 0x02, 0, 0, 0, 0])]);
+    master.send(&mut world, START_ALL.0, &START_ALL.1);
+    world.run_until(SECOND + Time::from_millis(20)).unwrap();
+    let before = world.summary(1.0, 0);
+
+    let (mut requests, mut responses) = (0, 0);
+    for _ in 0..SYNCS {
+        master.send(&mut world, SYNC, &[]);
+        if requests == responses {
+            master.send(&mut world, SDO_REQUEST, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+            requests += 1;
+        }
+        world.run_until(world.now() + Time::from_millis(1)).unwrap();
+        responses += master.heard(&mut world, SDO_RESPONSE).len();
+    }
+    let after = run(&mut world, Time::from_millis(5));
+    responses += master.heard(&mut world, SDO_RESPONSE).len();
+    let tpdos = after.nodes[0].heard.tpdos - before.nodes[0].heard.tpdos;
+
+    let sampling = after.nodes[0].sampling;
+    println!("worst start jitter of sampling: {:.3} us; bus load {:.2} %", sampling.worst_jitter, after.bus.load * 100.0);
+    println!("{after}");
+    assert_clean(&after);
+    assert!(after.bus.load > 0.99);
+    assert!((sampling.rate - 1000.0).abs() < 1e-6, "{} samples a second", sampling.rate);
+    assert!(sampling.worst_jitter < 50.0, "{} us", sampling.worst_jitter);
+    assert_eq!(responses, requests, "every SDO request is answered");
+    assert!(requests as u64 > SYNCS / 2, "an answer comes within two milliseconds");
+    assert_eq!(tpdos, SYNCS, "every SYNC is answered");
+}
+
+/// What a node costs. Instructions are exact; the ratio depends on the host and is only printed.
+#[test]
+fn a_node_is_cheap() {
+    let mut world = world("--bitrate 1000 --pressure sine:250000,100000,2");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND).unwrap();
+    master.send(&mut world, START_ALL.0, &START_ALL.1);
+    let before = world.summary(1.0, 0).nodes[0].cpu.instructions;
+    let summary = run(&mut world, Time::from_millis(5_000));
+    let node = &summary.nodes[0];
+    let host = summary.host_seconds / 5.0;
+    println!("{summary}one second of one node takes {host:.3} s of the host");
+    assert_clean(&summary);
+    assert!((1.0..=20_000.0).contains(&node.sampling.instructions), "{summary}");
+    assert!((1.0..=5_000.0).contains(&node.cpu.instructions_per_received_frame), "{summary}");
+    assert!(node.cpu.instructions - before < 5 * 25_000_000, "instructions decide what a second costs: {summary}");
+    assert!(node.cpu.load < 0.5, "{summary}");
+    assert!(node.memory.flash > 0 && node.memory.flash <= 192 * 1024, "{summary}");
+    assert!(node.memory.ram > 0 && node.memory.stack > 0 && node.memory.stack < 16 * 1024, "{summary}");
+}
+
+/// The same run twice gives the same bus log, bit for bit, with two nodes, noise, foreign traffic and a client.
+#[test]
+fn the_same_run_gives_the_same_bus_log() {
+    let log = || {
+        let mut world = world("--node 1 --node 2 --bitrate 500 --load 60 --pressure noise:250000,2000,7");
+        let port = world.open_port();
+        world.port(port).attach(Some(Adapter { bit_rate: 500_000, silent: false }));
+        let master = Master { port };
+        world.run_until(SECOND).unwrap();
+        master.send(&mut world, START_ALL.0, &START_ALL.1);
+        world.run_until(Time::from_millis(3_000)).unwrap();
+        let state = world.traffic().node(2).state;
+        (world.take_frames(), state)
+    };
+    let (first, state) = log();
+    assert_eq!(state, NmtState::Operational);
+    assert!(first.len() > 1000);
+    assert_eq!((first, state), log());
+}
+
+/// A board whose flash is kept comes up as it was left, whatever the command line says.
+#[test]
+fn a_kept_flash_keeps_the_node_id() {
+    let dir = std::env::temp_dir().join(format!("board-flash-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&dir);
+    let flags = format!("--node 5:pressure --flash {}", dir.display());
+    let first = world(&flags);
+    sim::flash::save(&dir, 5, &first.boards()[0].flash()).unwrap();
+    std::fs::rename(sim::flash::file(&dir, 5), sim::flash::file(&dir, 9)).unwrap();
+    let mut second = world(&flags.replace("5:", "9:"));
+    second.run_until(SECOND + SECOND).unwrap();
+    assert_eq!(second.traffic().node(5).boot_ups, 1, "it still is node 5");
+    std::fs::remove_dir_all(dir).unwrap();
+}
