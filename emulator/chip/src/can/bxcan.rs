@@ -87,7 +87,17 @@ pub struct BxCan {
     pub(super) fifos: [Fifo; 2],
     pub(super) filters: FilterBanks,
     pub(super) status: Status,
+    reception: Reception,
     poke: bool,
+}
+
+/// Frames that have passed a filter, since power-on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reception {
+    /// All of them.
+    pub accepted: u64,
+    /// Those that a full FIFO lost.
+    pub lost: u64,
 }
 
 impl BxCan {
@@ -105,6 +115,7 @@ impl BxCan {
             fifos: Default::default(),
             filters: FilterBanks::new(),
             status: Status::default(),
+            reception: Reception::default(),
             poke: false,
         }
     }
@@ -113,7 +124,13 @@ impl BxCan {
     pub(super) fn reset(&mut self) {
         let mut monitor = self.monitor;
         monitor.cancel();
-        *self = BxCan { monitor, poke: true, ..BxCan::new(self.slave, self.clock) };
+        let reception = self.reception;
+        *self = BxCan { monitor, reception, poke: true, ..BxCan::new(self.slave, self.clock) };
+    }
+
+    /// What the receive FIFOs were given.
+    pub fn reception(&self) -> Reception {
+        self.reception
     }
 
     /// The clock of APB1 is now this, in hertz; 0 stops it.
@@ -361,7 +378,9 @@ impl BxCan {
     pub(super) fn store(&mut self, frame: &Frame) {
         self.status.received();
         if let Some(found) = self.filters.accept(frame, self.filters.share(self.slave)) {
-            self.fifos[found.fifo].store(Registers::of(frame, found.index), self.is_set(RFLM));
+            let kept = self.fifos[found.fifo].store(Registers::of(frame, found.index), self.is_set(RFLM));
+            self.reception.accepted += 1;
+            self.reception.lost += u64::from(!kept);
         }
     }
 

@@ -20,9 +20,11 @@ pub(crate) struct Fifo {
 }
 
 impl Fifo {
-    /// Stores a frame that has passed a filter. When three wait, the newest of them is replaced or, `locked`, kept.
-    pub(crate) fn store(&mut self, frame: Registers, locked: bool) {
-        if self.mailboxes.len() < DEPTH {
+    /// Stores a frame that has passed a filter. When three wait, the newest of them is replaced or, `locked`, kept:
+    /// one frame is lost, and the answer is `false`.
+    pub(crate) fn store(&mut self, frame: Registers, locked: bool) -> bool {
+        let room = self.mailboxes.len() < DEPTH;
+        if room {
             self.mailboxes.push_back(frame);
             self.full |= self.mailboxes.len() == DEPTH;
         } else {
@@ -32,6 +34,7 @@ impl Fifo {
             }
         }
         self.show();
+        room
     }
 
     /// CAN_RFxR.

@@ -9,5 +9,5 @@ mod mailbox;
 mod status;
 mod transmit;
 
-pub use bxcan::{BxCan, Lines};
+pub use bxcan::{BxCan, Lines, Reception};
 pub use dual::DualCan;
