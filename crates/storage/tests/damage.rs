@@ -3,9 +3,12 @@
 
 mod common;
 
+use std::cell::RefCell;
+
 use common::{Changes, EMPTY, Model, after, as_changes, noise, read, read_good, restore, set, start};
-use storage::mock::{MockFlash, splitmix};
-use storage::{Group, Health, Pages};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use storage::mock::{MockFlash, PowerCut, splitmix};
+use storage::{Error, Group, Health, Pages, Store, View};
 
 const PAGES: Pages = Pages::new(0, 512);
 type Flash = MockFlash<256>;
@@ -179,12 +182,57 @@ fn foreign_pages_are_reported_and_replaced() {
 #[test]
 fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
     let first = vec![set(Group::Device, 1, 4)];
-    let mut device = Device::new(vec![first.clone()]);
-    let page = device.flash.bytes();
-    let second = vec![(Group::Application, Some((2, page[8..100].to_vec())))];
-    device = Device::new(vec![first, second, vec![restore(Group::Device)]]);
-    // With the head of the second transaction damaged the search for the third passes through the value.
+    let page = Device::new(vec![first.clone()]).flash.bytes();
+    let copy = vec![(Group::Application, Some((3, page[8..100].to_vec())))];
+    let device = Device::new(vec![first, vec![set(Group::Device, 2, 4)], copy]);
+    // With the head of the last transaction damaged the search for the next one passes through the value.
     for at in 0..1024 {
         device.check(true, |flash| flash.disturb(at, |byte| byte ^ 0x81));
     }
+}
+
+/// A flash that the test can reach while a store has it.
+struct Shared<'a>(&'a RefCell<Flash>);
+
+impl ErrorType for Shared<'_> {
+    type Error = PowerCut;
+}
+
+impl ReadNorFlash for Shared<'_> {
+    const READ_SIZE: usize = Flash::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        self.0.borrow_mut().read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.borrow().capacity()
+    }
+}
+
+impl NorFlash for Shared<'_> {
+    const WRITE_SIZE: usize = Flash::WRITE_SIZE;
+    const ERASE_SIZE: usize = Flash::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
+        self.0.borrow_mut().erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
+        self.0.borrow_mut().write(offset, bytes)
+    }
+}
+
+#[test]
+fn a_value_that_decays_while_the_store_runs_is_neither_read_nor_moved() {
+    let flash = RefCell::new(Flash::new(1024, 1));
+    let mut store = View::open(Shared(&flash), PAGES).and_then(Store::prepare).unwrap();
+    store.save(&as_changes(&vec![set(Group::Device, 1, 4), set(Group::Communication, 2, 300)])).unwrap();
+    flash.borrow_mut().disturb(100, |byte| byte ^ 4);
+    assert_eq!(store.load(Group::Device, &mut [0; 4]), Err(Error::Corrupt));
+    let before = flash.borrow().programmed();
+    // Does not fit the page any more, so it would take the decayed groups along.
+    let moving = store.save(&as_changes(&vec![set(Group::Application, 3, 124)]));
+    assert_eq!(moving, Err(Error::Corrupt));
+    assert_eq!(flash.borrow().programmed(), before);
 }

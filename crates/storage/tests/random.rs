@@ -32,7 +32,7 @@ fn life() -> impl Strategy<Value = Life> {
 
 #[test]
 fn random_lives_agree_with_the_model() {
-    let config = Config { cases: 1500, failure_persistence: None, ..Config::default() };
+    let config = Config { cases: 600, failure_persistence: None, ..Config::default() };
     let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
     let lives = (any::<u64>(), vec(life(), 1..6));
     let outcome = TestRunner::new_with_rng(config, rng).run(&lives, |(seed, lives)| {
