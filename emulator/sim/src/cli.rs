@@ -102,7 +102,8 @@ impl FromStr for Node {
 
     fn from_str(text: &str) -> Result<Node, String> {
         let (id, personality) = text.split_once(':').unwrap_or((text, "pressure"));
-        let id = node_id(id).ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"))?;
+        let id =
+            node_id(id).ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"))?;
         Ok(Node { id, personality: personality.parse()? })
     }
 }

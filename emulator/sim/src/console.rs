@@ -16,7 +16,8 @@ pub enum Command {
 }
 
 /// How to write a command.
-pub const HELP: &str = "commands: pressure|temperature|shaft|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
+pub const HELP: &str =
+    "commands: pressure|temperature|shaft|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
 
 /// Reads one line; `None` for an empty one.
 pub fn parse(line: &str) -> Option<Result<Command, String>> {
@@ -26,7 +27,9 @@ pub fn parse(line: &str) -> Option<Result<Command, String>> {
         "" => return None,
         "quit" if rest.is_empty() => Ok(Command::Quit),
         "help" => Err(HELP.to_owned()),
-        "pressure" | "temperature" | "shaft" | "fault" => Stimulus::parse(word, rest.trim()).map(Command::Stimulus),
+        "pressure" | "temperature" | "shaft" | "fault" => {
+            Stimulus::parse(word, rest.trim()).map(Command::Stimulus)
+        }
         _ => Err(format!("{word:?} is no command; {HELP}")),
     })
 }
@@ -36,7 +39,11 @@ pub fn lines() -> Receiver<String> {
     let (sender, lines) = channel();
     thread::spawn(move || {
         let input = std::io::stdin().lock();
-        input.lines().map_while(Result::ok).take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
+        input
+            .lines()
+            .map_while(Result::ok)
+            .take_while(|line| sender.send(line.clone()).is_ok())
+            .for_each(drop);
     });
     lines
 }

@@ -11,13 +11,19 @@ pub(crate) fn greeting(options: &Options, socketcand: SocketAddr, slcan: Option<
     let nodes: Vec<String> =
         options.nodes.iter().map(|node| format!("{} ({})", node.id, node.personality)).collect();
     let mut lines = vec![
-        format!("node {} at {} kbit/s; socketcand on {socketcand}, bus {BUS_NAME}", nodes.join(", "), options.bitrate),
+        format!(
+            "node {} at {} kbit/s; socketcand on {socketcand}, bus {BUS_NAME}",
+            nodes.join(", "),
+            options.bitrate
+        ),
         format!("python: {}", python(socketcand)),
         format!("        node = network.add_node({}, canopen.ObjectDictionary())", options.nodes[0].id),
         "        node.sdo.upload(0x1000, 0).hex(); node.nmt.state = 'OPERATIONAL'".to_owned(),
     ];
     match &options.socketcan {
-        Some(interface) => lines.push(format!("can-utils: candump -ta {interface}; cansend {interface} 000#0100")),
+        Some(interface) => {
+            lines.push(format!("can-utils: candump -ta {interface}; cansend {interface} 000#0100"))
+        }
         None => lines.push(format!(
             "can-utils: socketcandcl -v -i vcan0 -s {} -p {}; or start with --socketcan vcan0",
             socketcand.ip(),
@@ -25,7 +31,9 @@ pub(crate) fn greeting(options: &Options, socketcand: SocketAddr, slcan: Option<
         )),
     }
     lines.extend(slcan.map(|slcan| {
-        format!("slcan on {slcan}: can.Bus(interface='slcan', channel='socket://{slcan}', sleep_after_open=0)")
+        format!(
+            "slcan on {slcan}: can.Bus(interface='slcan', channel='socket://{slcan}', sleep_after_open=0)"
+        )
     }));
     lines.push(console::HELP.to_owned());
     lines

@@ -3,10 +3,9 @@
 //! Layout of the control block: SEGGER, "J-Link User Guide" UM08001, chapter RTT; `defmt-rtt` has one up-channel.
 
 use canbus::Time;
-use defmt_decoder::{DecodeError, Frame};
+use defmt_decoder::{DecodeError, Frame, Table};
 
 use crate::cli::LogLevel;
-use crate::image::Image;
 
 /// One line of a board's log.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -71,34 +70,34 @@ pub(crate) struct Log {
 }
 
 impl Log {
-    /// Reads the ring and hands every complete line of at least `level` to `sink`.
-    pub(crate) fn poll(&mut self, image: &Image, ram: &mut dyn Ram, sink: &mut dyn FnMut(LogLevel, String)) {
-        let Some(control_block) = image.rtt else { return };
+    /// Reads the ring and hands every complete line to `sink`.
+    pub(crate) fn poll(
+        &mut self,
+        table: &Table,
+        ram: &mut dyn Ram,
+        control_block: u32,
+        sink: &mut dyn FnMut(LogLevel, String),
+    ) {
         if drain(ram, control_block, &mut self.pending).is_some() {
-            self.decode(image, sink);
+            self.decode(table, sink);
         }
     }
 
     /// Frames end with a zero (rzCOBS, which defmt uses by default); what follows the last one waits.
-    fn decode(&mut self, image: &Image, sink: &mut dyn FnMut(LogLevel, String)) {
-        let (Some(table), Some(end)) = (&image.log, self.pending.iter().rposition(|&byte| byte == 0)) else {
-            return;
-        };
+    fn decode(&mut self, table: &Table, sink: &mut dyn FnMut(LogLevel, String)) {
+        let Some(end) = self.pending.iter().rposition(|&byte| byte == 0) else { return };
         let mut decoder = table.new_stream_decoder();
         decoder.received(&self.pending[..=end]);
         self.pending.drain(..=end);
         loop {
             match decoder.decode() {
                 Ok(frame) => sink(level(&frame), frame.display_message().to_string()),
-                Err(DecodeError::Malformed) => sink(LogLevel::Warn, "(a log frame that cannot be read)".into()),
+                Err(DecodeError::Malformed) => {
+                    sink(LogLevel::Warn, "(a log frame that cannot be read)".into())
+                }
                 Err(DecodeError::UnexpectedEof) => return,
             }
         }
-    }
-
-    /// The board was reset: half a frame from before makes no sense any more.
-    pub(crate) fn reset(&mut self) {
-        self.pending.clear();
     }
 }
 

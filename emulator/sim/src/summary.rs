@@ -47,6 +47,8 @@ pub struct NodeSummary {
     pub heard: Heard,
     /// The 1 kHz measurement.
     pub sampling: Sampling,
+    /// Frames for this node.
+    pub receiving: Receiving,
     /// What the core has done.
     pub cpu: Cpu,
     /// What the image takes.
@@ -70,6 +72,17 @@ pub struct Sampling {
     pub instructions: f64,
 }
 
+/// Frames that have passed the acceptance filters.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Receiving {
+    /// All of them.
+    pub frames: u64,
+    /// Those that were lost because a FIFO was full.
+    pub lost: u64,
+    /// Instructions of the receive interrupts for one frame, on average.
+    pub instructions: f64,
+}
+
 /// What the core has done.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Cpu {
@@ -77,10 +90,6 @@ pub struct Cpu {
     pub instructions: u64,
     /// Share of the time in which it did not sleep, 0 to 1.
     pub load: f64,
-    /// Frames taken from the receive FIFOs.
-    pub received_frames: u64,
-    /// Instructions of the receive interrupts for one frame, on average.
-    pub instructions_per_received_frame: f64,
 }
 
 /// What the image takes, in bytes.
@@ -125,7 +134,7 @@ impl fmt::Display for BusSummary {
 
 impl fmt::Display for NodeSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let NodeSummary { id, personality, heard, sampling, cpu, memory, .. } = self;
+        let NodeSummary { id, personality, heard, sampling, receiving, cpu, memory, .. } = self;
         writeln!(f, "node {id} ({personality}): {}", heard.state)?;
         writeln!(
             f,
@@ -139,12 +148,10 @@ impl fmt::Display for NodeSummary {
         )?;
         writeln!(
             f,
-            "  CPU: load {:.2} %, {} instructions, {} received frames of {:.0} instructions",
-            cpu.load * 100.0,
-            cpu.instructions,
-            cpu.received_frames,
-            cpu.instructions_per_received_frame
+            "  receiving: {} frames, {} lost, {:.0} instructions a frame",
+            receiving.frames, receiving.lost, receiving.instructions
         )?;
+        writeln!(f, "  CPU: load {:.2} %, {} instructions", cpu.load * 100.0, cpu.instructions)?;
         writeln!(
             f,
             "  memory: flash {} B (bootloader {} B), RAM {} B, deepest stack {} B",

@@ -114,16 +114,16 @@ impl Traffic {
             return;
         }
         match function {
-            0x080 => self.from_node(node).on_emcy(frame.bytes()),
-            0x180 | 0x280 | 0x380 | 0x480 => self.from_node(node).on_tpdo(function >> 8, frame.bytes()),
-            0x580 => self.from_node(node).sdo_frames += 1,
+            0x080 => self.sender(node).on_emcy(frame.bytes()),
+            0x180 | 0x280 | 0x380 | 0x480 => self.sender(node).on_tpdo(function >> 8, frame.bytes()),
+            0x580 => self.sender(node).sdo_frames += 1,
             0x600 => self.nodes.entry(node).or_default().sdo_frames += 1,
-            0x700 => self.from_node(node).on_heartbeat(frame.bytes()),
+            0x700 => self.sender(node).on_heartbeat(frame.bytes()),
             _ => {}
         }
     }
 
-    fn from_node(&mut self, node: u8) -> &mut Heard {
+    fn sender(&mut self, node: u8) -> &mut Heard {
         let heard = self.nodes.entry(node).or_default();
         heard.sent += 1;
         heard
@@ -167,7 +167,8 @@ mod tests {
     #[test]
     fn what_is_no_message_of_a_node_is_passed_over() {
         let mut traffic = Traffic::default();
-        for (id, bytes) in [(0x000, &[1u8, 5][..]), (0x080, &[]), (0x705, &[]), (0x085, &[1]), (0x7E5, &[4])] {
+        for (id, bytes) in [(0x000, &[1u8, 5][..]), (0x080, &[]), (0x705, &[]), (0x085, &[1]), (0x7E5, &[4])]
+        {
             hear(&mut traffic, id, bytes);
         }
         assert_eq!(traffic.node(5), Heard { sent: 2, ..Heard::default() });

@@ -3,7 +3,7 @@
 //! The loop is the one that the documentation of [`canbus`] describes. With one board it is exact; with several,
 //! a board may be ahead of a start of frame by [`QUANTUM_BITS`], too little to miss anything of the frame.
 
-use canbus::{Babbler, Bus, Controller, Event, Stamped, Time};
+use canbus::{Babbler, Bus, Controller, Event, HostNode, Stamped, Time};
 
 use crate::board::Board;
 use crate::log::Line;
@@ -29,6 +29,9 @@ pub struct World {
     bit: Time,
     bus: Bus,
     boards: Vec<Board>,
+    /// The adapter of the machine that everything runs on. It acknowledges frames also when no client is there:
+    /// a board alone on its bus could send nothing.
+    host: HostNode,
     load: Option<Babbler>,
     /// Places are used again but never given up: the bus knows its participants by their order.
     ports: Vec<Place>,
@@ -57,8 +60,8 @@ impl World {
     pub fn new(boards: Vec<Board>, bit_rate: u16, load: u8) -> World {
         let bit = Time::of_cycle(u64::from(bit_rate) * 1000);
         let load = (load > 0).then(|| Babbler::new(bit, f64::from(load) / 100.0, Babbler::foreign(), SEED));
-        let (bus, records) = (Bus::new(), Records::default());
-        World { now: Time::ZERO, bit_rate, bit, bus, boards, load, ports: Vec::new(), records }
+        let (bus, host, records) = (Bus::new(), HostNode::new(bit), Records::default());
+        World { now: Time::ZERO, bit_rate, bit, bus, boards, host, load, ports: Vec::new(), records }
     }
 
     /// Virtual time.
@@ -69,6 +72,11 @@ impl World {
     /// The boards, in the order of the command line.
     pub fn boards(&self) -> &[Board] {
         &self.boards
+    }
+
+    /// The boards, for a test that looks closer or breaks something.
+    pub fn boards_mut(&mut self) -> &mut [Board] {
+        &mut self.boards
     }
 
     /// The bus, for bit errors.
@@ -110,15 +118,16 @@ impl World {
             if self.now >= end {
                 break;
             }
-            let quantum = if self.boards.len() > 1 { self.now + self.bit * QUANTUM_BITS } else { Time::NEVER };
+            let quantum =
+                if self.boards.len() > 1 { self.now + self.bit * QUANTUM_BITS } else { Time::NEVER };
             let mut limit = end.min(next).min(quantum);
             for board in &mut self.boards {
                 limit = limit.min(board.run_until(limit)?);
             }
             self.now = limit;
         }
-        let Records { log, .. } = &mut self.records;
-        self.boards.iter_mut().for_each(|board| board.read_log(log));
+        while self.host.receive().is_some() {}
+        self.boards.iter_mut().for_each(|board| board.read_log(&mut self.records.log));
         Ok(())
     }
 
@@ -127,7 +136,9 @@ impl World {
         let boards = self.boards.iter_mut().map(|board| board.controller());
         let load = self.load.iter_mut().map(|load| load as &mut dyn Controller);
         let ports = self.ports.iter_mut().map(|place| &mut place.port as &mut dyn Controller);
-        let mut participants: Vec<&mut dyn Controller> = boards.chain(load).chain(ports).collect();
+        let host = std::iter::once(&mut self.host as &mut dyn Controller);
+        let mut participants: Vec<&mut dyn Controller> =
+            boards.chain(host).chain(load).chain(ports).collect();
         let records = &mut self.records;
         self.bus.step(&mut participants, self.now, &mut |event| records.on_event(&event))
     }

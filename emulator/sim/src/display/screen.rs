@@ -130,7 +130,8 @@ impl View {
 
     fn draw(&self, frame: &mut Frame) {
         let rows = |count: usize| Constraint::Length(u16::try_from(count).unwrap_or(u16::MAX));
-        let areas = [rows(self.greeting.len() + 1), rows(self.status.nodes.len() + 3), Constraint::Min(3), rows(1)];
+        let areas =
+            [rows(self.greeting.len() + 1), rows(self.status.nodes.len() + 3), Constraint::Min(3), rows(1)];
         let [heading, nodes, log, input] = Layout::vertical(areas).areas(frame.area());
         frame.render_widget(self.heading(), heading);
         frame.render_widget(self.nodes(), nodes);
@@ -146,7 +147,17 @@ impl View {
     }
 
     fn nodes(&self) -> Table<'_> {
-        let titles = ["node", "is", "NMT state", "sends", "pressure Pa", "temp. K", "position rev", "frames/s", "CPU %"];
+        let titles = [
+            "node",
+            "is",
+            "NMT state",
+            "sends",
+            "pressure Pa",
+            "temp. K",
+            "position rev",
+            "frames/s",
+            "CPU %",
+        ];
         let widths = [4, 9, 15, 14, 12, 8, 12, 9, 7].map(Constraint::Length);
         let none = NodeRates { frames: 0.0, cpu_load: 0.0 };
         let rows = self.status.nodes.iter().enumerate().map(|(index, node)| {

@@ -5,9 +5,9 @@
 
 mod session;
 mod slcan;
-mod socketcand;
 #[cfg(target_os = "linux")]
 mod socketcan;
+mod socketcand;
 mod tcp;
 
 use std::collections::BTreeMap;
@@ -100,8 +100,12 @@ impl Gateway {
     pub fn poll(&mut self, world: &mut World) {
         while let Ok(event) = self.events.try_recv() {
             match event {
-                Event::Connected { client, protocol, output } => self.connect(client, protocol, output, world),
-                Event::Bytes(client, bytes) => self.act(client, world, |session, out| session.on_bytes(&bytes, out)),
+                Event::Connected { client, protocol, output } => {
+                    self.connect(client, protocol, output, world)
+                }
+                Event::Bytes(client, bytes) => {
+                    self.act(client, world, |session, out| session.on_bytes(&bytes, out))
+                }
                 Event::Frame(client, frame) => self.send(client, frame, world),
                 Event::Closed(client) => self.close(client, world),
             }
@@ -128,8 +132,15 @@ impl Gateway {
     }
 
     /// Lets a session speak and does what it wants.
-    fn act(&mut self, id: ClientId, world: &mut World, speak: impl FnOnce(&mut dyn Session, &mut Vec<Action>)) {
-        let Some(Client { port, link: Link::Text { session, output } }) = self.clients.get_mut(&id) else { return };
+    fn act(
+        &mut self,
+        id: ClientId,
+        world: &mut World,
+        speak: impl FnOnce(&mut dyn Session, &mut Vec<Action>),
+    ) {
+        let Some(Client { port, link: Link::Text { session, output } }) = self.clients.get_mut(&id) else {
+            return;
+        };
         let mut actions = Vec::new();
         speak(session.as_mut(), &mut actions);
         for action in actions {

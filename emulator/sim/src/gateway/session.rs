@@ -6,7 +6,7 @@ use crate::port::Adapter;
 
 /// What a session wants done, in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Action {
+pub(super) enum Action {
     /// To the client, in a segment of its own: python-can compares what one `recv` returns.
     Segment(String),
     /// To the client, together with what comes before and after it.
@@ -21,18 +21,18 @@ pub enum Action {
 
 impl Action {
     /// [`Action::Segment`].
-    pub fn segment(text: impl Into<String>) -> Action {
+    pub(super) fn segment(text: impl Into<String>) -> Action {
         Action::Segment(text.into())
     }
 
     /// [`Action::Stream`].
-    pub fn stream(text: impl Into<String>) -> Action {
+    pub(super) fn stream(text: impl Into<String>) -> Action {
         Action::Stream(text.into())
     }
 }
 
 /// One client's side of a protocol, without sockets: bytes and frames in, actions out.
-pub trait Session {
+pub(super) trait Session {
     /// The client has connected.
     fn greet(&mut self, out: &mut Vec<Action>);
 

@@ -21,7 +21,7 @@ const BIT_RATES: [u32; 9] = [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 
 
 /// One command of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
+pub(super) enum Command {
     /// `S0` to `S8`: the bit rate, in bit/s.
     BitRate(u32),
     /// `O`: go on the bus.
@@ -43,7 +43,7 @@ pub enum Command {
 }
 
 /// Reads one line without its carriage return; `None` when it is not a command of the protocol.
-pub fn parse(line: &str) -> Option<Command> {
+pub(super) fn parse(line: &str) -> Option<Command> {
     let (name, rest) = line.split_at_checked(1)?;
     match (name, rest) {
         ("S", digit) => BIT_RATES.get(hex(digit, 1)? as usize).copied().map(Command::BitRate),
@@ -76,7 +76,10 @@ fn parse_frame(id: Id, remote: bool, rest: &str) -> Option<Command> {
     }
     let pairs = data.as_bytes().chunks(2).map(|pair| std::str::from_utf8(pair).ok());
     let bytes: Option<Vec<u8>> = pairs.map(|pair| u8::try_from(hex(pair?, 2)?).ok()).collect();
-    bytes.filter(|bytes| bytes.len() == usize::from(dlc)).and_then(|bytes| Frame::data(id, &bytes)).map(Command::Send)
+    bytes
+        .filter(|bytes| bytes.len() == usize::from(dlc))
+        .and_then(|bytes| Frame::data(id, &bytes))
+        .map(Command::Send)
 }
 
 /// A number of exactly `digits` hexadecimal digits.
@@ -108,7 +111,7 @@ fn format_frame(frame: &Frame, at: Time, stamped: bool) -> String {
 
 /// One client.
 #[derive(Debug)]
-pub struct Slcan {
+pub(super) struct Slcan {
     bit_rate: u32,
     open: Option<Adapter>,
     stamped: bool,
@@ -117,7 +120,7 @@ pub struct Slcan {
 
 impl Slcan {
     /// A client whose adapter runs at `bit_rate` (bit/s) until it chooses another.
-    pub fn new(bit_rate: u32) -> Slcan {
+    pub(super) fn new(bit_rate: u32) -> Slcan {
         Slcan { bit_rate, open: None, stamped: false, line: Vec::new() }
     }
 
@@ -243,7 +246,10 @@ mod tests {
         for text in ["t1230\r", "F\r"] {
             assert_eq!(talk(&mut Slcan::new(250_000), text), [Action::stream("\x07")], "{text:?}");
         }
-        for text in ["S4\r", "O\r", "L\r", "Z1\r", "t123\r", "t1231\r", "t12310\r", "t1239\r", "S9\r", "t8000\r", "q\r"] {
+        for text in [
+            "S4\r", "O\r", "L\r", "Z1\r", "t123\r", "t1231\r", "t12310\r", "t1239\r", "S9\r", "t8000\r",
+            "q\r",
+        ] {
             assert_eq!(talk(&mut open(), text), [Action::stream("\x07")], "{text:?}");
         }
         let mut listening = Slcan::new(250_000);
@@ -253,7 +259,10 @@ mod tests {
 
     #[test]
     fn identification() {
-        assert_eq!(talk(&mut Slcan::new(1), "V\rN\r"), [Action::stream("V0101\r"), Action::stream("NSIM0\r")]);
+        assert_eq!(
+            talk(&mut Slcan::new(1), "V\rN\r"),
+            [Action::stream("V0101\r"), Action::stream("NSIM0\r")]
+        );
         assert_eq!(talk(&mut open(), "F\r"), [Action::stream("F00\r")]);
     }
 

@@ -19,7 +19,11 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// Opens the interface and moves its frames; the sender takes those of the bus. Reading and writing share one
 /// socket, because a socket does not hear what it has sent itself.
-pub(super) fn open(interface: &str, client: ClientId, events: Sender<Event>) -> io::Result<SyncSender<Frame>> {
+pub(super) fn open(
+    interface: &str,
+    client: ClientId,
+    events: Sender<Event>,
+) -> io::Result<SyncSender<Frame>> {
     let socket = Arc::new(CanSocket::open(interface)?);
     socket.set_write_timeout(WRITE_TIMEOUT)?;
     let (frames, queue) = sync_channel(BACKLOG);

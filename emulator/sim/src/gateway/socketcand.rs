@@ -17,7 +17,7 @@ const MAX_MESSAGE: usize = 200;
 
 /// What a client asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Request {
+pub(super) enum Request {
     /// `< open vcan0 >`
     Open(String),
     /// `< rawmode >`: every frame of the bus is reported.
@@ -36,7 +36,7 @@ pub enum Request {
 
 /// Why a message is refused; the text goes to the client in `< error .. >`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Refused {
+pub(super) enum Refused {
     /// Not `< word ... >`.
     #[error("not a message")]
     NotAMessage,
@@ -55,7 +55,7 @@ pub enum Refused {
 }
 
 /// Reads one message without its brackets.
-pub fn parse(text: &str) -> Result<Request, Refused> {
+pub(super) fn parse(text: &str) -> Result<Request, Refused> {
     let mut words = text.split_ascii_whitespace();
     let command = words.next().ok_or(Refused::NotAMessage)?;
     let arguments: Vec<&str> = words.collect();
@@ -122,7 +122,7 @@ enum Mode {
 
 /// One client.
 #[derive(Debug)]
-pub struct Socketcand {
+pub(super) struct Socketcand {
     bus: &'static str,
     bit_rate: u32,
     mode: Mode,
@@ -131,7 +131,7 @@ pub struct Socketcand {
 
 impl Socketcand {
     /// A client of the bus with this name and bit rate (bit/s).
-    pub fn new(bus: &'static str, bit_rate: u32) -> Socketcand {
+    pub(super) fn new(bus: &'static str, bit_rate: u32) -> Socketcand {
         Socketcand { bus, bit_rate, mode: Mode::Closed, input: Vec::new() }
     }
 
@@ -156,7 +156,9 @@ impl Socketcand {
             (Request::Send(frame), _) => out.push(Action::Send(frame)),
             (Request::Subscribe(id), Mode::Broadcast(ids)) => drop(ids.insert(key(id))),
             (Request::Unsubscribe(id), Mode::Broadcast(ids)) => drop(ids.remove(&key(id))),
-            (Request::Subscribe(_) | Request::Unsubscribe(_), Mode::Raw) => return Err(Refused::UnknownCommand),
+            (Request::Subscribe(_) | Request::Unsubscribe(_), Mode::Raw) => {
+                return Err(Refused::UnknownCommand);
+            }
         }
         Ok(())
     }
@@ -272,7 +274,8 @@ mod tests {
         refused("< >", "not a message");
         refused("hello >", "not a message");
         let mut session = raw();
-        let bad = ["< send 123 8  >", "< send 800 0 >", "< send 1234 0 >", "< send 123 1 100 >", "< send 1 1 +1 >"];
+        let bad =
+            ["< send 123 8  >", "< send 800 0 >", "< send 1234 0 >", "< send 123 1 100 >", "< send 1 1 +1 >"];
         for text in bad {
             assert_eq!(talk(&mut session, text), [Action::segment("< error bad arguments >")], "{text}");
         }

@@ -26,7 +26,11 @@ impl ClientId {
 /// What the threads tell the world.
 #[derive(Debug)]
 pub(super) enum Event {
-    Connected { client: ClientId, protocol: Protocol, output: SyncSender<Output> },
+    Connected {
+        client: ClientId,
+        protocol: Protocol,
+        output: SyncSender<Output>,
+    },
     Bytes(ClientId, Vec<u8>),
     /// From a SocketCAN interface, which carries frames and no text.
     Frame(ClientId, Frame),

@@ -1,0 +1,148 @@
+//! One emulated board: the machine that runs the images, its flash, its log, and what was counted.
+
+use std::rc::Rc;
+
+use anyhow::{Context, Result};
+use canbus::{Controller, Time};
+use chip::{Board as Wiring, Stm32f4, Variant};
+use emulator::{Machine, Model, Stop};
+
+use crate::figures;
+use crate::flash;
+use crate::image::Image;
+use crate::log::{Line, Log, Ram};
+use crate::personality::Personality;
+use crate::status::NodeStatus;
+use crate::stimuli::Stimulus;
+use crate::summary::NodeSummary;
+use crate::traffic::Heard;
+
+/// The ELF files that every board runs.
+pub struct Images {
+    /// The application.
+    pub(crate) firmware: Image,
+    /// What starts it, if anything does.
+    pub(crate) bootloader: Option<Image>,
+}
+
+/// One emulated board.
+pub struct Board {
+    id: u8,
+    personality: Personality,
+    machine: Machine<Stm32f4>,
+    images: Rc<Images>,
+    firmware: emulator::Image,
+    bootloader_flash: u32,
+    log: Log,
+}
+
+impl Board {
+    /// A board with these contents of its flash, over which the images are written as a debug probe does it.
+    /// It is switched on.
+    ///
+    /// # Errors
+    /// When an image does not fit the chip.
+    pub(crate) fn new(id: u8, personality: Personality, flash: &[u8], images: Rc<Images>) -> Result<Board> {
+        let chip = Stm32f4::new(Variant::F446, Wiring::default());
+        let mut machine = Machine::new(Model::stm32f4(flash::SIZE as u32), chip)?;
+        machine.set_flash(flash)?;
+        let bootloader = images.bootloader.as_ref().map(|image| load(&mut machine, image)).transpose()?;
+        let bootloader_flash = bootloader.map_or(0, |bootloader| bootloader.flash_size);
+        let firmware = load(&mut machine, &images.firmware)?;
+        machine.power_on(Time::ZERO);
+        Ok(Board { id, personality, machine, images, firmware, bootloader_flash, log: Log::default() })
+    }
+
+    /// The node-ID it was given on the command line.
+    pub fn id(&self) -> u8 {
+        self.id
+    }
+
+    /// The machine inside, for a test that looks closer or breaks something.
+    pub fn machine(&mut self) -> &mut Machine<Stm32f4> {
+        &mut self.machine
+    }
+
+    /// Runs to `limit`, or to the moment at which it requests a frame; returns the time reached.
+    ///
+    /// # Errors
+    /// When the core has locked up: it would stand still for ever.
+    pub(crate) fn run_until(&mut self, limit: Time) -> Result<Time> {
+        match self.machine.run_until(limit) {
+            Stop::Reached | Stop::PowerCut => Ok(limit),
+            Stop::Poked => Ok(limit.min(self.machine.now())),
+            Stop::Lockup { pc } => anyhow::bail!("node {}: the core has locked up at {pc:#010x}", self.id),
+        }
+    }
+
+    /// Its CAN controller.
+    pub(crate) fn controller(&mut self) -> &mut dyn Controller {
+        self.machine.peripherals_mut().can1_mut()
+    }
+
+    pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
+        stimulus.act_on(self.machine.peripherals_mut().plant_mut(), now);
+    }
+
+    /// What the firmware has logged since the last call.
+    pub(crate) fn read_log(&mut self, into: &mut Vec<Line>) {
+        let (at, node) = (self.machine.now(), self.id);
+        let (Some(control_block), Some(table)) = (self.firmware.rtt, &self.images.firmware.log) else {
+            return;
+        };
+        self.log.poll(table, &mut self.machine, control_block, &mut |level, text| {
+            into.push(Line { at, node, level, text });
+        });
+    }
+
+    /// The flash array.
+    pub(crate) fn flash(&self) -> Vec<u8> {
+        self.machine.flash()
+    }
+
+    pub(crate) fn status(&self, heard: Heard) -> NodeStatus {
+        let (now, plant) = (self.machine.now(), self.machine.peripherals().plant());
+        NodeStatus {
+            id: self.id,
+            personality: self.personality,
+            heard,
+            pressure: plant.pressure(now),
+            temperature: plant.temperature(now),
+            position: plant.revolutions(now),
+            awake: now.since(self.machine.stats().asleep),
+        }
+    }
+
+    pub(crate) fn summary(&self, heard: Heard) -> NodeSummary {
+        NodeSummary {
+            id: self.id,
+            personality: self.personality,
+            heard,
+            sampling: figures::sampling(&self.machine),
+            receiving: figures::receiving(&self.machine),
+            cpu: figures::cpu(&self.machine),
+            memory: figures::memory(
+                &self.machine,
+                &self.images.firmware,
+                &self.firmware,
+                self.bootloader_flash,
+            ),
+            resets: figures::resets(&self.machine),
+            unmodelled: figures::unmodelled(&self.machine),
+        }
+    }
+}
+
+fn load(machine: &mut Machine<Stm32f4>, image: &Image) -> Result<emulator::Image> {
+    machine.load_elf(&image.elf).with_context(|| format!("{} is not an image for the board", image.path))
+}
+
+impl Ram for Machine<Stm32f4> {
+    fn read(&self, address: u32, bytes: &mut [u8]) -> Option<()> {
+        Machine::read(self, address, bytes).ok()
+    }
+
+    fn write(&mut self, address: u32, bytes: &[u8]) -> Option<()> {
+        Machine::write(self, address, bytes).ok()
+    }
+}

@@ -1,0 +1,92 @@
+//! What a board's machine has counted, as figures for the summary.
+
+use canbus::Time;
+use chip::Stm32f4;
+use emulator::{Exception, Incident, Machine, RAM_PATTERN};
+
+use crate::image::Image;
+use crate::status::{per_second, share};
+use crate::summary::{Cpu, Memory, Receiving, Sampling};
+
+/// DMA2 stream 0 takes the samples over: its interrupt is the sampling task (RM0390, table 38).
+const SAMPLING: Exception = Exception::irq(56);
+/// CAN1 receive FIFO 0 and 1.
+const RECEIVE: [Exception; 2] = [Exception::irq(20), Exception::irq(21)];
+/// Samples are due at every millisecond.
+const PERIOD: Time = Time::from_millis(1);
+
+/// The 1 kHz measurement.
+pub(crate) fn sampling(machine: &Machine<Stm32f4>) -> Sampling {
+    let activity = machine.stats().of(SAMPLING);
+    let early = PERIOD.since(activity.least_interval);
+    let late = activity.worst_interval.since(PERIOD);
+    Sampling {
+        samples: activity.entries,
+        rate: per_second(activity.entries.saturating_sub(1), activity.last_entry.since(activity.first_entry)),
+        worst_jitter: early.max(late).as_secs_f64() * 1e6,
+        instructions: mean(activity.instructions, activity.entries),
+    }
+}
+
+/// Frames for this node.
+pub(crate) fn receiving(machine: &Machine<Stm32f4>) -> Receiving {
+    let reception = machine.peripherals().can1().reception();
+    let instructions = RECEIVE.iter().map(|&exception| machine.stats().of(exception).instructions).sum();
+    Receiving {
+        frames: reception.accepted,
+        lost: reception.lost,
+        instructions: mean(instructions, reception.accepted),
+    }
+}
+
+/// The core.
+pub(crate) fn cpu(machine: &Machine<Stm32f4>) -> Cpu {
+    let stats = machine.stats();
+    let load = share(machine.now().since(stats.asleep), machine.now());
+    Cpu { instructions: stats.instructions, load }
+}
+
+/// What the images take. The stack grows down from its start towards the start of RAM, and RAM that was never
+/// written still has the pattern of power-on.
+pub(crate) fn memory(
+    machine: &Machine<Stm32f4>,
+    image: &Image,
+    firmware: &emulator::Image,
+    bootloader_flash: u32,
+) -> Memory {
+    let stack = image.stack_start.map_or(0, |start| stack_depth(machine, start));
+    Memory { flash: firmware.flash_size, bootloader_flash, ram: firmware.ram_size, stack }
+}
+
+fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
+    let bottom = machine.model().ram.start;
+    let mut stack = vec![0; start.saturating_sub(bottom) as usize];
+    if machine.read(bottom, &mut stack).is_err() {
+        return 0;
+    }
+    let untouched = stack.iter().take_while(|&&byte| byte == RAM_PATTERN).count();
+    (stack.len() - untouched) as u32
+}
+
+/// Faults and resets after power-on.
+pub(crate) fn resets(machine: &Machine<Stm32f4>) -> Vec<String> {
+    machine.incidents().iter().map(|(at, incident)| format!("{at} s: {}", describe(incident))).collect()
+}
+
+fn describe(incident: &Incident) -> String {
+    match incident {
+        Incident::Fault(fault) => format!("fault at {:#010x}, CFSR {:#x}", fault.pc, fault.status),
+        Incident::SoftwareReset => "reset by software".to_owned(),
+        Incident::ChipReset => "reset by the chip (watchdog)".to_owned(),
+    }
+}
+
+/// Accesses that silicon would have answered differently.
+pub(crate) fn unmodelled(machine: &Machine<Stm32f4>) -> Vec<String> {
+    machine.peripherals().unmodelled().iter().map(ToString::to_string).collect()
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn mean(sum: u64, count: u64) -> f64 {
+    if count == 0 { 0.0 } else { sum as f64 / count as f64 }
+}

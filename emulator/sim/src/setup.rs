@@ -1,0 +1,60 @@
+//! Builds a world from the command line.
+
+use std::rc::Rc;
+
+use anyhow::{Context, Result, ensure};
+use storage::{DeviceRecord, Memory, Pages, View};
+
+use crate::board::{Board, Images};
+use crate::cli::{Node, Options};
+use crate::flash;
+use crate::image::Image;
+use crate::world::World;
+
+/// The two pages of the parameter store: sectors 2 and 3 (memory.x).
+const PAGES: Pages = Pages::new(0x8000, 0x4000);
+
+/// A bit rate as controllers count it.
+pub fn bits_per_second(kbit: u16) -> u32 {
+    u32::from(kbit) * 1000
+}
+
+/// The boards with their images, parameters and stimuli, before power-on.
+pub fn world(options: &Options) -> Result<World> {
+    let firmware = Image::load(&options.firmware)?;
+    let bootloader = options.bootloader.as_deref().map(Image::load).transpose()?;
+    let images = Rc::new(Images { firmware, bootloader });
+    let boards = options.nodes.iter().map(|node| board(node, options, &images));
+    let boards = boards.collect::<Result<Vec<Board>>>()?;
+    let mut world = World::new(boards, options.bitrate, options.load);
+    let Options { pressure, temperature, shaft, fault, .. } = options;
+    [pressure, temperature, shaft, fault].into_iter().flatten().for_each(|stimulus| world.apply(stimulus));
+    Ok(world)
+}
+
+fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
+    let twice = options.nodes.iter().filter(|other| other.id == node.id).count() > 1;
+    ensure!(!twice, "node-ID {} is given more than once", node.id);
+    let kept = options.flash.as_deref().map(|dir| flash::load(dir, node.id)).transpose()?.flatten();
+    let mut contents = kept.unwrap_or_else(|| vec![0xFF; flash::SIZE]);
+    provision(&mut contents, node, options.bitrate)?;
+    Board::new(node.id, node.personality, &contents, Rc::clone(images))
+}
+
+/// Tells a fresh board what it is. A board that knows it already, because its flash was kept, is left as it is.
+fn provision(flash: &mut [u8], node: &Node, bit_rate: u16) -> Result<()> {
+    let known = View::open(Memory(&*flash), PAGES).and_then(|mut view| view.device());
+    if matches!(known, Ok(Some(_))) {
+        return Ok(());
+    }
+    let record =
+        DeviceRecord::new(node.id, bit_rate, node.personality.number()).context("no such device record")?;
+    let done = storage::provision(Memory(flash), PAGES, &record);
+    done.map_err(|error| anyhow::anyhow!("the parameter store takes no device record: {error:?}"))
+}
+
+/// Writes the boards' flash back to where it was read from.
+pub fn keep_flash(options: &Options, world: &World) -> Result<()> {
+    let Some(dir) = &options.flash else { return Ok(()) };
+    world.boards().iter().try_for_each(|board| flash::save(dir, board.id(), &board.flash()))
+}

@@ -1,0 +1,108 @@
+//! What the sensors see, and which boards a specification is meant for.
+
+use std::fmt;
+use std::str::FromStr;
+
+use canbus::Time;
+use chip::plant::{Fault, Motion, Plant, Signal};
+
+use crate::cli::node_id;
+
+/// A change of what a board's sensors see.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stimulus {
+    /// In Pa.
+    Pressure(Signal),
+    /// In K.
+    Temperature(Signal),
+    /// In revolutions, or a speed.
+    Shaft(Motion),
+    /// A defect of the wiring or of a sensor.
+    Fault(Fault),
+}
+
+impl Stimulus {
+    /// Reads `[ID=]SPEC` of a kind: pressure, temperature, shaft or fault.
+    ///
+    /// # Errors
+    /// One line that says what is wrong.
+    pub fn parse(kind: &str, text: &str) -> Result<Targeted<Stimulus>, String> {
+        match kind {
+            "pressure" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Pressure)),
+            "temperature" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Temperature)),
+            "shaft" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Shaft)),
+            "fault" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Fault)),
+            _ => Err(format!("{kind:?} is no stimulus; there are pressure, temperature, shaft and fault")),
+        }
+    }
+
+    /// Lets it act from `now` on.
+    pub(crate) fn act_on(&self, plant: &mut Plant, now: Time) {
+        match self.clone() {
+            Stimulus::Pressure(signal) => plant.set_pressure(signal, now),
+            Stimulus::Temperature(signal) => plant.set_temperature(signal, now),
+            Stimulus::Shaft(motion) => plant.set_shaft(motion, now),
+            Stimulus::Fault(fault) => plant.add_fault(fault),
+        }
+    }
+}
+
+/// Something for one node, written `ID=SPEC`, or for all of them, written `SPEC`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Targeted<T> {
+    /// The node; `None` for all.
+    pub node: Option<u8>,
+    /// What it is to get.
+    pub what: T,
+}
+
+impl<T> Targeted<T> {
+    /// Whether the node of this ID is meant.
+    pub fn is_for(&self, node: u8) -> bool {
+        self.node.is_none_or(|target| target == node)
+    }
+
+    /// The same nodes, another thing.
+    pub fn map<U>(self, change: impl FnOnce(T) -> U) -> Targeted<U> {
+        Targeted { node: self.node, what: change(self.what) }
+    }
+}
+
+impl<T: FromStr> FromStr for Targeted<T>
+where
+    T::Err: fmt::Display,
+{
+    type Err = String;
+
+    /// An equals sign inside a SPEC, as in a file name, is no target: a target is a number.
+    fn from_str(text: &str) -> Result<Targeted<T>, String> {
+        let target = text.split_once('=').filter(|(id, _)| id.bytes().all(|byte| byte.is_ascii_digit()));
+        let (node, spec) = match target {
+            Some((id, spec)) => {
+                let id = node_id(id)
+                    .ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"));
+                (Some(id?), spec)
+            }
+            None => (None, text),
+        };
+        spec.parse().map(|what| Targeted { node, what }).map_err(|error: T::Err| error.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_is_a_node_id_before_an_equals_sign() {
+        let read = |text: &str| text.parse::<Targeted<String>>();
+        assert_eq!(read("const:1"), Ok(Targeted { node: None, what: "const:1".into() }));
+        assert_eq!(read("12=const:1"), Ok(Targeted { node: Some(12), what: "const:1".into() }));
+        assert_eq!(read("csv:a=b.csv"), Ok(Targeted { node: None, what: "csv:a=b.csv".into() }));
+        assert!(read("128=const:1").is_err());
+        assert!(read("=const:1").is_err());
+        assert!("1=x".parse::<Targeted<f64>>().is_err());
+        assert!(read("3=x").unwrap().is_for(3) && !read("3=x").unwrap().is_for(4));
+        assert!(read("x").unwrap().is_for(4));
+    }
+}

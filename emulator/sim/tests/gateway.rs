@@ -1,0 +1,140 @@
+//! Clients over real sockets on one bus, without a board.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+
+use canbus::Time;
+use sim::gateway::{Gateway, Protocol};
+use sim::world::World;
+
+/// A bus with a gateway, and virtual time that passes while a client waits for an answer.
+struct Bench {
+    world: World,
+    gateway: Gateway,
+}
+
+impl Bench {
+    fn new() -> Bench {
+        Bench { world: World::new(Vec::new(), 1000, 0), gateway: Gateway::new(1_000_000) }
+    }
+
+    fn serve(&self, protocol: Protocol) -> SocketAddr {
+        self.gateway.listen("127.0.0.1:0".parse().unwrap(), protocol).unwrap()
+    }
+
+    fn connect(&mut self, address: SocketAddr) -> TcpStream {
+        let client = TcpStream::connect(address).unwrap();
+        client.set_nonblocking(true).unwrap();
+        client
+    }
+
+    fn step(&mut self) {
+        self.gateway.poll(&mut self.world);
+        self.world.run_until(self.world.now() + Time::from_millis(1)).unwrap();
+        self.gateway.deliver(&mut self.world);
+        std::thread::yield_now();
+    }
+
+    /// What the client gets, up to and including `end`.
+    fn answer(&mut self, client: &mut TcpStream, end: u8) -> String {
+        let mut text = Vec::new();
+        while text.last() != Some(&end) {
+            let mut byte = [0];
+            match client.read(&mut byte) {
+                Ok(0) => panic!("the connection was closed after {:?}", String::from_utf8_lossy(&text)),
+                Ok(_) => text.push(byte[0]),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => self.step(),
+                Err(error) => panic!("{error}"),
+            }
+        }
+        String::from_utf8(text).unwrap()
+    }
+
+    /// Sends a message of socketcand and returns the answer.
+    fn ask(&mut self, client: &mut TcpStream, message: &str) -> String {
+        client.write_all(message.as_bytes()).unwrap();
+        self.answer(client, b'>')
+    }
+
+    fn raw_client(&mut self, address: SocketAddr) -> TcpStream {
+        let mut client = self.connect(address);
+        assert_eq!(self.answer(&mut client, b'>'), "< hi >");
+        assert_eq!(self.ask(&mut client, "< open vcan0 >"), "< ok >");
+        assert_eq!(self.ask(&mut client, "< rawmode >"), "< ok >");
+        client
+    }
+}
+
+#[test]
+fn clients_of_both_protocols_hear_each_other() {
+    let mut bench = Bench::new();
+    let (socketcand, slcan) = (bench.serve(Protocol::Socketcand), bench.serve(Protocol::Slcan));
+    let mut one = bench.raw_client(socketcand);
+    let mut two = bench.raw_client(socketcand);
+    let mut three = bench.connect(slcan);
+    three.write_all(b"S8\rO\r").unwrap();
+    assert_eq!(bench.answer(&mut three, b'\r') + &bench.answer(&mut three, b'\r'), "\r\r");
+
+    one.write_all(b"< send 123 2 AB C >").unwrap();
+    let heard = bench.answer(&mut two, b'>');
+    assert!(heard.starts_with("< frame 123 ") && heard.ends_with(" AB0C >"), "{heard}");
+    assert_eq!(bench.answer(&mut three, b'\r'), "t1232AB0C\r");
+
+    three.write_all(b"T1ABCDEF00\r").unwrap();
+    assert_eq!(bench.answer(&mut three, b'\r'), "Z\r");
+    for client in [&mut one, &mut two] {
+        let heard = bench.answer(client, b'>');
+        assert!(heard.starts_with("< frame 1ABCDEF0 "), "its own frame is not reported: {heard}");
+    }
+}
+
+#[test]
+fn a_silent_client_at_the_wrong_bit_rate_disturbs_nobody_but_an_active_one_does() {
+    let mut bench = Bench::new();
+    let (socketcand, slcan) = (bench.serve(Protocol::Socketcand), bench.serve(Protocol::Slcan));
+    let mut one = bench.raw_client(socketcand);
+    let mut two = bench.raw_client(socketcand);
+    let mut wrong = bench.connect(slcan);
+    wrong.write_all(b"S6\rL\r").unwrap();
+    bench.answer(&mut wrong, b'\r');
+    bench.answer(&mut wrong, b'\r');
+    one.write_all(b"< send 055 1 55 >").unwrap();
+    assert!(bench.answer(&mut two, b'>').starts_with("< frame 055 "));
+    assert_eq!(bench.world.summary(1.0, 0).bus.errors, 0);
+    wrong.write_all(b"C\rO\r").unwrap();
+    bench.answer(&mut wrong, b'\r');
+    bench.answer(&mut wrong, b'\r');
+    one.write_all(b"< send 055 1 55 >").unwrap();
+    bench.answer(&mut two, b'>');
+    assert!(bench.world.summary(1.0, 0).bus.errors > 0);
+}
+
+#[test]
+fn a_client_that_leaves_gives_its_place_to_the_next() {
+    let mut bench = Bench::new();
+    let address = bench.serve(Protocol::Socketcand);
+    let mut stays = bench.raw_client(address);
+    for id in 1..=3 {
+        let mut guest = bench.raw_client(address);
+        guest.write_all(format!("< send {id:03X} 0 >").as_bytes()).unwrap();
+        let heard = bench.answer(&mut stays, b'>');
+        assert!(heard.starts_with(&format!("< frame {id:03X} ")), "{heard}");
+    }
+}
+
+#[test]
+fn a_port_in_use_is_an_error_that_names_it() {
+    let bench = Bench::new();
+    let address = bench.serve(Protocol::Socketcand);
+    let error = bench.gateway.listen(address, Protocol::Slcan).unwrap_err();
+    let message = format!("{error:#}");
+    assert!(message.contains(&address.to_string()) && !message.contains('\n'), "{message}");
+}
+
+#[test]
+fn an_interface_that_the_host_has_not_is_an_error_that_names_it() {
+    let mut bench = Bench::new();
+    let error = bench.gateway.attach_interface("nocan7", &mut bench.world).unwrap_err();
+    let message = format!("{error:#}");
+    assert!(message.contains("nocan7") && !message.contains('\n'), "{message}");
+}
