@@ -12,19 +12,16 @@ pub struct Bus {
     /// Bit errors on the wire.
     pub faults: Faults,
     slot: Option<Slot>,
+    /// The end of the last intermission.
     free: Time,
     recessive: Time,
-    suspended: Option<Suspension>,
+    /// Error-passive transmitters that let others go first.
+    suspended: Vec<usize>,
+    suspended_until: Time,
+    /// Participants that know what the wire does.
     known: usize,
     frames: u64,
     busy: Time,
-}
-
-/// An error-passive transmitter that lets others go first.
-#[derive(Clone, Copy, Debug)]
-struct Suspension {
-    participant: usize,
-    until: Time,
 }
 
 impl Bus {
@@ -80,8 +77,8 @@ impl Bus {
 
     /// The earliest instant at which a participant with this request may begin.
     fn wish(&self, participant: usize, requested: Option<Time>) -> Option<Time> {
-        let suspended = self.suspended.filter(|suspension| suspension.participant == participant);
-        Some(requested?.max(suspended.map_or(Time::ZERO, |suspension| suspension.until)))
+        let suspended = self.suspended.contains(&participant);
+        Some(requested?.max(if suspended { self.suspended_until } else { Time::ZERO }))
     }
 
     /// Tells newcomers what the wire does.
@@ -139,10 +136,11 @@ impl Bus {
         self.free = slot.end();
         self.recessive = slot.recessive();
         participants.iter_mut().for_each(|participant| participant.idle(slot.recessive()));
-        self.suspended = slot.transmitters().iter().find_map(|n| {
-            let passive =
-                matches!(participants.get_mut(*n)?.attachment(slot.end()), Attachment::Passive { .. });
-            passive.then(|| Suspension { participant: *n, until: slot.end() + slot.bit() * SUSPEND_BITS })
+        self.suspended_until = slot.end() + slot.bit() * SUSPEND_BITS;
+        self.suspended = slot.transmitters().to_vec();
+        self.suspended.retain(|n| {
+            let attachment = participants.get_mut(*n).map(|sender| sender.attachment(slot.end()));
+            matches!(attachment, Some(Attachment::Passive { .. }))
         });
     }
 }

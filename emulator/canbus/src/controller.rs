@@ -99,7 +99,7 @@ pub trait Controller {
     /// A frame of somebody else's is valid: `at` is the last but one bit of the end of frame.
     fn received(&mut self, frame: &Frame, at: Time);
 
-    /// An error destroyed the frame on the wire; `at` is the first bit after this participant's error flag.
+    /// An error destroyed the frame on the wire; `at` is the end of the last error flag that this participant saw.
     fn error(&mut self, report: &ErrorReport, at: Time);
 
     /// The wire has been recessive since `since` and remains so until the next `start_of_frame`.

@@ -20,7 +20,7 @@ pub enum Event {
     Error {
         /// The start of frame.
         start: Time,
-        /// The end of the transmitter's error flag.
+        /// The end of the error flags.
         end: Time,
         /// The frame that was to be sent.
         frame: Frame,

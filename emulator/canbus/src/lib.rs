@@ -24,8 +24,8 @@
 //! of frame and the first thing that a receiver can notice:
 //!
 //! * frames without errors: the end of the shortest frame, so any `Q` of up to 43 bits is causal;
-//! * with injected errors, or participants at another bit rate: an error is reported no earlier than 13 bits after
-//!   the start of frame (six bits to see it, six of the flag, one more). With `Q` of up to 12 bits this is causal too.
+//! * with injected errors, or participants at another bit rate: an error is reported no earlier than 12 bits after
+//!   the start of frame (six to see it, six of the flag). With `Q` of up to 12 bits this is causal too.
 //!
 //! Wake-up by a start of frame and the end of a wait for 11 recessive bits may be late by up to `Q`. Whatever `Q`
 //! is, the same input gives the same traffic.
@@ -56,8 +56,10 @@
 //!
 //! * A controller begins at the instant of its request when the bus is idle, not at the next edge of its bit clock.
 //! * Propagation takes no time; resynchronisation is perfect for bit rates within 1 % and absent beyond.
-//! * A participant at another bit rate than the transmitter counts as ready when the transmitter is.
-//! * At most one overload frame follows a frame; a disturbed delimiter is waited out and not counted again.
+//! * A participant at another bit rate than the transmitter begins afresh with each frame, and delays the next one
+//!   by its error flag only.
+//! * At most one overload frame follows a frame and none an error frame; a disturbed delimiter is waited out and
+//!   not counted again.
 
 mod babbler;
 mod bits;

@@ -34,13 +34,18 @@ impl Receiver {
         Receiver { bits: BitString::default(), last: RECESSIVE, run: 0, tail: None }
     }
 
+    /// Whether it has seen a start of frame.
+    pub(crate) fn is_inside(&self) -> bool {
+        self.bits.len > 0
+    }
+
     /// Takes the next bit.
     pub(crate) fn feed(&mut self, level: Level) -> Seen {
         if let Some(n) = self.tail {
             self.tail = Some(n + 1);
             return self.feed_tail(n, level);
         }
-        if self.bits.len == 0 && level == RECESSIVE {
+        if !self.is_inside() && level == RECESSIVE {
             return Seen::Nothing;
         }
         let stuffed = self.run == STUFF_RUN;

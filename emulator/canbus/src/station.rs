@@ -46,7 +46,9 @@ pub(crate) struct Station {
     phase: Phase,
     drive: Level,
     report: Option<ErrorReport>,
+    /// No overload flag comes any more: one was sent, or the frame was faulty.
     overloaded: bool,
+    resumed: bool,
 }
 
 impl Station {
@@ -62,6 +64,7 @@ impl Station {
             drive,
             report: None,
             overloaded: false,
+            resumed: false,
         }
     }
 
@@ -72,6 +75,16 @@ impl Station {
 
     pub(crate) fn is_done(&self) -> bool {
         self.phase == Phase::Done
+    }
+
+    /// Whether its dominant error flag is on the wire or may still come.
+    pub(crate) fn threatens(&self) -> bool {
+        let active = matches!(self.attachment, Attachment::Active { .. });
+        active
+            && match self.phase {
+                Phase::Frame => self.sending.is_some() || self.receiver.is_inside(),
+                phase => matches!(phase, Phase::ActiveFlag { .. }),
+            }
     }
 
     /// Gives up the error report that waits for the end of others' flags.
@@ -102,7 +115,10 @@ impl Station {
                 self.sample_intermission(left, level);
                 None
             }
-            Phase::Done => None,
+            Phase::Done => {
+                self.sample_idle(level);
+                None
+            }
         }
     }
 
@@ -171,13 +187,15 @@ impl Station {
     fn fail(&mut self, error: BusError) {
         let transmitting = self.sending.is_some();
         self.report = Some(ErrorReport { error, transmitting, dominant_in_flag: 0, dominant_after_flag: 0 });
+        self.overloaded = true;
         match self.attachment {
             Attachment::Passive { .. } => self.enter(Phase::PassiveFlag { run: 0, last: RECESSIVE }),
             _ => self.enter(Phase::ActiveFlag { left: FLAG_BITS }),
         }
     }
 
-    /// Begins an overload flag: no error, nothing is counted. Twice would be allowed; once keeps it finite.
+    /// Begins an overload flag, which even an error-passive station sends dominant: no error, nothing is counted.
+    /// Two would be allowed; one keeps it finite.
     fn overload(&mut self) {
         if self.overloaded {
             return self.enter(Phase::AfterFlag);
@@ -228,5 +246,16 @@ impl Station {
             return self.overload();
         }
         self.step(left, |left| Phase::Intermission { left }, Phase::Done);
+    }
+
+    /// Only the flag of a participant at another bit rate comes now: it looks like a start of frame. Once is enough.
+    fn sample_idle(&mut self, level: Level) {
+        if level == DOMINANT && !self.resumed {
+            self.resumed = true;
+            self.receiver = Receiver::new();
+            self.receiver.feed(level);
+            self.sending = None;
+            self.enter(Phase::Frame);
+        }
     }
 }

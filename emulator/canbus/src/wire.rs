@@ -50,6 +50,11 @@ impl Tap {
         self.began + Time(self.bit.0 / 8 * 7)
     }
 
+    /// Whether the next frame has to wait for it. A station at another rate can delay it by a flag only.
+    fn is_busy(&self, bit: Time) -> bool {
+        if self.bit == bit { !self.station.is_done() } else { self.station.threatens() }
+    }
+
     fn level_at(&self, at: Time) -> Level {
         if at < self.began { self.drove } else { self.drives }
     }
@@ -62,11 +67,13 @@ impl Tap {
     fn sample(&mut self, wire: Level, flips: &[Flip]) -> Option<(Time, Notice)> {
         let flipped = flips.iter().any(|flip| flip.bit == self.number && self.is_hit_by(flip));
         let notice = self.station.sample(wire ^ flipped);
+        // An error is reported for the instant at which the last flag has ended, the rest for the end of its bit.
+        let began = self.began;
         self.began += self.bit;
         self.number += 1;
         self.drove = self.drives;
         self.drives = self.station.drives();
-        notice.map(|notice| (self.began, notice))
+        notice.map(|notice| (if matches!(notice, Notice::Error(_)) { began } else { self.began }, notice))
     }
 
     fn is_hit_by(&self, flip: &Flip) -> bool {
@@ -96,12 +103,12 @@ pub(crate) struct Course {
     pub(crate) end: Time,
 }
 
-/// Runs the wire from the start of frame at `start` until every station at the rate `bit` is ready for the next
+/// Runs the wire from the start of frame at `start` until the stations at the rate `bit` are ready for the next
 /// frame. `flips` are the bits that some of them read inverted.
 pub(crate) fn run(taps: &mut [Tap], start: Time, bit: Time, flips: &[Flip]) -> Course {
     let mut course = Course { happenings: Vec::new(), recessive: start, end: start };
     taps.iter_mut().for_each(|tap| tap.began = start);
-    while taps.iter().any(|tap| tap.bit == bit && !tap.station.is_done()) {
+    while taps.iter().any(|tap| tap.is_busy(bit)) {
         let Some(at) = taps.iter().map(Tap::sample_point).min() else { break };
         let dominant =
             taps.iter().filter(|tap| tap.level_at(at) == DOMINANT).map(|tap| tap.holds_until(at)).max();
@@ -117,7 +124,7 @@ pub(crate) fn run(taps: &mut [Tap], start: Time, bit: Time, flips: &[Flip]) -> C
     course
 }
 
-/// A station at another rate may still wait for the end of a flag. The next frame overtakes it: it reports now.
+/// A station at another rate may still be in its flag or delimiter. The next frame overtakes it: it reports now.
 fn finish(taps: &mut [Tap], course: &mut Course) {
     for (n, tap) in taps.iter_mut().enumerate() {
         let report = tap.station.take_report();

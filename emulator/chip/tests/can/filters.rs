@@ -145,6 +145,8 @@ fn any_bank() -> impl Strategy<Value = Bank> {
 }
 
 proptest! {
+    #![proptest_config(fixed())]
+
     #[test]
     fn filters_agree_with_the_model(
         banks in prop::collection::vec(any_bank(), 28),

@@ -2,6 +2,7 @@
 
 use canbus::{Bus, Controller, Event, Frame, HostNode, Id, StandardId, Time};
 use chip::can::DualCan;
+use proptest::test_runner::{Config, RngSeed};
 
 pub(crate) const MCR: u32 = 0x00;
 pub(crate) const MSR: u32 = 0x04;
@@ -44,6 +45,11 @@ pub(crate) fn bank(n: u32, half: u32) -> u32 {
 
 pub(crate) fn standard(id: u16, data: &[u8]) -> Frame {
     Frame::data(StandardId::new(id).unwrap(), data).unwrap()
+}
+
+/// The same cases in every run of a property test.
+pub(crate) fn fixed() -> Config {
+    Config { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::default() }
 }
 
 /// Some chips, some host nodes, and the bus between them.

@@ -153,6 +153,8 @@ fn a_request_asks_for_a_look_at_the_bus() {
 }
 
 proptest! {
+    #![proptest_config(fixed())]
+
     #[test]
     fn mailboxes_go_by_identifier_and_then_by_number(ids in prop::array::uniform3(1_u16..4)) {
         let mut rig = blocked(0);
