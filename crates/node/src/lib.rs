@@ -1,13 +1,22 @@
 //! One CANopen sensor node: everything that is its state, in two values that two priorities of the firmware own.
+//!
+//! [`Protocol`] is the CANopen device, [`Measurement`] the sampling chain. A [`Snapshot`] goes from the second to the
+//! first once a millisecond, [`Parameters`] go back when they have changed; each is one consistent set of values.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
+mod faults;
+mod flags;
 mod measurement;
+pub mod pressure;
+mod profile;
 mod protocol;
 mod setup;
 mod signal;
 
+pub use canopen::emcy::Fault;
+pub use canopen::nmt::State;
 pub use canopen::{Frame, Instant, NodeId, QueueFull, Transmit};
 pub use measurement::{Measurement, Parameters, Snapshot};
 pub use profiles::pressure::{FactoryCalibration, RawSample};

@@ -1,18 +1,26 @@
 //! The sampling half: one raw sample in, one snapshot out, a thousand times a second.
 
-use profiles::pressure::RawSample;
+use profiles::pressure::{self, RawSample, Transmitter};
 
 /// All parameters of the measurement, as one consistent set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Parameters {}
+pub struct Parameters {
+    /// Of the pressure and temperature channels.
+    pub pressure: pressure::Parameters,
+}
 
 /// All measured values of one millisecond, as one consistent set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Snapshot {}
+pub struct Snapshot {
+    /// Of the pressure and temperature channels.
+    pub pressure: pressure::Snapshot,
+}
 
 /// The measurement chain and its state.
-#[derive(Debug, Default)]
-pub struct Measurement {}
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Measurement {
+    pressure: Transmitter,
+}
 
 impl Measurement {
     /// A chain with the default parameters.
@@ -23,12 +31,11 @@ impl Measurement {
 
     /// Takes over new parameters, from the next sample on.
     pub fn apply(&mut self, parameters: &Parameters) {
-        let _ = parameters;
+        self.pressure.apply(&parameters.pressure);
     }
 
     /// Processes the sums of one millisecond.
     pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
-        let _ = raw;
-        Snapshot::default()
+        Snapshot { pressure: self.pressure.sample(raw) }
     }
 }

@@ -1,78 +1,97 @@
 //! The protocol half: the CANopen device with everything it owns.
 
-use crate::{BusEvent, Parameters, Request, Setup, Snapshot};
-use canopen::{Frame, Instant, Transmit};
+use crate::profile::{IMAGE_SIZE, Profile};
+use crate::{Parameters, Personality, Request, Setup, Snapshot, flags, pressure};
+use canopen::nmt::State;
+use canopen::{Action, CanId, Device, Frame, Instant, Transmit};
+use profiles::pressure::Conditions;
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
+///
+/// A call that takes a frame, a snapshot or an event may move the next deadline: ask `poll_process` and
+/// `poll_services` afterwards. Where nothing is due, a poll is a comparison.
 #[derive(Debug)]
 pub struct Protocol {
-    setup: Setup,
+    pub(crate) device: Device<Profile, IMAGE_SIZE>,
+    /// As last published: most samples change nothing.
+    pub(crate) conditions: Conditions,
+    pub(crate) is_bus_off: bool,
 }
 
 impl Protocol {
     /// A node that has not started: it is silent and hears nothing until `start`.
     #[must_use]
     pub fn new(setup: &Setup) -> Protocol {
-        Protocol { setup: *setup }
+        let profile = Profile { setup: *setup, flags: flags::Flags::default() };
+        let device = Device::new(setup.personality.dictionary(), setup.node_id, profile);
+        Protocol { device, conditions: Conditions::default(), is_bus_off: false }
     }
 
     /// Initialises what the pending reset covers, then boots up. To be called once the bus is ready,
     /// and again for `Request::ResetCommunication`.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) {
-        let _ = now;
-        let bootup = Frame::new(0x700 | u16::from(self.setup.node_id.get()), &[0]);
-        let _ = bootup.map(|frame| out.send(frame));
+        self.device.start(now, out);
+    }
+
+    /// The NMT state.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.device.state()
     }
 
     /// A frame of FIFO 0: NMT, SYNC, RPDO, or a remote request for a TPDO.
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let _ = (frame, now, out.room());
+        self.device.on_process_frame(frame, now, out);
     }
 
     /// A frame of FIFO 1: everything else.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let _ = (frame, now, out.room());
+        self.device.on_service_frame(frame, now, out);
     }
 
     /// Takes the values of the last millisecond into the dictionary and sends what their change triggers.
     pub fn publish(&mut self, snapshot: &Snapshot, now: Instant, out: &mut impl Transmit) {
-        let _ = (snapshot, now, out.room());
+        pressure::publish(&snapshot.pressure, self.device.image_mut());
+        if self.conditions != snapshot.pressure.conditions {
+            self.take_conditions(snapshot.pressure.conditions, now, out);
+        }
+        self.device.changed(now, out);
     }
 
     /// Does what is due of PDO and SYNC timers. Returns the instant at which it wants to be called again.
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
-        let _ = (now, out.room());
-        Instant::NEVER
+        self.device.poll_process(now, out)
     }
 
     /// Does what is due of heartbeat, SDO and EMCY. Returns the instant at which it wants to be called again.
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
-        let _ = (now, out.room());
-        Instant::NEVER
+        self.device.poll_services(now, out)
     }
 
     /// The next thing that the firmware must do. To be asked after every call above until it is `None`.
     pub fn take_request(&mut self) -> Option<Request> {
-        None
+        Some(match self.device.take_action()? {
+            Action::ResetNode => Request::ResetNode,
+            Action::ResetCommunication => Request::ResetCommunication,
+            Action::Identifiers => Request::Filters,
+        })
     }
 
     /// The parameters for `Measurement::apply`, when they have changed since the last call (and after `start`).
     pub fn take_parameters(&mut self) -> Option<Parameters> {
-        None
+        let image = self.device.take_parameters_changed().then(|| self.device.image())?;
+        match self.device.application().setup.personality {
+            Personality::Pressure => Some(Parameters { pressure: pressure::parameters(image) }),
+        }
     }
 
     /// Identifiers for FIFO 0, data and remote frames.
     pub fn process_ids(&self) -> impl Iterator<Item = u16> {
-        core::iter::once(0)
+        self.device.process_ids().map(CanId::get)
     }
 
     /// Identifiers for FIFO 1.
     pub fn service_ids(&self) -> impl Iterator<Item = u16> {
-        core::iter::once(0x600 | u16::from(self.setup.node_id.get()))
-    }
-
-    /// Takes note of an event on the bus.
-    pub fn bus_event(&mut self, event: BusEvent, now: Instant, out: &mut impl Transmit) {
-        let _ = (event, now, out.room());
+        self.device.service_ids().map(CanId::get)
     }
 }

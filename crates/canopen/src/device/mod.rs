@@ -88,4 +88,15 @@ impl<A: Application, const N: usize> Device<A, N> {
     pub fn image_mut(&mut self) -> &mut [u8] {
         &mut self.core.image
     }
+
+    /// The application.
+    #[must_use]
+    pub fn application(&self) -> &A {
+        &self.core.application
+    }
+
+    /// The application, to change its state.
+    pub fn application_mut(&mut self) -> &mut A {
+        &mut self.core.application
+    }
 }

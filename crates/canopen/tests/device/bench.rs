@@ -1,0 +1,256 @@
+//! A device with a small dictionary, a queue that records, and a client that talks to it.
+
+use canopen::dictionary::{
+    self, Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Rule, Type,
+};
+use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response, Segment};
+use canopen::{Application, Device, Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+
+const fn parameter(index: u16, sub: u8, kind: Type) -> Object {
+    Object::new(index, sub, "", kind, Access::ReadWrite).saved(Group::Communication)
+}
+
+const fn value(index: u16, sub: u8, kind: Type) -> Object {
+    Object::new(index, sub, "", kind, Access::ReadOnly).mappable(Mapping::Tpdo)
+}
+
+const ROWS: &[Object] = &[
+    Object::new(0x1000, 0, "", Type::Unsigned32, Access::ReadOnly).value(0x0002_0194),
+    Object::new(0x1001, 0, "", Type::Unsigned8, Access::ReadOnly),
+    Object::new(0x1003, 0, "", Type::Unsigned8, Access::ReadWrite).rule(Rule::ErrorCount),
+    Object::new(0x1003, 1, "", Type::Unsigned32, Access::ReadOnly).rule(Rule::ErrorEntry),
+    Object::new(0x1003, 2, "", Type::Unsigned32, Access::ReadOnly).rule(Rule::ErrorEntry),
+    parameter(0x1005, 0, Type::Unsigned32).value(0x80).rule(Rule::SyncCobId),
+    Object::new(0x1008, 0, "", Type::VisibleString(32), Access::Const)
+        .default(DefaultValue::Text("a name of twenty-six chars")),
+    parameter(0x1014, 0, Type::Unsigned32).default(DefaultValue::NodeId(0x80)).rule(Rule::EmcyCobId),
+    parameter(0x1017, 0, Type::Unsigned16).value(1000).rule(Rule::HeartbeatTime),
+    Object::highest(0x1029, 2, ""),
+    parameter(0x1029, 1, Type::Unsigned8).limits(0, 254),
+    parameter(0x1029, 2, Type::Unsigned8).limits(0, 2),
+    Object::highest(0x1800, 5, ""),
+    parameter(0x1800, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x180)).rule(Rule::TpdoCobId),
+    parameter(0x1800, 2, Type::Unsigned8).value(255).rule(Rule::TpdoType),
+    parameter(0x1800, 3, Type::Unsigned16).rule(Rule::TpdoInhibit),
+    parameter(0x1800, 5, Type::Unsigned16).value(100).rule(Rule::TpdoEventTimer),
+    parameter(0x1A00, 0, Type::Unsigned8).limits(0, 4).value(1).rule(Rule::TpdoCount),
+    parameter(0x1A00, 1, Type::Unsigned32).value(0x6000_0120).rule(Rule::TpdoSlot),
+    parameter(0x1A00, 2, Type::Unsigned32).rule(Rule::TpdoSlot),
+    parameter(0x1A00, 3, Type::Unsigned32).rule(Rule::TpdoSlot),
+    parameter(0x1A00, 4, Type::Unsigned32).rule(Rule::TpdoSlot),
+    parameter(0x1F80, 0, Type::Unsigned32).rule(Rule::StartUp),
+    Object::highest(0x6000, 3, ""),
+    value(0x6000, 1, Type::Integer32),
+    value(0x6000, 2, Type::Integer16),
+    value(0x6000, 3, Type::Integer32),
+    Object::new(0x6100, 0, "", Type::Integer16, Access::ReadWrite).limits(-5, 5).saved(Group::Application),
+    Object::new(0x6101, 0, "", Type::Real32, Access::ReadWrite).saved(Group::Application),
+    Object::new(0x6102, 0, "", Type::Unsigned32, Access::WriteOnly).rule(Rule::Application(7)),
+    Object::new(0x6103, 0, "", Type::VisibleString(20), Access::ReadWrite).saved(Group::Application),
+];
+
+const SIZE: usize = dictionary::image_size(ROWS);
+const TABLE: [Object; ROWS.len()] = dictionary::gather(&[ROWS]);
+const ENTRIES: [Entry; ROWS.len()] = dictionary::compile(&TABLE);
+const DEFAULTS: [u8; SIZE] = dictionary::default_image(ROWS);
+const _: () = dictionary::check(ROWS);
+
+pub(crate) const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+
+/// The rows and their entries, for what compares them.
+pub(crate) fn rows() -> impl Iterator<Item = (&'static Object, &'static Entry)> {
+    ROWS.iter().zip(DICTIONARY.entries())
+}
+
+/// Takes 4711 and nothing else at its rule 7. Its 1F80h is as if it came from a store.
+pub(crate) struct Numbers {
+    pub(crate) start_up: u8,
+}
+
+impl Application for Numbers {
+    fn initialise(&mut self, image: &mut [u8]) {
+        DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);
+    }
+
+    fn write(&mut self, number: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        assert_eq!(number, 7);
+        if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+}
+
+/// A transmit queue that keeps all it gets, as long as it has room.
+pub(crate) struct Queue {
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) room: usize,
+}
+
+impl Transmit for Queue {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.room = self.room.checked_sub(1).ok_or(QueueFull)?;
+        self.frames.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        self.room
+    }
+}
+
+/// Node-ID of the device under test.
+pub(crate) const ID: u8 = 5;
+
+/// A device, its queue and the time.
+pub(crate) struct Bench {
+    pub(crate) device: Device<Numbers, SIZE>,
+    pub(crate) out: Queue,
+    pub(crate) now: Instant,
+}
+
+impl Bench {
+    /// A device that has booted and whose boot-up message is out of the way.
+    pub(crate) fn booted() -> Bench {
+        let mut bench = Bench::unstarted();
+        bench.start();
+        bench.take();
+        bench
+    }
+
+    pub(crate) fn operational() -> Bench {
+        let mut bench = Bench::booted();
+        bench.nmt(1);
+        bench.take();
+        bench
+    }
+
+    pub(crate) fn unstarted() -> Bench {
+        let device = Device::new(&DICTIONARY, NodeId::new(ID).unwrap(), Numbers { start_up: 0 });
+        Bench { device, out: Queue { frames: vec![], room: usize::MAX }, now: Instant(1_000_000) }
+    }
+
+    pub(crate) fn start(&mut self) {
+        self.device.start(self.now, &mut self.out);
+    }
+
+    /// All frames sent since the last call.
+    pub(crate) fn take(&mut self) -> Vec<Frame> {
+        std::mem::take(&mut self.out.frames)
+    }
+
+    /// Frames sent since the last call, as identifier and data.
+    pub(crate) fn sent(&mut self) -> Vec<(u16, Vec<u8>)> {
+        self.take().iter().map(|frame| (frame.id(), frame.data().to_vec())).collect()
+    }
+
+    /// Hands a frame to both halves, as filters would not.
+    pub(crate) fn receive(&mut self, frame: Frame) {
+        self.device.on_process_frame(&frame, self.now, &mut self.out);
+        self.device.on_service_frame(&frame, self.now, &mut self.out);
+        self.poll();
+    }
+
+    pub(crate) fn poll(&mut self) -> Instant {
+        let process = self.device.poll_process(self.now, &mut self.out);
+        process.min(self.device.poll_services(self.now, &mut self.out))
+    }
+
+    pub(crate) fn nmt(&mut self, command: u8) {
+        self.receive(Frame::new(0, &[command, ID]).unwrap());
+    }
+
+    pub(crate) fn sync(&mut self) {
+        self.receive(Frame::new(0x80, &[]).unwrap());
+    }
+
+    /// Lets time pass, from deadline to deadline as the firmware does.
+    pub(crate) fn run(&mut self, span: Duration) {
+        let end = self.now + span;
+        loop {
+            let due = self.poll().max(Instant(self.now.0 + 1));
+            if due > end {
+                self.now = end;
+                return;
+            }
+            self.now = due;
+        }
+    }
+
+    /// Runs and gives the instants at which frames with this identifier were sent, from now on.
+    pub(crate) fn times_of(&mut self, id: u16, span: Duration) -> Vec<u64> {
+        let (start, end) = (self.now, self.now + span);
+        let mut times = vec![];
+        loop {
+            let due = self.poll().max(Instant(self.now.0 + 1));
+            let sent = self.take().iter().filter(|frame| frame.id() == id).count();
+            times.extend(std::iter::repeat_n(self.now.0 - start.0, sent));
+            if due > end {
+                return times;
+            }
+            self.now = due;
+        }
+    }
+
+    pub(crate) fn set_value(&mut self, sub: u8, bytes: &[u8]) {
+        DICTIONARY.field(0x6000, sub).set(self.device.image_mut(), bytes);
+        self.device.changed(self.now, &mut self.out);
+    }
+
+    /// One SDO exchange.
+    pub(crate) fn ask(&mut self, request: Request) -> Option<Response> {
+        self.ask_raw(request.encode())
+    }
+
+    pub(crate) fn ask_raw(&mut self, request: [u8; 8]) -> Option<Response> {
+        let before = self.take();
+        self.receive(Frame::new(0x600 + u16::from(ID), &request).unwrap());
+        let id = 0x580 + u16::from(ID);
+        let (responses, others): (Vec<_>, Vec<_>) = self.take().into_iter().partition(|f| f.id() == id);
+        self.out.frames = before.into_iter().chain(others).collect();
+        assert!(responses.len() <= 1, "more than one response");
+        let data = responses.first()?.data().try_into().unwrap();
+        Some(Response::parse(data).expect("no valid response"))
+    }
+
+    /// Reads a value by whatever transfer the server chooses.
+    pub(crate) fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, u32> {
+        let at = Multiplexer { index, sub };
+        match self.ask(Request::Upload(at)).unwrap() {
+            Response::Uploaded(of, bytes) if of == at => Ok(bytes.as_slice().to_vec()),
+            Response::UploadSegmented(of, size) if of == at => Ok(self.read_segments(size)),
+            Response::Abort(of, code) if of == at => Err(code),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn read_segments(&mut self, size: u32) -> Vec<u8> {
+        let mut value = vec![];
+        for toggle in [false, true].into_iter().cycle() {
+            let Some(Response::UploadedSegment(Segment { toggle: t, last, data })) =
+                self.ask(Request::UploadSegment { toggle })
+            else {
+                panic!()
+            };
+            assert_eq!(t, toggle);
+            value.extend_from_slice(data.as_slice());
+            if last {
+                break;
+            }
+        }
+        assert_eq!(value.len(), size as usize);
+        value
+    }
+
+    /// Writes up to four bytes, expedited.
+    pub(crate) fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) -> Result<(), u32> {
+        let at = Multiplexer { index, sub };
+        let payload = Initiate::Expedited(Bytes::from_slice(bytes));
+        match self.ask(Request::Download(at, payload)).unwrap() {
+            Response::Downloaded(of) if of == at => Ok(()),
+            Response::Abort(of, code) if of == at => Err(code),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(crate) fn write32(&mut self, index: u16, sub: u8, value: u32) -> Result<(), u32> {
+        self.write(index, sub, &value.to_le_bytes())
+    }
+}

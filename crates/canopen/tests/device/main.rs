@@ -1,0 +1,10 @@
+//! The whole device, on a bench: a small dictionary, frames in and frames out.
+
+mod bench;
+mod emcy;
+mod heartbeat;
+mod mapping;
+mod nmt;
+mod robustness;
+mod sdo;
+mod tpdo;

@@ -1,0 +1,90 @@
+//! Anything may arrive at any time.
+
+use crate::bench::{Bench, ID};
+use canopen::nmt::State;
+use canopen::{Duration, Frame};
+use proptest::prelude::*;
+
+/// Identifiers that mean something to the node, most of the time.
+fn identifier() -> impl Strategy<Value = u16> {
+    prop_oneof![
+        4 => Just(0x600 + u16::from(ID)),
+        1 => Just(0x000),
+        1 => Just(0x080),
+        1 => Just(0x180 + u16::from(ID)),
+        1 => 0..=0x7FF_u16,
+    ]
+}
+
+/// SDO requests that hit an object of the dictionary, most of the time.
+fn payload() -> impl Strategy<Value = Vec<u8>> {
+    let entry =
+        prop::sample::select(crate::bench::rows().map(|(row, _)| (row.index, row.sub)).collect::<Vec<_>>());
+    let request = (any::<u8>(), entry, any::<[u8; 4]>()).prop_map(|(command, (index, sub), data)| {
+        let [low, high] = index.to_le_bytes();
+        vec![command, low, high, sub, data[0], data[1], data[2], data[3]]
+    });
+    let nmt = (prop::sample::select(vec![1, 2, 0x80, 0x81, 0x82, 7]), 0..8_u8).prop_map(|(c, n)| vec![c, n]);
+    prop_oneof![4 => request, 1 => nmt, 1 => prop::collection::vec(any::<u8>(), 0..=8)]
+}
+
+fn frame() -> impl Strategy<Value = Frame> {
+    (identifier(), payload(), prop::bool::weighted(0.1)).prop_map(|(id, data, remote)| {
+        let frame = if remote { Frame::remote(id, data.len() as u8) } else { Frame::new(id, &data) };
+        frame.unwrap()
+    })
+}
+
+/// What CiA 301 lets a node send in a state, by the function code of the frame.
+fn is_allowed(state: State, frame: &Frame, bench: &mut Bench) -> bool {
+    match frame.id() {
+        0x705 => true,
+        0x585 => state.has_services(),
+        _ if state == State::Stopped || state == State::Initialising => false,
+        // EMCY and PDO, wherever the dictionary has put them.
+        id => {
+            let emcy = bench.read(0x1014, 0).is_ok_and(|value| value[..2] == id.to_le_bytes());
+            emcy || state.has_pdos()
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_frame_in_any_state_is_answered_with_a_forbidden_one(
+        frames in prop::collection::vec((frame(), 0..3_000_u64), 1..60),
+        room in prop_oneof![Just(usize::MAX), 0..20_usize],
+    ) {
+        let mut bench = Bench::booted();
+        bench.out.room = room;
+        for (frame, pause) in frames {
+            let before = bench.device.state();
+            bench.receive(frame);
+            let after = bench.device.state();
+            if after == State::Initialising && pause % 2 == 0 {
+                bench.start();
+            }
+            bench.run(Duration(pause * 1_000));
+            for sent in bench.take() {
+                let states = [before, after, bench.device.state()];
+                prop_assert!(
+                    states.into_iter().any(|state| is_allowed(state, &sent, &mut bench)),
+                    "{sent:?} in {before:?} to {after:?}"
+                );
+            }
+        }
+    }
+
+    /// The two polls together never ask to be called again at once, or the processor would spin.
+    #[test]
+    fn the_next_deadline_is_later_than_now(frames in prop::collection::vec(frame(), 1..60), room in 0..10_usize) {
+        let mut bench = Bench::booted();
+        bench.out.room = room;
+        for frame in frames {
+            bench.receive(frame);
+            let due = bench.poll();
+            prop_assert!(due > bench.now, "{due:?} at {:?}", bench.now);
+            bench.now = bench.now + Duration(7);
+        }
+    }
+}

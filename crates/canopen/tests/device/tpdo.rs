@@ -1,0 +1,207 @@
+//! TPDOs: transmission types, timers, remote frames.
+
+use crate::bench::Bench;
+use canopen::{Duration, Frame};
+
+const TPDO: u16 = 0x185;
+const MS: Duration = Duration::from_millis(1);
+
+/// An operational device whose TPDO has this type, inhibit time (100 us) and event timer (ms).
+fn bench(transmission: u8, inhibit: u16, event: u16) -> Bench {
+    let mut bench = Bench::booted();
+    bench.write32(0x1800, 1, 0x8000_0185).unwrap();
+    bench.write(0x1800, 2, &[transmission]).unwrap();
+    bench.write(0x1800, 3, &inhibit.to_le_bytes()).unwrap();
+    bench.write(0x1800, 5, &event.to_le_bytes()).unwrap();
+    bench.write32(0x1800, 1, 0x0000_0185).unwrap();
+    bench.nmt(1);
+    bench
+}
+
+fn sent(bench: &mut Bench) -> Vec<Vec<u8>> {
+    bench.sent().into_iter().filter(|(id, _)| *id == TPDO).map(|(_, data)| data).collect()
+}
+
+fn request(bench: &mut Bench) {
+    bench.receive(Frame::remote(TPDO, 4).unwrap());
+}
+
+#[test]
+fn it_is_sent_on_entering_operational_and_by_its_event_timer() {
+    for transmission in [254, 255] {
+        let mut bench = bench(transmission, 0, 100);
+        assert_eq!(sent(&mut bench), [[0; 4]]);
+        bench.set_value(1, &[1, 2, 3, 4]);
+        assert_eq!(bench.times_of(TPDO, Duration::from_millis(350)), [100_000, 200_000, 300_000]);
+    }
+}
+
+#[test]
+fn leaving_operational_stops_it() {
+    let mut bench = bench(255, 0, 10);
+    bench.take();
+    bench.nmt(0x80);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(100)), []);
+    bench.nmt(1);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(25)), [0, 10_000, 20_000]);
+}
+
+#[test]
+fn a_start_command_in_operational_sends_nothing() {
+    let mut bench = bench(255, 0, 100);
+    bench.take();
+    bench.nmt(1);
+    assert_eq!(sent(&mut bench), [[0; 0]; 0]);
+}
+
+#[test]
+fn without_an_event_timer_every_change_is_sent() {
+    let mut bench = bench(255, 0, 0);
+    bench.take();
+    bench.set_value(1, &[0; 4]);
+    assert!(sent(&mut bench).is_empty());
+    bench.set_value(1, &[1, 0, 0, 0]);
+    bench.set_value(2, &[9, 9]);
+    assert_eq!(sent(&mut bench), [[1, 0, 0, 0]]);
+    bench.run(Duration::from_millis(5000));
+    assert!(sent(&mut bench).is_empty());
+}
+
+#[test]
+fn within_the_inhibit_time_changes_wait_and_the_newest_wins() {
+    let mut bench = bench(255, 50, 0);
+    assert_eq!(sent(&mut bench).len(), 1);
+    bench.set_value(1, &[1, 0, 0, 0]);
+    bench.run(MS);
+    bench.set_value(1, &[2, 0, 0, 0]);
+    assert!(sent(&mut bench).is_empty());
+    bench.run(Duration(3_999));
+    assert!(sent(&mut bench).is_empty());
+    bench.run(Duration(1));
+    assert_eq!(sent(&mut bench), [[2, 0, 0, 0]]);
+}
+
+#[test]
+fn the_inhibit_time_limits_the_event_timer() {
+    let mut bench = bench(255, 50, 1);
+    bench.take();
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(11)), [5_000, 10_000]);
+}
+
+#[test]
+fn types_1_to_240_count_syncs() {
+    for (transmission, syncs, expected) in [(1, 3, 3), (2, 5, 2), (240, 480, 2)] {
+        let mut bench = bench(transmission, 0, 0);
+        (0..syncs).for_each(|_| bench.sync());
+        assert_eq!(sent(&mut bench).len(), expected);
+    }
+}
+
+#[test]
+fn type_0_is_sent_with_the_sync_after_a_change() {
+    let mut bench = bench(0, 0, 0);
+    bench.sync();
+    assert_eq!(sent(&mut bench).len(), 1);
+    bench.sync();
+    assert!(sent(&mut bench).is_empty());
+    bench.set_value(1, &[7, 0, 0, 0]);
+    assert!(sent(&mut bench).is_empty());
+    bench.sync();
+    assert_eq!(sent(&mut bench), [[7, 0, 0, 0]]);
+}
+
+#[test]
+fn synchronous_types_ignore_event_timer_and_remote_frames() {
+    let mut bench = bench(1, 0, 5);
+    request(&mut bench);
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(50)), []);
+}
+
+#[test]
+fn type_252_sends_on_request_what_the_sync_sampled() {
+    let mut bench = bench(252, 0, 0);
+    request(&mut bench);
+    assert!(sent(&mut bench).is_empty());
+    bench.set_value(1, &[1, 0, 0, 0]);
+    bench.sync();
+    bench.set_value(1, &[2, 0, 0, 0]);
+    assert!(sent(&mut bench).is_empty());
+    request(&mut bench);
+    assert_eq!(sent(&mut bench), [[1, 0, 0, 0]]);
+}
+
+#[test]
+fn type_253_samples_and_sends_on_request() {
+    let mut bench = bench(253, 0, 0);
+    bench.sync();
+    bench.set_value(1, &[2, 0, 0, 0]);
+    assert!(sent(&mut bench).is_empty());
+    request(&mut bench);
+    assert_eq!(sent(&mut bench), [[2, 0, 0, 0]]);
+}
+
+#[test]
+fn event_types_answer_a_remote_frame_unless_it_is_forbidden() {
+    let mut bench = bench(255, 0, 0);
+    bench.take();
+    request(&mut bench);
+    assert_eq!(sent(&mut bench).len(), 1);
+    bench.write32(0x1800, 1, 0x4000_0185).unwrap();
+    bench.take();
+    request(&mut bench);
+    assert!(sent(&mut bench).is_empty());
+}
+
+#[test]
+fn remote_frames_and_syncs_outside_operational_are_ignored() {
+    let mut bench = bench(253, 0, 0);
+    bench.nmt(0x80);
+    bench.take();
+    request(&mut bench);
+    bench.sync();
+    assert_eq!(bench.sent(), []);
+}
+
+#[test]
+fn a_remote_frame_with_the_identifier_of_sync_is_no_sync() {
+    let mut bench = bench(1, 0, 0);
+    bench.receive(Frame::remote(0x80, 0).unwrap());
+    assert!(sent(&mut bench).is_empty());
+}
+
+#[test]
+fn sync_follows_its_cob_id() {
+    let mut bench = bench(1, 0, 0);
+    for refused in [0x4000_0080, 0x2000_0080, 0x880, 0x000, 0x601] {
+        assert_eq!(bench.write32(0x1005, 0, refused), Err(0x0609_0030));
+    }
+    bench.write32(0x1005, 0, 0x8000_0090).unwrap();
+    assert!(bench.device.process_ids().any(|id| id.get() == 0x90));
+    bench.sync();
+    assert!(sent(&mut bench).is_empty());
+    bench.receive(Frame::new(0x90, &[]).unwrap());
+    assert_eq!(sent(&mut bench).len(), 1);
+}
+
+#[test]
+fn a_full_queue_is_tried_again_with_the_values_of_then() {
+    let mut bench = bench(1, 0, 0);
+    bench.out.room = 0;
+    bench.set_value(1, &[1, 0, 0, 0]);
+    bench.sync();
+    bench.set_value(1, &[2, 0, 0, 0]);
+    bench.out.room = 1;
+    bench.run(MS);
+    assert_eq!(sent(&mut bench), [[2, 0, 0, 0]]);
+    bench.run(Duration::from_millis(50));
+    assert!(sent(&mut bench).is_empty());
+}
+
+#[test]
+fn an_event_timer_changed_in_operational_starts_over() {
+    let mut bench = bench(255, 0, 100);
+    bench.run(Duration::from_millis(50));
+    bench.write(0x1800, 5, &[20, 0]).unwrap();
+    bench.take();
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(45)), [20_000, 40_000]);
+}

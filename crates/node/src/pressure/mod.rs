@@ -1,0 +1,26 @@
+//! The pressure transmitter: its dictionary, and how measured values and parameters come in and out of it.
+
+mod communication;
+mod manufacturer;
+mod profile;
+mod rules;
+mod values;
+
+pub(crate) use rules::write;
+pub(crate) use values::{parameters, publish};
+
+use canopen::dictionary::{self, Dictionary, Entry, Object};
+
+/// The table: everything there is to say about every object, sorted.
+pub const OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
+
+const PARTS: &[&[Object]] = &[communication::OBJECTS, manufacturer::OBJECTS, profile::OBJECTS];
+const ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
+const DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
+const _: () = dictionary::check(&OBJECTS);
+
+/// Bytes of the image of all values.
+pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
+
+/// The dictionary as the node runs it.
+pub(crate) const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);

@@ -1,0 +1,51 @@
+//! The application of the CANopen device: what the personality adds to it.
+
+use crate::flags::Flags;
+use crate::{Personality, REVISION, Setup, VENDOR_ID, pressure};
+use canopen::Application;
+use canopen::dictionary::{Dictionary, Entry};
+use canopen::sdo::Abort;
+
+/// Large enough for the values of every personality.
+pub(crate) const IMAGE_SIZE: usize = pressure::IMAGE_SIZE;
+
+impl Personality {
+    /// The dictionary that the node runs.
+    pub(crate) fn dictionary(self) -> &'static Dictionary {
+        match self {
+            Personality::Pressure => &pressure::DICTIONARY,
+        }
+    }
+}
+
+/// The personality at work.
+#[derive(Debug)]
+pub(crate) struct Profile {
+    pub(crate) setup: Setup,
+    pub(crate) flags: Flags,
+}
+
+impl Application for Profile {
+    fn initialise(&mut self, image: &mut [u8]) {
+        let setup = &self.setup;
+        let dictionary = setup.personality.dictionary();
+        let mut set = |index, sub, bytes: &[u8]| {
+            if let Ok(entry) = dictionary.find(index, sub) {
+                entry.field().set(image, bytes);
+            }
+        };
+        set(0x1009, 0, setup.hardware_version.as_bytes());
+        set(0x100A, 0, setup.software_version.as_bytes());
+        set(0x1018, 1, &VENDOR_ID.to_le_bytes());
+        set(0x1018, 2, &setup.personality.product_code().to_le_bytes());
+        set(0x1018, 3, &REVISION.to_le_bytes());
+        set(0x1018, 4, &setup.serial_number.to_le_bytes());
+        self.flags.store(image);
+    }
+
+    fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        match self.setup.personality {
+            Personality::Pressure => pressure::write(number, entry, bytes, image),
+        }
+    }
+}
