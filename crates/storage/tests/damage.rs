@@ -71,11 +71,25 @@ impl Device {
         replay(&mut self.saves.iter())
     }
 
-    /// Damages a copy and checks what is read from it, before and after it was mended.
+    /// Damages a copy and checks what is read from it.
     fn check(&self, honest: bool, damage: impl FnOnce(&mut Flash)) -> [Health; 4] {
         let mut flash = self.flash.clone();
         damage(&mut flash);
-        let (model, health) = read(&mut flash, PAGES);
+        self.check_read(&mut flash, honest).1
+    }
+
+    /// The same, and that a start mends it.
+    fn check_and_mend(&self, honest: bool, damage: impl FnOnce(&mut Flash)) {
+        let mut flash = self.flash.clone();
+        damage(&mut flash);
+        let (model, _) = self.check_read(&mut flash, honest);
+        let changes = vec![set(Group::Device, 77, 4)];
+        start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
+        assert_eq!(read_good(&mut flash, PAGES), after(&model, &changes), "mended");
+    }
+
+    fn check_read(&self, flash: &mut Flash, honest: bool) -> (Model, [Health; 4]) {
+        let (model, health) = read(flash, PAGES);
         assert!(self.explainable.contains(&model), "{model:?} was never saved");
         for ((value, newest), health) in model.iter().zip(&self.newest()).zip(health) {
             match health {
@@ -84,10 +98,7 @@ impl Device {
                 Health::Lost => assert_eq!(*value, None),
             }
         }
-        let mut store = start(&mut flash, PAGES).unwrap();
-        store.save(&as_changes(&vec![set(Group::Device, 77, 4)])).unwrap();
-        assert_eq!(read_good(&mut flash, PAGES), after(&model, &vec![set(Group::Device, 77, 4)]), "mended");
-        health
+        (model, health)
     }
 }
 
@@ -98,6 +109,9 @@ fn any_flipped_bit_of_either_page_is_noticed_or_harmless() {
         for bit in 0..1024 * 8 {
             let health = device.check(true, |flash| flash.disturb(bit / 8, |byte| byte ^ 1 << (bit % 8)));
             doubtful += u32::from(health != [Health::Good; 4]);
+        }
+        for byte in 0..1024 {
+            device.check_and_mend(true, |flash| flash.disturb(byte, |byte| byte ^ 0x10));
         }
         println!("of 8192 flipped bits {doubtful} made a group doubtful");
         assert!(doubtful > 500);
@@ -126,7 +140,7 @@ fn a_damaged_first_save_of_the_only_page_costs_only_what_no_later_save_holds() {
 #[test]
 fn an_overwritten_stretch_is_noticed_or_harmless() {
     for device in [Device::on_one_page(), Device::just_moved()] {
-        for seed in 0..4000 {
+        for seed in 0..2000 {
             let random = splitmix(seed).to_le_bytes();
             let (at, len) =
                 (usize::from(u16::from_le_bytes([random[0], random[1]])) % 1024, usize::from(random[2]) % 64);
@@ -136,7 +150,7 @@ fn an_overwritten_stretch_is_noticed_or_harmless() {
                 _ => 0xFF,
             };
             // Cells that return to the erased value look like a save that was cut: older, but still whole.
-            device.check(seed % 3 != 2, |flash| {
+            device.check_and_mend(seed % 3 != 2, |flash| {
                 (at..1024.min(at + len))
                     .enumerate()
                     .for_each(|(index, at)| flash.disturb(at, |_| fill(index)));
@@ -185,10 +199,24 @@ fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
     let page = Device::new(vec![first.clone()]).flash.bytes();
     let copy = vec![(Group::Application, Some((3, page[8..100].to_vec())))];
     let device = Device::new(vec![first, vec![set(Group::Device, 2, 4)], copy]);
-    // With the head of the last transaction damaged the search for the next one passes through the value.
-    for at in 0..1024 {
-        device.check(true, |flash| flash.disturb(at, |byte| byte ^ 0x81));
+    let before = replay(&mut device.saves[..2].iter());
+    // The copying save is at 100. With its generation or length damaged the search for the next one enters the value.
+    for at in 104..112 {
+        let mut flash = device.flash.clone();
+        flash.disturb(at, |byte| byte ^ 0x81);
+        assert_eq!(read(&mut flash, PAGES), (before.clone(), [Health::FellBack; 4]));
     }
+}
+
+#[test]
+fn the_closing_mark_of_a_move_is_not_needed_once_the_old_page_says_that_it_was_left() {
+    let device = Device::just_moved();
+    let bytes = device.flash.bytes();
+    let words = usize::from(u16::from_le_bytes([bytes[512 + 16], bytes[512 + 17]]));
+    let closing_mark = 512 + 8 + 12 + words * 4 + 4;
+    assert_eq!(bytes[closing_mark..][..4], [0; 4]);
+    let health = device.check(true, |flash| flash.disturb(closing_mark, |byte| byte ^ 1));
+    assert_eq!(health, [Health::Good; 4]);
 }
 
 /// A flash that the test can reach while a store has it.
