@@ -98,6 +98,11 @@ proptest! {
         prop_assert_eq!(a.backlog(), 0);
     }
 
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..fixed() })]
+
     #[test]
     fn contenders_go_in_the_order_of_their_identifiers(
         frames in prop::collection::hash_map(any_frame().prop_map(|frame| frame.arbitration()), any_frame(), 2..40)

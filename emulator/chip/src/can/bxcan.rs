@@ -1,13 +1,19 @@
-//! One bxCAN: registers, operating modes, clock.
+//! One bxCAN: its registers, clock and interrupt lines.
 
-use canbus::{ErrorState, Frame, Monitor, Time, frame_bits};
+mod loop_back;
+mod modes;
+
+use canbus::{ErrorState, Frame, Monitor, Time};
+
+use self::loop_back::Loop;
+use self::modes::Mode;
 
 use super::fifo::Fifo;
 use super::filter::FilterBanks;
 use super::mailbox::Registers;
 use super::status::Status;
 use super::transmit::Transmitter;
-use crate::register::{bit, field, flag};
+use crate::register::{bit, field};
 
 const MCR: u32 = 0x00;
 const MSR: u32 = 0x04;
@@ -53,21 +59,6 @@ pub struct Lines {
     pub rx1: bool,
     /// Error and status change.
     pub sce: bool,
-}
-
-/// The mode that CAN_MSR acknowledges.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mode {
-    Sleep,
-    Initialisation,
-    Normal,
-}
-
-/// A frame that goes round inside in loop-back mode.
-#[derive(Clone, Copy, Debug)]
-struct Loop {
-    frame: Frame,
-    end: Time,
 }
 
 /// A bxCAN peripheral at register level.
@@ -241,52 +232,6 @@ impl BxCan {
         bit(self.timing, LBKM)
     }
 
-    /// Whether it takes part in the traffic of the bus.
-    pub(super) fn is_on_bus(&self) -> bool {
-        self.mode == Mode::Normal && !self.loops_back() && self.clock > 0 && !self.status.is_bus_off()
-    }
-
-    /// Since when it has been on the bus, or when it will be if the wire stays as it is.
-    pub(super) fn joins_at(&self) -> Option<Time> {
-        let on_way = self.monitor.is_waiting() && !self.loops_back() && self.clock > 0;
-        // The wait to leave initialisation while bus-off is followed by another one.
-        let last = self.mode == Mode::Normal || !self.status.is_bus_off();
-        (self.is_on_bus() || on_way && last).then(|| self.monitor.ready(self.bit()))
-    }
-
-    /// INAK, SLAK, TXM, RXM and the recessive input.
-    fn mode_status(&self) -> u32 {
-        let transmitting = self.transmitter.is_transmitting();
-        let receiving = self.is_on_bus() && self.monitor.is_busy() && !transmitting;
-        flag(self.mode == Mode::Initialisation, 0)
-            | flag(self.mode == Mode::Sleep, 1)
-            | flag(transmitting, 8)
-            | flag(receiving, 9)
-            | 0b11 << 10
-    }
-
-    fn write_control(&mut self, value: u32, now: Time) {
-        self.poke = true;
-        if bit(value, RESET) {
-            return self.master_reset();
-        }
-        self.control = value & MCR_WRITABLE;
-        self.follow_requests(now);
-    }
-
-    /// MCR.RESET: sleep mode, with the mailboxes empty. Bit timing, interrupt enables and filters stay.
-    fn master_reset(&mut self) {
-        let enable = self.status.enable;
-        self.status = Status::default();
-        self.status.write_enable(enable);
-        self.control = MCR_RESET;
-        self.mode = Mode::Sleep;
-        self.monitor.cancel();
-        self.looped = None;
-        self.transmitter = Transmitter::default();
-        self.fifos = Default::default();
-    }
-
     /// BTR is write protected outside of initialisation mode.
     fn write_timing(&mut self, value: u32) {
         if self.mode == Mode::Initialisation {
@@ -302,78 +247,6 @@ impl BxCan {
         Some(())
     }
 
-    /// Moves towards the mode that INRQ and SLEEP ask for (RM0390, bxCAN operating modes).
-    pub(super) fn follow_requests(&mut self, now: Time) {
-        match (self.is_set(INRQ), self.is_set(SLEEP)) {
-            // To leave sleep mode for initialisation, software has to clear SLEEP as well.
-            (true, true) if self.mode == Mode::Sleep => {}
-            (true, _) => self.stop(Mode::Initialisation),
-            (false, true) => self.stop(Mode::Sleep),
-            (false, false) if self.mode == Mode::Normal => self.recover(now),
-            (false, false) if !self.monitor.is_waiting() => self.monitor.wait(1, now),
-            (false, false) => {}
-        }
-    }
-
-    /// Leaves the bus, as soon as the frame on the wire has ended.
-    fn stop(&mut self, mode: Mode) {
-        let in_frame = self.is_on_bus() && self.monitor.is_busy() || self.looped.is_some();
-        if in_frame || self.mode == mode && !self.monitor.is_waiting() {
-            return;
-        }
-        self.monitor.cancel();
-        if self.mode == Mode::Sleep {
-            self.status.awake();
-        }
-        if mode == Mode::Sleep && self.mode != Mode::Sleep {
-            self.status.asleep();
-        }
-        self.mode = mode;
-    }
-
-    /// In bus-off with ABOM the recovery begins by itself.
-    pub(super) fn recover(&mut self, now: Time) {
-        if self.status.is_bus_off() && self.is_set(ABOM) && !self.monitor.is_waiting() {
-            self.monitor.wait(Monitor::BUS_OFF_SEQUENCES, now);
-        }
-    }
-
-    /// The wait for recessive bits is over: on the bus, or out of bus-off.
-    fn synchronised(&mut self, now: Time) {
-        if self.mode == Mode::Normal {
-            return self.status.recovered();
-        }
-        self.mode = Mode::Normal;
-        self.status.awake();
-        // Software has set and cleared INRQ: that too begins the recovery.
-        if self.status.is_bus_off() {
-            self.monitor.wait(Monitor::BUS_OFF_SEQUENCES, now);
-        }
-        self.begin_loop(now);
-    }
-
-    /// In loop-back mode a frame goes round without the bus.
-    fn begin_loop(&mut self, at: Time) {
-        if self.mode != Mode::Normal || !self.loops_back() || self.looped.is_some() {
-            return;
-        }
-        let order = self.by_request_order();
-        if let Some(frame) = self.transmitter.scheduled(order, at) {
-            self.transmitter.begin(order, at);
-            self.looped = Some(Loop { frame, end: at + self.bit() * (frame_bits(&frame) - 3) });
-        }
-    }
-
-    fn end_loop(&mut self, looped: &Loop) {
-        self.transmitter.sent();
-        self.status.sent();
-        self.store(&looped.frame);
-        if self.is_set(INRQ) || self.is_set(SLEEP) {
-            self.follow_requests(looped.end);
-        }
-        self.begin_loop(looped.end + self.bit() * 3);
-    }
-
     /// Passes a frame through the filters into its FIFO.
     pub(super) fn store(&mut self, frame: &Frame) {
         self.status.received();
@@ -381,34 +254,6 @@ impl BxCan {
             let kept = self.fifos[found.fifo].store(Registers::of(frame, found.index), self.is_set(RFLM));
             self.reception.accepted += 1;
             self.reception.lost += u64::from(!kept);
-        }
-    }
-
-    /// A start of frame.
-    pub(super) fn hear_start(&mut self, transmitting: bool, at: Time) {
-        self.advance(at);
-        self.monitor.busy(at, self.bit());
-        if transmitting {
-            self.transmitter.begin(self.by_request_order(), at);
-        }
-        if self.mode == Mode::Sleep && self.is_set(SLEEP) {
-            self.wake(at);
-        }
-    }
-
-    fn wake(&mut self, at: Time) {
-        self.status.woken();
-        if self.is_set(AWUM) {
-            self.control &= !(1 << SLEEP);
-            self.follow_requests(at);
-        }
-    }
-
-    /// The wire is recessive until the next frame: a request to leave the bus can be followed now.
-    pub(super) fn hear_idle(&mut self, since: Time) {
-        self.monitor.idle(since);
-        if self.is_set(INRQ) || self.is_set(SLEEP) {
-            self.follow_requests(since);
         }
     }
 

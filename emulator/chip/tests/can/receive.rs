@@ -52,6 +52,8 @@ fn an_overrun_loses_the_newest_but_one_or_locked_the_newest() {
         assert_eq!(rig.read(0, RF0R), 3 | FULL | FOVR);
         rig.write(0, RF0R, FOVR | FULL);
         assert_eq!(drain(&mut rig, 0), kept);
+        let reception = rig.chips[0].can1.reception();
+        assert_eq!((reception.accepted, reception.lost), (5, 2));
     }
 }
 
