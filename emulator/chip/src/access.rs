@@ -6,11 +6,45 @@ use crate::lane::Lane;
 use crate::map::{self, Block, Unit};
 use crate::peripherals::BusFault;
 use crate::rcc::Rcc;
+use crate::signature;
 use crate::stm32f4::Stm32f4;
 use crate::unmodelled::{Direction, Reason};
 
+/// Why a write is not carried out.
+enum Refusal {
+    /// The register, or a setting of it, is not modelled.
+    NotModelled,
+    /// The peripheral answers with an error.
+    Bus,
+}
+
+/// The two CAN controllers share one block of registers.
+fn can_offset(index: usize, offset: u32) -> u32 {
+    index as u32 * 0x400 + offset
+}
+
 impl Stm32f4 {
-    /// A load by the core or by DMA.
+    /// A load by the core.
+    pub(crate) fn core_load(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
+        let unit = map::find(self.variant, address).ok_or(BusFault)?.unit;
+        self.refresh(unit, now);
+        self.load(address, size, now)
+    }
+
+    /// A store by the core.
+    pub(crate) fn core_store(
+        &mut self,
+        address: u32,
+        size: u8,
+        value: u32,
+        now: Time,
+    ) -> Result<(), BusFault> {
+        let unit = map::find(self.variant, address).ok_or(BusFault)?.unit;
+        self.refresh(unit, now);
+        self.store(address, size, value, now)
+    }
+
+    /// A load from a peripheral that is up to date.
     pub(crate) fn load(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
         let lane = Lane::of(address, size)?;
         let block = map::find(self.variant, address).ok_or(BusFault)?;
@@ -18,7 +52,7 @@ impl Stm32f4 {
         Ok(lane.extract(self.load_word(block, offset, now)))
     }
 
-    /// A store by the core or by DMA.
+    /// A store to a peripheral that is up to date.
     pub(crate) fn store(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault> {
         let lane = Lane::of(address, size)?;
         let block = map::find(self.variant, address).ok_or(BusFault)?;
@@ -32,8 +66,10 @@ impl Stm32f4 {
             _ if block.has_byte_lanes() => lane.insert(self.load_word(block, offset, now), value),
             _ => lane.repeat(value),
         };
-        if self.write_unit(block.unit, offset, word, now).is_none() {
-            self.note(block, offset, Direction::Write, Reason::NotModelled);
+        match self.write_unit(block.unit, offset, word, now) {
+            Err(Refusal::NotModelled) => self.note(block, offset, Direction::Write, Reason::NotModelled),
+            Err(Refusal::Bus) => return Err(BusFault),
+            Ok(()) => {}
         }
         Ok(())
     }
@@ -62,36 +98,90 @@ impl Stm32f4 {
         match unit {
             Unit::Rcc => self.rcc.read(offset, now),
             Unit::Pwr => self.pwr.read(offset),
-            Unit::Flash => self.flash.read(offset),
-            Unit::Gpio(port) => self.ports[port].read(offset, self.outside[port]),
+            Unit::Flash => self.flash.read(offset, now),
+            Unit::Gpio(port) => self.ports[port].read(offset, self.outside(port, now)),
             Unit::Syscfg => self.syscfg.read(offset),
+            Unit::Exti => self.exti.read(offset),
             Unit::Dbgmcu => self.dbgmcu.read(offset),
-            Unit::Timer(index) => {
-                self.run_timer(index, now);
-                self.timers[index].read(offset)
-            }
+            Unit::Timer(index) => self.timers[index].read(offset),
+            Unit::Adc => self.adc.read(offset),
+            Unit::AdcCommon => self.adc_common.read(offset, self.adc.status()),
+            Unit::Dma(index) => self.dmas[index].read(offset),
+            Unit::Can(index) => self.can.read(can_offset(index, offset), now),
+            Unit::Spi(index) => self.spis[index].read(offset),
+            Unit::Iwdg => self.iwdg.read(offset, now),
+            Unit::Crc => self.crc.read(offset),
+            Unit::Signature => signature::read(self.variant, self.board.unique_id, offset),
             Unit::Absent => None,
         }
     }
 
-    /// `None` when the register, or a setting of it, is not modelled.
-    fn write_unit(&mut self, unit: Unit, offset: u32, value: u32, now: Time) -> Option<()> {
-        match unit {
+    fn write_unit(&mut self, unit: Unit, offset: u32, value: u32, now: Time) -> Result<(), Refusal> {
+        let done = match unit {
             Unit::Rcc => self.write_rcc(offset, value, now),
             Unit::Pwr => self.pwr.write(offset, value),
-            Unit::Flash => self.flash.write(offset, value),
+            Unit::Flash => {
+                self.flash.write(offset, value, now, &mut self.effects).map_err(|BusFault| Refusal::Bus)?
+            }
             Unit::Gpio(port) => self.ports[port].write(offset, value),
             Unit::Syscfg => self.syscfg.write(offset, value),
+            Unit::Exti => self.exti.write(offset, value),
             Unit::Dbgmcu => self.dbgmcu.write(offset, value),
+            Unit::Timer(index) => self.write_timer(index, offset, value, now),
+            Unit::Adc => self.write_adc(offset, value, now),
+            Unit::AdcCommon => self.write_adc_common(offset, value),
+            Unit::Dma(index) => self.dmas[index].write(offset, value),
+            Unit::Can(index) => self.can.write(can_offset(index, offset), value, now),
+            Unit::Spi(index) => self.spis[index].write(offset, value, now),
+            Unit::Iwdg => self.write_iwdg(offset, value, now),
+            Unit::Crc => self.crc.write(offset, value),
+            Unit::Signature | Unit::Absent => None,
+        };
+        done.ok_or(Refusal::NotModelled)
+    }
+
+    /// Brings what an access can see up to `now`.
+    fn refresh(&mut self, unit: Unit, now: Time) {
+        match unit {
             Unit::Timer(index) => {
+                self.convert(now);
                 self.run_timer(index, now);
-                self.timers[index].write(offset, value, now)
             }
-            Unit::Absent => None,
+            Unit::Adc | Unit::AdcCommon | Unit::Dma(_) => self.convert(now),
+            Unit::Spi(index) => self.run_spi(index, now),
+            Unit::Flash => self.flash.advance(now, &mut self.effects),
+            _ => {}
         }
+    }
+
+    fn write_timer(&mut self, index: usize, offset: u32, value: u32, now: Time) -> Option<()> {
+        let done = self.timers[index].write(offset, value, now);
+        self.pass_trigger(index, now);
+        done
+    }
+
+    fn write_adc(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
+        let done = self.adc.write(offset, value, now);
+        self.attach_trigger(now);
+        done
+    }
+
+    fn write_adc_common(&mut self, offset: u32, value: u32) -> Option<()> {
+        let done = self.adc_common.write(offset, value);
+        self.adc.set_cycle(self.adc_cycle());
+        done
+    }
+
+    fn write_iwdg(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
+        let done = self.iwdg.write(offset, value, now);
+        if self.iwdg.is_running() {
+            self.rcc.start_lsi(now);
+        }
+        done
     }
 
     fn write_rcc(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
+        self.catch_up(now);
         let done = self.rcc.write(offset, value, now);
         self.rcc.advance(now);
         self.update_clocks(now);

@@ -43,6 +43,19 @@ impl Clocks {
         times(self.hclk_cycle(), self.apb2_divider)
     }
 
+    /// PCLK1 in hertz.
+    pub fn pclk1(&self) -> u64 {
+        self.hclk / u64::from(self.apb1_divider)
+    }
+
+    /// One cycle of the clock of a bus.
+    pub(crate) fn apb_cycle(&self, bus: Apb) -> Time {
+        match bus {
+            Apb::One => self.pclk1_cycle(),
+            Apb::Two => self.pclk2_cycle(),
+        }
+    }
+
     /// One cycle of the clock of the timers on a bus (RM0390 section 6.2, RCC_DCKCFGR.TIMPRE).
     pub(crate) fn timer_cycle(&self, bus: Apb) -> Time {
         let divider = match bus {

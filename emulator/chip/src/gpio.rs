@@ -35,14 +35,14 @@ const OTHER: &[Plain] = port!(0, 0, 0);
 
 /// The levels that something outside of the chip puts on the pins of a port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Outside {
+pub(crate) struct Outside {
     driven: u16,
     levels: u16,
 }
 
 impl Outside {
     /// Drives one pin, or lets go of it.
-    pub fn set(&mut self, pin: u32, level: Option<bool>) {
+    pub(crate) fn set(&mut self, pin: u32, level: Option<bool>) {
         self.driven = self.driven & !(1 << pin) | u16::from(level.is_some()) << pin;
         self.levels = self.levels & !(1 << pin) | u16::from(level == Some(true)) << pin;
     }

@@ -18,7 +18,7 @@ impl Lane {
             4 => u32::MAX,
             _ => return Err(BusFault),
         };
-        let aligned = address % u32::from(size) == 0;
+        let aligned = address.is_multiple_of(u32::from(size));
         aligned.then_some(Self { shift: address % 4 * 8, mask }).ok_or(BusFault)
     }
 

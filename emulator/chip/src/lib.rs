@@ -1,26 +1,54 @@
-//! Register-level models of the STM32F4 peripherals that the node uses.
+//! Register-level models of the STM32F4 peripherals that the node uses, and of the world around them.
+//!
+//! [`Stm32f4`] is the chip without its core. A core drives it through [`Peripherals`]; the world reaches its
+//! [`can`] controllers, changes what its sensors see ([`plant`]) and breaks things.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `map`, `access`, `lane` | addresses: which peripheral answers, whether it is clocked, narrow accesses |
+//! | `stm32f4`, `schedule` | the peripherals together: time, interrupt lines, clocks, resets |
+//! | `converter`, `pins` | what crosses peripherals: timer to ADC to DMA to memory; encoder to timers and EXTI |
+//! | one file or folder each | the peripherals, which know nothing of each other |
+//! | `plant` | pressure, temperature, shaft, faults and the board's analogue front end |
+//!
+//! Nothing is stepped: a peripheral computes its state at the instant of an access from its state at the last one, and
+//! `deadline` tells when something can be seen without an access. An access that the models cannot answer as silicon
+//! would is on record: [`Stm32f4::unmodelled`].
 
 mod access;
+mod adc;
+mod board;
 pub mod can;
 mod clocks;
+mod converter;
+mod crc_unit;
 mod dbgmcu;
+mod dma;
+mod exti;
 mod flash;
 mod gpio;
+mod iwdg;
 mod lane;
 mod map;
 mod peripherals;
+mod pins;
+pub mod plant;
 mod pwr;
 mod rcc;
 mod register;
+mod schedule;
+mod signature;
+mod spi;
 mod stm32f4;
 mod syscfg;
 mod timer;
 mod unmodelled;
 mod variant;
 
+pub use board::{Board, SsiFormat};
 pub use clocks::Clocks;
+pub use flash::Flash;
 pub use peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
-pub use rcc::Rcc;
-pub use stm32f4::{Board, Stm32f4};
+pub use stm32f4::Stm32f4;
 pub use unmodelled::{Direction, Reason, Unmodelled};
 pub use variant::{FLASH_BASE, Variant};

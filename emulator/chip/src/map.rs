@@ -1,7 +1,9 @@
 //! Which peripheral is at which address (RM0390 table 1, RM0090 table 1) and what gates its clock.
 
 use crate::clocks::Apb;
+use crate::dma::{Line, line};
 use crate::rcc::Gate;
+use crate::signature;
 use crate::timer::Kind;
 use crate::variant::Variant;
 
@@ -17,6 +19,18 @@ pub(crate) enum Unit {
     Flash,
     Syscfg,
     Dbgmcu,
+    Exti,
+    Iwdg,
+    Adc,
+    AdcCommon,
+    /// 0 is DMA1.
+    Dma(usize),
+    /// 0 is CAN1.
+    Can(usize),
+    /// The index into `SPIS`.
+    Spi(usize),
+    Crc,
+    Signature,
     /// The chip has it, the emulator has not.
     Absent,
 }
@@ -81,6 +95,10 @@ impl Block {
 
 /// Every block, in the order of the addresses.
 const BLOCKS: &[Block] = &[
+    absent(0x1FFF_0000, "SYSTEM_MEMORY", None).size(0x7800),
+    absent(0x1FFF_7800, "OTP", None).size(0x210),
+    block(signature::BASE, "SIGNATURE", Unit::Signature, None).size(0x20),
+    absent(0x1FFF_C000, "OPTION_BYTES", None).size(0x10),
     block(0x4000_0000, "TIM2", Unit::Timer(0), Gate::apb1(0)),
     block(0x4000_0400, "TIM3", Unit::Timer(1), Gate::apb1(1)),
     block(0x4000_0800, "TIM4", Unit::Timer(2), Gate::apb1(2)),
@@ -92,10 +110,10 @@ const BLOCKS: &[Block] = &[
     block(0x4000_2000, "TIM14", Unit::Timer(11), Gate::apb1(8)),
     absent(0x4000_2800, "RTC", None),
     absent(0x4000_2C00, "WWDG", Gate::apb1(11)),
-    absent(0x4000_3000, "IWDG", None),
+    block(0x4000_3000, "IWDG", Unit::Iwdg, None),
     absent(0x4000_3400, "I2S2ext", Gate::apb1(14)).on(On::F405And407),
-    absent(0x4000_3800, "SPI2", Gate::apb1(14)),
-    absent(0x4000_3C00, "SPI3", Gate::apb1(15)),
+    block(0x4000_3800, "SPI2", Unit::Spi(1), Gate::apb1(14)),
+    block(0x4000_3C00, "SPI3", Unit::Spi(2), Gate::apb1(15)),
     absent(0x4000_4000, "I2S3ext", Gate::apb1(15)).on(On::F405And407),
     absent(0x4000_4000, "SPDIFRX", Gate::apb1(16)).on(On::F446),
     absent(0x4000_4400, "USART2", Gate::apb1(17)),
@@ -106,8 +124,8 @@ const BLOCKS: &[Block] = &[
     absent(0x4000_5800, "I2C2", Gate::apb1(22)),
     absent(0x4000_5C00, "I2C3", Gate::apb1(23)),
     absent(0x4000_6000, "FMPI2C1", Gate::apb1(24)).on(On::F446),
-    absent(0x4000_6400, "CAN1", Gate::apb1(25)),
-    absent(0x4000_6800, "CAN2", Gate::apb1(26)),
+    block(0x4000_6400, "CAN1", Unit::Can(0), Gate::apb1(25)),
+    block(0x4000_6800, "CAN2", Unit::Can(1), Gate::apb1(26)),
     absent(0x4000_6C00, "CEC", Gate::apb1(27)).on(On::F446),
     block(0x4000_7000, "PWR", Unit::Pwr, Gate::apb1(28)),
     absent(0x4000_7400, "DAC", Gate::apb1(29)),
@@ -115,15 +133,15 @@ const BLOCKS: &[Block] = &[
     absent(0x4001_0400, "TIM8", Gate::apb2(1)),
     absent(0x4001_1000, "USART1", Gate::apb2(4)),
     absent(0x4001_1400, "USART6", Gate::apb2(5)),
-    absent(0x4001_2000, "ADC1", Gate::apb2(8)).size(0x100),
+    block(0x4001_2000, "ADC1", Unit::Adc, Gate::apb2(8)).size(0x100),
     absent(0x4001_2100, "ADC2", Gate::apb2(9)).size(0x100),
     absent(0x4001_2200, "ADC3", Gate::apb2(10)).size(0x100),
-    absent(0x4001_2300, "ADC_Common", Gate::apb2(8)).size(0x100),
+    block(0x4001_2300, "ADC_Common", Unit::AdcCommon, Gate::apb2(8)).size(0x100),
     absent(0x4001_2C00, "SDIO", Gate::apb2(11)),
-    absent(0x4001_3000, "SPI1", Gate::apb2(12)),
-    absent(0x4001_3400, "SPI4", Gate::apb2(13)).on(On::F446),
+    block(0x4001_3000, "SPI1", Unit::Spi(0), Gate::apb2(12)),
+    block(0x4001_3400, "SPI4", Unit::Spi(3), Gate::apb2(13)).on(On::F446),
     block(0x4001_3800, "SYSCFG", Unit::Syscfg, Gate::apb2(14)),
-    absent(0x4001_3C00, "EXTI", None),
+    block(0x4001_3C00, "EXTI", Unit::Exti, None),
     block(0x4001_4000, "TIM9", Unit::Timer(6), Gate::apb2(16)),
     block(0x4001_4400, "TIM10", Unit::Timer(7), Gate::apb2(17)),
     block(0x4001_4800, "TIM11", Unit::Timer(8), Gate::apb2(18)),
@@ -138,12 +156,12 @@ const BLOCKS: &[Block] = &[
     block(0x4002_1800, "GPIOG", Unit::Gpio(6), Gate::ahb1(6)),
     block(0x4002_1C00, "GPIOH", Unit::Gpio(7), Gate::ahb1(7)),
     block(0x4002_2000, "GPIOI", Unit::Gpio(8), Gate::ahb1(8)).on(On::F405And407),
-    absent(0x4002_3000, "CRC", Gate::ahb1(12)),
+    block(0x4002_3000, "CRC", Unit::Crc, Gate::ahb1(12)),
     block(0x4002_3800, "RCC", Unit::Rcc, None),
     block(0x4002_3C00, "FLASH", Unit::Flash, None),
     absent(0x4002_4000, "BKPSRAM", Gate::ahb1(18)).size(4 * KIB),
-    absent(0x4002_6000, "DMA1", Gate::ahb1(21)),
-    absent(0x4002_6400, "DMA2", Gate::ahb1(22)),
+    block(0x4002_6000, "DMA1", Unit::Dma(0), Gate::ahb1(21)),
+    block(0x4002_6400, "DMA2", Unit::Dma(1), Gate::ahb1(22)),
     absent(0x4002_8000, "ETH", Gate::ahb1(25)).size(0x1400).on(On::F407),
     absent(0x4004_0000, "OTG_HS", Gate::ahb1(29)).size(0x4_0000),
     absent(0x5000_0000, "OTG_FS", Gate::ahb2(7)).size(0x4_0000),
@@ -163,7 +181,7 @@ pub(crate) fn find(variant: Variant, address: u32) -> Option<&'static Block> {
     candidates.filter(|block| block.on.has(variant)).find(|block| address - block.base < block.size)
 }
 
-/// The blocks that a reset bit of RCC, named by the enable bit beside it, resets.
+/// Every block of any chip.
 pub(crate) fn blocks() -> impl Iterator<Item = &'static Block> {
     BLOCKS.iter()
 }
@@ -193,4 +211,57 @@ pub(crate) const TIMERS: [TimerPlace; 12] = [
     timer(false, 2, Apb::One, 43),
     timer(false, 1, Apb::One, 44),
     timer(false, 1, Apb::One, 45),
+];
+
+/// Interrupt lines of the streams of DMA1 and DMA2 (RM0390 table 38).
+pub(crate) const DMA_IRQS: [[u8; 8]; 2] =
+    [[11, 12, 13, 14, 15, 16, 17, 47], [56, 57, 58, 59, 60, 68, 69, 70]];
+
+/// TX, RX0, RX1 and SCE of CAN1 and CAN2.
+pub(crate) const CAN_IRQS: [[u8; 4]; 2] = [[19, 20, 21, 22], [63, 64, 65, 66]];
+
+/// FLASH and ADC.
+pub(crate) const FLASH_IRQ: u8 = 4;
+pub(crate) const ADC_IRQ: u8 = 18;
+
+/// An SPI: its bus, its interrupt line and the DMA requests for its two directions (RM0390 tables 28 and 29).
+pub(crate) struct SpiPlace {
+    pub(crate) bus: Apb,
+    pub(crate) irq: u8,
+    /// 0 is DMA1.
+    pub(crate) dma: usize,
+    pub(crate) receive: [Line; 2],
+    pub(crate) transmit: [Line; 2],
+}
+
+/// SPI1 to SPI4.
+pub(crate) const SPIS: [SpiPlace; 4] = [
+    SpiPlace {
+        bus: Apb::Two,
+        irq: 35,
+        dma: 1,
+        receive: [line(0, 3), line(2, 3)],
+        transmit: [line(3, 3), line(5, 3)],
+    },
+    SpiPlace {
+        bus: Apb::One,
+        irq: 36,
+        dma: 0,
+        receive: [line(3, 0), line(3, 0)],
+        transmit: [line(4, 0), line(4, 0)],
+    },
+    SpiPlace {
+        bus: Apb::One,
+        irq: 51,
+        dma: 0,
+        receive: [line(0, 0), line(2, 0)],
+        transmit: [line(5, 0), line(7, 0)],
+    },
+    SpiPlace {
+        bus: Apb::Two,
+        irq: 84,
+        dma: 1,
+        receive: [line(0, 4), line(3, 5)],
+        transmit: [line(1, 4), line(4, 5)],
+    },
 ];

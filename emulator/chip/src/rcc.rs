@@ -115,7 +115,7 @@ const PINRSTF: u32 = 1 << 26;
 const HSI_HERTZ: u64 = 16_000_000;
 
 /// The reset and clock controller.
-pub struct Rcc {
+pub(crate) struct Rcc {
     variant: Variant,
     /// Frequency of the clock on OSC_IN; `None` without one.
     hse_hertz: Option<u64>,
@@ -163,7 +163,7 @@ impl Rcc {
     }
 
     /// Takes the clock on OSC_IN away (`None`) or gives one, from now on. Without it HSE never gets ready.
-    pub fn set_hse(&mut self, hertz: Option<u64>) {
+    pub(crate) fn set_hse(&mut self, hertz: Option<u64>) {
         self.hse_hertz = hertz;
         if hertz.is_none() {
             self.sources[HSE].ready = Time::NEVER;

@@ -4,14 +4,23 @@ use std::collections::VecDeque;
 
 use canbus::Time;
 
-use crate::clocks::Clocks;
+use crate::adc::{Adc, AdcCommon};
+use crate::board::Board;
+use crate::can::{BxCan, DualCan};
+use crate::clocks::{Clocks, times};
+use crate::crc_unit::CrcUnit;
 use crate::dbgmcu::Dbgmcu;
+use crate::dma::Dma;
+use crate::exti::Exti;
 use crate::flash::Flash;
 use crate::gpio::{Gpio, Outside};
-use crate::map::{self, TIMERS, Unit};
-use crate::peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
+use crate::iwdg::Iwdg;
+use crate::map::{SPIS, TIMERS};
+use crate::peripherals::{Effect, IrqLines};
+use crate::plant::Plant;
 use crate::pwr::Pwr;
 use crate::rcc::{Cause, Rcc};
+use crate::spi::{Spi, Ssi};
 use crate::syscfg::Syscfg;
 use crate::timer::Timer;
 use crate::unmodelled::{Record, Unmodelled};
@@ -20,56 +29,70 @@ use crate::variant::Variant;
 /// Ports GPIOA to GPIOI.
 pub(crate) const PORTS: usize = 9;
 
-/// What the board around the chip is made of.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Board {
-    /// Frequency of the clock on OSC_IN in hertz; `None` without one.
-    pub hse: Option<u64>,
-}
-
-impl Default for Board {
-    /// A NUCLEO-F446RE: 8 MHz from the ST-LINK.
-    fn default() -> Self {
-        Self { hse: Some(8_000_000) }
-    }
-}
-
-/// An STM32F4 without its core.
+/// An STM32F4 without its core, on its board.
 pub struct Stm32f4 {
     pub(crate) variant: Variant,
+    pub(crate) board: Board,
+    pub(crate) plant: Plant,
     pub(crate) rcc: Rcc,
     pub(crate) pwr: Pwr,
     pub(crate) flash: Flash,
     pub(crate) ports: [Gpio; PORTS],
+    /// Levels that a test drives.
     pub(crate) outside: [Outside; PORTS],
+    /// The last level of the encoder's index that was looked at.
+    pub(crate) index_level: bool,
     pub(crate) syscfg: Syscfg,
+    pub(crate) exti: Exti,
     pub(crate) dbgmcu: Dbgmcu,
     pub(crate) timers: [Timer; TIMERS.len()],
+    pub(crate) adc: Adc,
+    pub(crate) adc_common: AdcCommon,
+    pub(crate) dmas: [Dma; 2],
+    pub(crate) spis: [Spi; SPIS.len()],
+    pub(crate) can: DualCan,
+    pub(crate) iwdg: Iwdg,
+    pub(crate) crc: CrcUnit,
     pub(crate) clocks: Clocks,
     pub(crate) effects: VecDeque<Effect>,
     pub(crate) record: Record,
-    lines: IrqLines,
-    deadline: Time,
+    /// The reset that the chip itself has asked for.
+    pub(crate) asked: Option<Cause>,
+    pub(crate) lines: IrqLines,
+    pub(crate) deadline: Time,
 }
 
 impl Stm32f4 {
     /// A chip on a board, at power-on.
     pub fn new(variant: Variant, board: Board) -> Self {
+        let clocks = Clocks::RESET;
         let mut chip = Self {
             variant,
+            plant: Plant::new(board.encoder_lines),
             rcc: Rcc::new(variant, board.hse),
             pwr: Pwr::new(variant),
-            flash: Flash::new(),
+            flash: Flash::new(variant, board.write_protected),
             ports: std::array::from_fn(Gpio::new),
             outside: [Outside::default(); PORTS],
+            index_level: false,
             syscfg: Syscfg::new(),
+            exti: Exti::default(),
             dbgmcu: Dbgmcu::new(variant),
-            timers: timers(),
-            clocks: Clocks::RESET,
+            timers: TIMERS.each_ref().map(|place| Timer::new(place.kind, clocks.timer_cycle(place.bus))),
+            adc: Adc::new(times(clocks.pclk2_cycle(), AdcCommon::default().divider())),
+            adc_common: AdcCommon::default(),
+            dmas: Default::default(),
+            spis: SPIS.each_ref().map(|place| Spi::new(clocks.apb_cycle(place.bus), Ssi::new(board.ssi))),
+            can: DualCan::new(clocks.pclk1()),
+            iwdg: Iwdg::new(),
+            crc: CrcUnit::new(),
+            clocks,
             effects: VecDeque::new(),
             record: Record::default(),
+            asked: None,
             lines: IrqLines::default(),
             deadline: Time::NEVER,
+            board,
         };
         chip.announce_clock();
         chip
@@ -80,14 +103,14 @@ impl Stm32f4 {
         self.record.list()
     }
 
-    /// Takes the clock on OSC_IN away (`None`) or gives one, in hertz: the HSE is then dead or alive.
-    pub fn set_hse(&mut self, hertz: Option<u64>) {
-        self.rcc.set_hse(hertz);
-    }
-
     /// The clock tree as the program has set it.
     pub fn clocks(&self) -> Clocks {
         self.clocks
+    }
+
+    /// Takes the clock on OSC_IN away (`None`) or gives one, in hertz: the HSE is then dead or alive.
+    pub fn set_hse(&mut self, hertz: Option<u64>) {
+        self.rcc.set_hse(hertz);
     }
 
     /// The level that the program drives on a pin (port `'A'` to `'I'`, pin 0 to 15); `None` when it drives none.
@@ -96,111 +119,41 @@ impl Stm32f4 {
         self.ports.get(index)?.output(pin)
     }
 
-    /// Lets everything due up to `now` happen.
-    pub(crate) fn pass(&mut self, now: Time) {
-        if now < self.deadline {
-            return;
-        }
-        self.rcc.advance(now);
-        self.update_clocks(now);
-        for index in 0..self.timers.len() {
-            self.run_timer(index, now);
-        }
-        self.settle();
+    /// What the sensors measure.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
     }
 
-    pub(crate) fn run_timer(&mut self, index: usize, now: Time) {
-        self.timers[index].run(now, 0);
+    /// What the sensors measure, to change it at `now`: everything before is measured as it was.
+    pub fn plant_mut(&mut self, now: Time) -> &mut Plant {
+        self.catch_up(now);
+        // What is due next depends on the change: look again at once.
+        self.deadline = now;
+        &mut self.plant
     }
 
-    /// After a change: what is due next, and which lines are up.
-    pub(crate) fn settle(&mut self) {
-        self.deadline = self.timers.iter().map(Timer::deadline).fold(self.rcc.deadline(), Time::min);
-        self.lines = IrqLines::default();
-        for (timer, place) in self.timers.iter().zip(&TIMERS) {
-            self.lines.0 |= u128::from(timer.interrupt()) << place.irq;
-        }
+    /// CAN1.
+    pub fn can1(&self) -> &BxCan {
+        &self.can.can1
     }
 
-    /// Brings every clocked unit to a clock tree that may have changed.
-    pub(crate) fn update_clocks(&mut self, now: Time) {
-        let clocks = self.rcc.clocks();
-        if clocks == self.clocks {
-            return;
-        }
-        for (index, place) in TIMERS.iter().enumerate() {
-            self.run_timer(index, now);
-            self.timers[index].set_cycle(clocks.timer_cycle(place.bus), now);
-        }
-        let core_changed = clocks.hclk != self.clocks.hclk;
-        self.clocks = clocks;
-        if core_changed {
-            self.announce_clock();
-        }
+    /// CAN1 as a participant of a bus.
+    pub fn can1_mut(&mut self) -> &mut BxCan {
+        &mut self.can.can1
     }
 
-    fn announce_clock(&mut self) {
-        self.effects.push_back(Effect::CoreClock(self.clocks.hclk));
+    /// CAN2.
+    pub fn can2(&self) -> &BxCan {
+        &self.can.can2
     }
 
-    /// Puts one peripheral into its state after reset.
-    pub(crate) fn reset_unit(&mut self, unit: Unit) {
-        match unit {
-            Unit::Timer(index) => {
-                let place = &TIMERS[index];
-                self.timers[index] = Timer::new(place.kind, self.clocks.timer_cycle(place.bus));
-            }
-            Unit::Gpio(port) => self.ports[port] = Gpio::new(port),
-            Unit::Pwr => self.pwr = Pwr::new(self.variant),
-            Unit::Syscfg => self.syscfg = Syscfg::new(),
-            Unit::Flash => self.flash = Flash::new(),
-            Unit::Rcc | Unit::Dbgmcu | Unit::Absent => {}
-        }
-    }
-}
-
-fn timers() -> [Timer; TIMERS.len()] {
-    TIMERS.each_ref().map(|place| Timer::new(place.kind, Clocks::RESET.timer_cycle(place.bus)))
-}
-
-impl Peripherals for Stm32f4 {
-    fn read(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
-        self.pass(now);
-        self.load(address, size, now)
+    /// CAN2 as a participant of a bus.
+    pub fn can2_mut(&mut self) -> &mut BxCan {
+        &mut self.can.can2
     }
 
-    fn write(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault> {
-        self.pass(now);
-        self.store(address, size, value, now)?;
-        self.settle();
-        Ok(())
-    }
-
-    fn program(&mut self, _address: u32, _old: &[u8], _new: &[u8], _now: Time) -> Result<(), BusFault> {
-        Err(BusFault)
-    }
-
-    fn deadline(&self) -> Time {
-        self.deadline
-    }
-
-    fn advance(&mut self, now: Time, _memory: &dyn Memory) {
-        self.pass(now);
-    }
-
-    fn lines(&self) -> IrqLines {
-        self.lines
-    }
-
-    fn effect(&mut self) -> Option<Effect> {
-        self.effects.pop_front()
-    }
-
-    fn reset(&mut self, power: bool, _now: Time) {
-        self.rcc.reset((!power).then_some(Cause::Software));
-        self.clocks = Clocks::RESET;
-        self.announce_clock();
-        map::blocks().for_each(|block| self.reset_unit(block.unit));
-        self.settle();
+    /// The flash controller, to look at or to cut the power in one of its operations.
+    pub fn flash_mut(&mut self) -> &mut Flash {
+        &mut self.flash
     }
 }

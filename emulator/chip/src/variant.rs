@@ -1,5 +1,7 @@
 //! What differs between the chips.
 
+use std::ops::Range;
+
 /// One of the chips that the images are built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variant {
@@ -34,6 +36,12 @@ impl Variant {
         };
         let count = if self == Variant::F446 { 8 } else { 12 };
         (0..count).map(size)
+    }
+
+    /// The addresses of a flash sector; `None` when the chip has no such sector.
+    pub fn sector(self, index: usize) -> Option<Range<u32>> {
+        let start = FLASH_BASE + self.sectors().take(index).sum::<u32>();
+        self.sectors().nth(index).map(|size| start..start + size)
     }
 
     /// DBGMCU_IDCODE: device and revision (RM0390 section 33.6.1, RM0090 section 38.6.1).

@@ -1,22 +1,210 @@
-//! FLASH: access control.
+//! FLASH: the controller of the flash array (RM0390 section 3, RM0090 section 3).
+//!
+//! Unlocking, programming in all widths, sector and mass erase, write protection, error flags and busy times. The array
+//! itself is with the core: effects say what becomes of it. A programmed unit changes when the operation starts, an erased
+//! sector when it ends; reads in between wait for the end anyway.
 
-use crate::register::{Plain, RegisterFile};
+mod lock;
+mod program;
+mod timing;
+mod torn;
+mod work;
 
-const PLAIN: &[Plain] = &[Plain::new(0x00, 0, 0x0000_1F0F)];
+use std::collections::VecDeque;
+use std::ops::Range;
 
-#[derive(Clone)]
-pub(crate) struct Flash {
-    plain: RegisterFile,
+use canbus::Time;
+use lock::{CONTROL_KEYS, Lock, OPTION_KEYS};
+
+use crate::peripherals::{BusFault, Effect};
+use crate::register::{bit, field, flag};
+use crate::variant::Variant;
+
+const ACR: u32 = 0x00;
+const KEYR: u32 = 0x04;
+const OPTKEYR: u32 = 0x08;
+const SR: u32 = 0x0C;
+const CR: u32 = 0x10;
+const OPTCR: u32 = 0x14;
+
+const SR_EOP: u32 = 0;
+const SR_OPERR: u32 = 1;
+const SR_BSY: u32 = 16;
+/// Flags that are cleared by writing 1.
+const SR_CLEARABLE: u32 = 0x1F3;
+
+const CR_PG: u32 = 0;
+const CR_SER: u32 = 1;
+const CR_MER: u32 = 2;
+const CR_STRT: u32 = 16;
+const CR_EOPIE: u32 = 24;
+const CR_ERRIE: u32 = 25;
+const CR_LOCK: u32 = 31;
+const CR_WRITABLE: u32 = 0x0300_037F;
+
+const OPTCR_LOCK: u32 = 0;
+const OPTCR_STRT: u32 = 1;
+const OPTCR_WRITABLE: u32 = 0x0FFF_FFEC;
+/// The first of the nWRP bits: a sector is protected while its bit is 0.
+const OPTCR_NWRP: u32 = 16;
+const OPTCR_DEFAULT: u32 = 0x0FFF_AAEC;
+
+/// An operation that was refused: its flag in FLASH_SR.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Refused {
+    WriteProtected = 4,
+    Alignment = 5,
+    Parallelism = 6,
+    Sequence = 7,
+}
+
+/// What goes on in the array.
+#[derive(Clone, Debug)]
+enum Work {
+    /// The array is as it will be.
+    Programmed,
+    /// These sectors become FFh at the end; with `cut` the power goes away before that.
+    Erase { sectors: Vec<Range<u32>>, cut: bool },
+}
+
+/// The flash controller.
+#[derive(Clone, Debug)]
+pub struct Flash {
+    variant: Variant,
+    acr: u32,
+    lock: Lock,
+    option_lock: Lock,
+    sr: u32,
+    cr: u32,
+    optcr: u32,
+    work: Option<Work>,
+    busy_until: Time,
+    /// The first half of a double word: the core stores it as two words.
+    half: Option<(u32, [u8; 4], [u8; 4])>,
+    operations: u64,
+    cut_at: Option<u64>,
 }
 
 impl Flash {
-    pub(crate) fn new() -> Self {
-        Self { plain: RegisterFile::new(PLAIN) }
+    pub(crate) fn new(variant: Variant, write_protected: u32) -> Self {
+        Self {
+            variant,
+            acr: 0,
+            lock: Lock::new(CONTROL_KEYS),
+            option_lock: Lock::new(OPTION_KEYS),
+            sr: 0,
+            cr: 0,
+            optcr: OPTCR_DEFAULT & !(write_protected << OPTCR_NWRP),
+            work: None,
+            busy_until: Time::ZERO,
+            half: None,
+            operations: 0,
+            cut_at: None,
+        }
     }
-    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
-        self.plain.read(offset)
+
+    /// Cuts the power in the `n`th operation from now on (1 is the next one). Each programmed unit and each erased
+    /// sector is an operation. The array is then torn, and `Effect::PowerCut` tells.
+    pub fn cut_power_at_operation(&mut self, n: u64) {
+        self.cut_at = Some(self.operations + n);
     }
-    pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
-        self.plain.write(offset, value)
+
+    /// Operations so far.
+    pub fn operations(&self) -> u64 {
+        self.operations
+    }
+
+    /// Sectors that are write protected, bit 0 for sector 0.
+    pub fn write_protected(&self) -> u32 {
+        !field(self.optcr, OPTCR_NWRP, 12) & 0xFFF
+    }
+
+    /// A reset. One in the middle of an erase leaves the sector torn.
+    pub(crate) fn reset(&mut self, effects: &mut VecDeque<Effect>) {
+        if let Some(Work::Erase { sectors, .. }) = self.work.take() {
+            self.tear(&sectors, effects);
+        }
+        let fresh = Self::new(self.variant, self.write_protected());
+        *self = Self { operations: self.operations, cut_at: self.cut_at, ..fresh };
+    }
+
+    pub(crate) fn read(&self, offset: u32, now: Time) -> Option<u32> {
+        match offset {
+            ACR => Some(self.acr),
+            KEYR | OPTKEYR => Some(0),
+            SR => Some(self.sr | flag(now < self.busy_until, SR_BSY)),
+            CR => Some(
+                self.cr
+                    | flag(now < self.busy_until && self.erases(), CR_STRT)
+                    | flag(!self.lock.is_open(), CR_LOCK),
+            ),
+            OPTCR => Some(self.optcr | flag(!self.option_lock.is_open(), OPTCR_LOCK)),
+            _ => None,
+        }
+    }
+
+    /// Writes a register after `advance`; `Ok(None)` when it, or what is asked of it, is not modelled.
+    pub(crate) fn write(
+        &mut self,
+        offset: u32,
+        value: u32,
+        now: Time,
+        effects: &mut VecDeque<Effect>,
+    ) -> Result<Option<()>, BusFault> {
+        match offset {
+            ACR => self.acr = value & 0x1F0F,
+            KEYR => self.lock.take(value)?,
+            OPTKEYR => self.option_lock.take(value)?,
+            SR => self.sr &= !(value & SR_CLEARABLE),
+            CR if self.lock.is_open() => self.write_control(value, now, effects),
+            OPTCR if self.option_lock.is_open() => return Ok(self.write_options(value, now)),
+            // Locked: the write has no effect.
+            CR | OPTCR => {}
+            _ => return Ok(None),
+        }
+        Ok(Some(()))
+    }
+
+    fn write_control(&mut self, value: u32, now: Time, effects: &mut VecDeque<Effect>) {
+        self.cr = value & CR_WRITABLE;
+        self.half = None;
+        if bit(value, CR_STRT) {
+            let outcome = self.erase(now, effects);
+            self.report(outcome);
+        }
+        if bit(value, CR_LOCK) {
+            self.lock.close();
+        }
+    }
+
+    /// Options take effect with OPTSTRT; the array is not changed. `None` for PCROP.
+    fn write_options(&mut self, value: u32, now: Time) -> Option<()> {
+        if bit(value, OPTCR_STRT) {
+            self.optcr = value & OPTCR_WRITABLE;
+            // The reference manual gives no time; the option bytes are erased and programmed like a small sector.
+            self.busy_until = self.free(now) + timing::sector_erase(16 * 1024, field(self.cr, 8, 2));
+        }
+        if bit(value, OPTCR_LOCK) {
+            self.option_lock.close();
+        }
+        (!bit(value, 31)).then_some(())
+    }
+
+    fn report(&mut self, outcome: Result<(), Refused>) {
+        if let Err(refused) = outcome {
+            // OPERR is only set while its interrupt is enabled (RM0390 section 3.8.5).
+            self.sr |= 1 << refused as u32 | flag(bit(self.cr, CR_ERRIE), SR_OPERR);
+        }
+    }
+
+    /// When the operation under way ends.
+    pub(crate) fn deadline(&self) -> Time {
+        let watched = self.erases() || self.work.is_some() && bit(self.cr, CR_EOPIE);
+        if watched { self.busy_until } else { Time::NEVER }
+    }
+
+    /// The level of the interrupt line.
+    pub(crate) fn interrupt(&self) -> bool {
+        bit(self.sr, SR_EOP) && bit(self.cr, CR_EOPIE) || bit(self.sr, SR_OPERR) && bit(self.cr, CR_ERRIE)
     }
 }

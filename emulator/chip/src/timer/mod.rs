@@ -58,8 +58,8 @@ pub(crate) struct Timer {
     sr: u32,
     ccmr: [u32; 2],
     ccer: u32,
-    /// Position of the encoder, in quarter periods, at the last look.
-    position: i64,
+    /// Position of the encoder, in quarter periods, at the last look; `None` while none is connected.
+    position: Option<i64>,
     /// The last motion of the encoder was backwards.
     backwards: bool,
     /// An update event by software sent TRGO.
@@ -80,7 +80,7 @@ impl Timer {
             sr: 0,
             ccmr: [0; 2],
             ccer: 0,
-            position: 0,
+            position: None,
             backwards: false,
             triggered: false,
         }
@@ -170,7 +170,7 @@ impl Timer {
 
     fn channel_at(&self, offset: u32) -> Option<usize> {
         let channel = (offset - CCR1) / 4;
-        (offset % 4 == 0 && channel < self.kind.channels).then_some(channel as usize)
+        (offset.is_multiple_of(4) && channel < self.kind.channels).then_some(channel as usize)
     }
 
     /// The eight bits of CCMR of a channel.
@@ -203,8 +203,8 @@ impl Timer {
         self.sr |= flag(!silent, SR_UIF);
     }
 
-    /// Counts up to `now`. `position` is that of the encoder on the two inputs, in quarter periods.
-    pub(crate) fn run(&mut self, now: Time, position: i64) {
+    /// Counts up to `now`. `position` is that of the encoder on the two inputs, in quarter periods; `None` without one.
+    pub(crate) fn run(&mut self, now: Time, position: Option<i64>) {
         if self.is_encoder() {
             self.follow(position);
         } else {
@@ -270,7 +270,7 @@ impl Timer {
         matches!(field(self.smcr, 0, 3), 1..=3)
     }
 
-    fn follow(&mut self, position: i64) {
+    fn follow(&mut self, position: Option<i64>) {
         let steps = self.steps_to(position);
         if steps == 0 || !self.counter.running() {
             return;
@@ -286,18 +286,19 @@ impl Timer {
 
     /// Counts between the last position and this one (RM0390 section 17.3.12): every edge of both inputs, or only
     /// those of input 2 (mode 1) or input 1 (mode 2). One inverted input turns the direction around.
-    fn steps_to(&self, position: i64) -> i64 {
+    fn steps_to(&self, position: Option<i64>) -> i64 {
+        let (Some(before), Some(position)) = (self.position, position) else { return 0 };
         let counted = |position: i64| match field(self.smcr, 0, 3) {
             1 => position.div_euclid(2),
             2 => (position + 1).div_euclid(2),
             _ => position,
         };
-        let steps = counted(position) - counted(self.position);
+        let steps = counted(position) - counted(before);
         if bit(self.ccer, 1) == bit(self.ccer, 5) { steps } else { -steps }
     }
 
     /// Whether a move of the encoder from the last position raises an interrupt that is not up yet.
-    pub(crate) fn rises_at(&self, position: i64) -> bool {
+    pub(crate) fn rises_at(&self, position: Option<i64>) -> bool {
         let steps = self.steps_to(position);
         let turn = self.counter.look(steps);
         let wraps = turn.wrapped && self.awaits(SR_UIF);

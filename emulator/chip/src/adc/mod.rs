@@ -1,0 +1,311 @@
+//! ADC1: regular conversions (RM0390 section 13, RM0090 section 13).
+//!
+//! Scan, single and continuous mode, software and timer trigger, DMA with DDS, overrun, every sample time and
+//! resolution. Injected and discontinuous conversions and the analogue watchdog are not modelled: a write that asks for
+//! them is on record.
+
+mod common;
+mod sequence;
+
+use canbus::Time;
+pub(crate) use common::AdcCommon;
+use sequence::Sequence;
+
+use crate::clocks::times;
+use crate::register::{Plain, RegisterFile, bit, field, flag};
+
+const SR: u32 = 0x00;
+const CR1: u32 = 0x04;
+const CR2: u32 = 0x08;
+const SMPR1: u32 = 0x0C;
+const SMPR2: u32 = 0x10;
+const SQR1: u32 = 0x2C;
+const SQR3: u32 = 0x34;
+const DR: u32 = 0x4C;
+
+/// Thresholds of the analogue watchdog: held, without effect as the watchdog cannot be turned on.
+const PLAIN: &[Plain] = &[Plain::new(0x24, 0x0FFF, 0x0FFF), Plain::new(0x28, 0, 0x0FFF)];
+
+const EOC: u32 = 1;
+const STRT: u32 = 4;
+const OVR: u32 = 5;
+/// What CR1 may ask for: EOCIE, SCAN, RES and OVRIE.
+const CR1_MODELLED: u32 = 1 << 5 | 1 << 8 | 3 << 24 | 1 << 26;
+/// What CR2 may ask for: all but JEXTEN and JSWSTART.
+const CR2_MODELLED: u32 = 0x7F00_0F03 & !(0x40 << 24);
+/// tSTAB, DS10693 section 6.3.20: 3 us at most.
+const STABILISATION: Time = Time::from_micros(3);
+/// Regular trigger conversion latency, DS10693 section 6.3.20: 2 cycles of the ADC clock.
+const TRIGGER_LATENCY: u32 = 2;
+
+/// A timer whose TRGO starts conversions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Trigger {
+    Tim2,
+    Tim3,
+}
+
+/// A conversion under way.
+#[derive(Clone, Copy, Debug)]
+struct Conversion {
+    rank: usize,
+    /// The end of the sample time: the instant whose voltage is converted.
+    sampled: Time,
+    end: Time,
+}
+
+/// A conversion that has ended and waits for its value.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample {
+    pub(crate) channel: u32,
+    pub(crate) at: Time,
+}
+
+#[derive(Clone)]
+pub(crate) struct Adc {
+    plain: RegisterFile,
+    sequence: Sequence,
+    /// One cycle of the ADC clock.
+    cycle: Time,
+    sr: u32,
+    cr1: u32,
+    cr2: u32,
+    dr: u32,
+    /// When it can convert after ADON.
+    stable: Time,
+    conversion: Option<Conversion>,
+    /// DR has not been read since it was written.
+    unread: bool,
+    /// A transfer by DMA is asked for.
+    request: bool,
+    /// The last transfer of the stream is done and DDS is 0: no more requests.
+    exhausted: bool,
+}
+
+impl Adc {
+    pub(crate) fn new(cycle: Time) -> Self {
+        Self {
+            plain: RegisterFile::new(PLAIN),
+            sequence: Sequence::default(),
+            cycle,
+            sr: 0,
+            cr1: 0,
+            cr2: 0,
+            dr: 0,
+            stable: Time::NEVER,
+            conversion: None,
+            unread: false,
+            request: false,
+            exhausted: false,
+        }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        *self = Self::new(self.cycle);
+    }
+
+    pub(crate) fn set_cycle(&mut self, cycle: Time) {
+        self.cycle = cycle;
+    }
+
+    pub(crate) fn read(&mut self, offset: u32) -> Option<u32> {
+        match offset {
+            SR => Some(self.sr),
+            CR1 => Some(self.cr1),
+            CR2 => Some(self.cr2),
+            DR => Some(self.take()),
+            SMPR1 | SMPR2 | SQR1..=SQR3 => self.sequence.read(offset),
+            _ => self.plain.read(offset),
+        }
+    }
+
+    /// `None` when the register, or what is asked of it, is not modelled.
+    pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
+        match offset {
+            SR => {
+                self.sr &= value;
+                Some(())
+            }
+            CR1 => {
+                self.cr1 = value & 0x07C0_FFFF;
+                (value & !CR1_MODELLED & 0xFFFF_FFE0 == 0).then_some(())
+            }
+            CR2 => self.write_control(value, now),
+            SMPR1 | SMPR2 | SQR1..=SQR3 => self.sequence.write(offset, value),
+            _ => self.plain.write(offset, value),
+        }
+    }
+
+    fn write_control(&mut self, value: u32, now: Time) -> Option<()> {
+        if bit(value, 0) && !self.is_on() {
+            self.stable = now + STABILISATION;
+        }
+        // Writing DMA to 0 and 1 again lets requests go on after the last transfer or an overrun.
+        if !self.uses_dma() || !bit(value, 8) {
+            self.exhausted = false;
+        }
+        self.cr2 = value & 0x3F7F_0F03;
+        if !self.is_on() {
+            self.conversion = None;
+        } else if bit(value, 30) {
+            self.start(now);
+        }
+        let known_trigger = field(value, 28, 2) == 0 || self.trigger().is_some();
+        (value & !CR2_MODELLED & 0xFF3F_FFFF == 0 && known_trigger).then_some(())
+    }
+
+    /// Reads DR.
+    fn take(&mut self) -> u32 {
+        self.unread = false;
+        self.sr &= !(1 << EOC);
+        self.dr
+    }
+
+    fn is_on(&self) -> bool {
+        bit(self.cr2, 0)
+    }
+
+    fn is_continuous(&self) -> bool {
+        bit(self.cr2, 1)
+    }
+
+    fn uses_dma(&self) -> bool {
+        bit(self.cr2, 8)
+    }
+
+    /// The timer that starts conversions (EXTSEL, RM0390 table 78).
+    pub(crate) fn trigger(&self) -> Option<Trigger> {
+        match (field(self.cr2, 28, 2), field(self.cr2, 24, 4)) {
+            (1.., 6) if self.is_on() => Some(Trigger::Tim2),
+            (1.., 8) if self.is_on() => Some(Trigger::Tim3),
+            _ => None,
+        }
+    }
+
+    /// The trigger came. While a sequence runs it is ignored.
+    pub(crate) fn on_trigger(&mut self, at: Time) {
+        self.start(at + times(self.cycle, TRIGGER_LATENCY));
+    }
+
+    fn start(&mut self, at: Time) {
+        if self.conversion.is_none() {
+            self.sr |= 1 << STRT;
+            self.convert(0, at.max(self.stable));
+        }
+    }
+
+    fn convert(&mut self, rank: usize, from: Time) {
+        let sampled = from + times(self.cycle, self.sequence.sample_cycles(rank));
+        let end = sampled + times(self.cycle, self.bits());
+        self.conversion = Some(Conversion { rank, sampled, end });
+    }
+
+    /// The resolution, which is also how many cycles a conversion takes after its sample time.
+    fn bits(&self) -> u32 {
+        12 - 2 * field(self.cr1, 24, 2)
+    }
+
+    /// Conversions in a sequence.
+    fn length(&self) -> usize {
+        let scan = bit(self.cr1, 8);
+        if scan { self.sequence.length() } else { 1 }
+    }
+
+    /// When the conversion under way ends.
+    pub(crate) fn conversion_end(&self) -> Time {
+        self.conversion.map_or(Time::NEVER, |conversion| conversion.end)
+    }
+
+    /// What the conversion under way has sampled.
+    pub(crate) fn sample(&self) -> Option<Sample> {
+        let conversion = self.conversion?;
+        Some(Sample { channel: self.sequence.channel(conversion.rank), at: conversion.sampled })
+    }
+
+    /// Ends the conversion under way with a 12-bit code, and goes on with the sequence.
+    pub(crate) fn finish(&mut self, code: u32) {
+        let Some(conversion) = self.conversion.take() else { return };
+        let last = conversion.rank + 1 >= self.length();
+        self.deliver(code, last);
+        if !last {
+            self.convert(conversion.rank + 1, conversion.end);
+        } else if self.is_continuous() {
+            self.convert(0, conversion.end);
+        }
+    }
+
+    fn deliver(&mut self, code: u32, last: bool) {
+        let each = bit(self.cr2, 10);
+        if self.unread && (self.uses_dma() || each) {
+            // Overrun: the old value stays and requests stop until OVR is cleared.
+            self.sr |= 1 << OVR;
+        }
+        if bit(self.sr, OVR) {
+            return;
+        }
+        let left = bit(self.cr2, 11);
+        self.dr = code >> (12 - self.bits()) << if left { 16 - self.bits() } else { 0 };
+        self.unread = true;
+        self.sr |= flag(each || last, EOC);
+        self.request = self.uses_dma() && !self.exhausted;
+    }
+
+    /// Whether a transfer by DMA is asked for now.
+    pub(crate) fn requests(&self) -> bool {
+        self.request
+    }
+
+    /// The transfer was made; `last` when it was the last one of the stream.
+    pub(crate) fn served(&mut self, last: bool) {
+        self.request = false;
+        let keeps_on = bit(self.cr2, 9);
+        self.exhausted = last && !keeps_on;
+    }
+
+    /// When the `count`th conversion from now on ends, or earlier; never late. `trigger` is when the trigger next comes
+    /// and how soon after that again at the earliest.
+    pub(crate) fn end_after(&self, count: usize, trigger: (Time, Time)) -> Time {
+        let Some(current) = self.conversion else { return self.end_from_trigger(count, trigger) };
+        let in_sequence = self.length() - current.rank.min(self.length() - 1);
+        if count <= in_sequence {
+            current.end + self.span(current.rank + 1, count - 1)
+        } else if self.is_continuous() {
+            current.end + self.span(current.rank + 1, in_sequence - 1)
+        } else {
+            self.end_from_trigger(count - in_sequence, trigger)
+        }
+    }
+
+    fn end_from_trigger(&self, count: usize, (next, period): (Time, Time)) -> Time {
+        let sequences = (count - 1) / self.length();
+        let rest = (count - 1) % self.length() + 1;
+        let start = Time(next.0.saturating_add(period.0.saturating_mul(sequences as u64)));
+        start + times(self.cycle, TRIGGER_LATENCY) + self.span(0, rest)
+    }
+
+    /// How long `count` conversions from `rank` on take.
+    fn span(&self, rank: usize, count: usize) -> Time {
+        let cycles = (rank..rank + count).map(|rank| self.sequence.sample_cycles(rank) + self.bits());
+        times(self.cycle, cycles.sum())
+    }
+
+    /// Whether the end of a conversion can raise the interrupt.
+    pub(crate) fn awaits_interrupt(&self) -> bool {
+        bit(self.cr1, 5) && !bit(self.sr, EOC) || bit(self.cr1, 26) && !bit(self.sr, OVR)
+    }
+
+    /// Whether conversions end in a transfer by DMA.
+    pub(crate) fn transfers(&self) -> bool {
+        self.uses_dma() && !self.exhausted && !bit(self.sr, OVR)
+    }
+
+    /// Flags as the common status register shows them.
+    pub(crate) fn status(&self) -> u32 {
+        self.sr & 0x3F
+    }
+
+    /// The level of the interrupt line.
+    pub(crate) fn interrupt(&self) -> bool {
+        bit(self.sr, EOC) && bit(self.cr1, 5) || bit(self.sr, OVR) && bit(self.cr1, 26)
+    }
+}

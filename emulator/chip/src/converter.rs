@@ -1,0 +1,185 @@
+//! From the trigger to memory: timer, ADC and DMA at work together.
+//!
+//! Conversions are made up when somebody looks: at an access to one of the three, at an interrupt and at each half and
+//! full transfer, when what was transferred reaches memory. Each conversion still has the voltage of its own instant.
+
+use canbus::Time;
+
+use crate::adc::{Sample, Trigger};
+use crate::clocks::times;
+use crate::dma::{Direction, Line, Transfer, line};
+use crate::peripherals::{BusFault, Effect, Memory};
+use crate::plant::front_end::quantise;
+use crate::stm32f4::Stm32f4;
+
+/// DMA2, as an index.
+const DMA2: usize = 1;
+/// The requests of ADC1 (RM0390 table 29).
+const ADC1: [Line; 2] = [line(0, 0), line(4, 0)];
+/// ADC input of the reference.
+const REFERENCE: u32 = 17;
+
+/// What DMA can reach besides peripherals: SRAM1 and SRAM2, and flash to read from. The CCM of the F405 is not on
+/// its bus (RM0090 section 2.1).
+const RAM: std::ops::Range<u32> = 0x2000_0000..0x2002_0000;
+
+impl Stm32f4 {
+    /// Makes every conversion that ended up to `now`.
+    pub(crate) fn convert(&mut self, now: Time) {
+        loop {
+            let end = self.adc.conversion_end();
+            let trigger = self.next_trigger().0;
+            if end.min(trigger) > now {
+                return;
+            }
+            if end <= trigger {
+                self.finish_conversion(end);
+            } else {
+                self.trigger_conversion(trigger);
+            }
+        }
+    }
+
+    /// When the timer that the ADC listens to next sends TRGO, and how soon after that again at the earliest.
+    fn next_trigger(&self) -> (Time, Time) {
+        let never = (Time::NEVER, Time::ZERO);
+        self.trigger_timer().map_or(never, |timer| self.timers[timer].trigger_output())
+    }
+
+    fn trigger_timer(&self) -> Option<usize> {
+        self.adc.trigger().map(|trigger| match trigger {
+            Trigger::Tim2 => 0,
+            Trigger::Tim3 => 1,
+        })
+    }
+
+    fn trigger_conversion(&mut self, at: Time) {
+        if let Some(timer) = self.trigger_timer() {
+            self.run_timer(timer, at);
+            self.adc.on_trigger(at);
+        }
+    }
+
+    /// A timer sent TRGO because software made an update event.
+    pub(crate) fn pass_trigger(&mut self, timer: usize, now: Time) {
+        if self.timers[timer].take_trigger() && self.trigger_timer() == Some(timer) {
+            self.adc.on_trigger(now);
+        }
+    }
+
+    /// Brings the timer that the ADC has just begun to listen to up to `now`: what it sent before does not count.
+    pub(crate) fn attach_trigger(&mut self, now: Time) {
+        if let Some(timer) = self.trigger_timer() {
+            self.run_timer(timer, now);
+        }
+    }
+
+    fn finish_conversion(&mut self, at: Time) {
+        let code = self.adc.sample().map_or(0, |sample| quantise(self.analogue(sample)));
+        self.adc.finish(code);
+        if self.adc.requests() {
+            self.transfer_conversion(at);
+        }
+    }
+
+    /// The voltage on an input of ADC1 as a ratio of VDDA; what is not connected is at ground.
+    fn analogue(&self, Sample { channel, at }: Sample) -> f64 {
+        let sensors = self.adc_common.sensors_on();
+        match channel {
+            0 => self.plant.pressure_input(at),
+            1 => self.plant.supply_input(),
+            REFERENCE if sensors => self.plant.reference_input(),
+            _ if sensors && channel == self.variant.temperature_channel() => self.plant.temperature_input(at),
+            _ => 0.0,
+        }
+    }
+
+    fn transfer_conversion(&mut self, at: Time) {
+        if let Some(last) = self.transfer_to_memory(DMA2, &ADC1, at) {
+            self.adc.served(last);
+        }
+    }
+
+    /// Serves a request towards memory: `Some(true)` when that ended a round of the stream, `None` when no stream
+    /// serves it.
+    pub(crate) fn transfer_to_memory(
+        &mut self,
+        controller: usize,
+        request: &[Line],
+        at: Time,
+    ) -> Option<bool> {
+        let transfer = self.dmas[controller].serves(request)?.next();
+        if transfer.direction != Direction::PeripheralToMemory {
+            return None;
+        }
+        let moved = self.move_to_memory(transfer, at);
+        Some(self.account(controller, request, moved))
+    }
+
+    fn move_to_memory(&mut self, transfer: Transfer, at: Time) -> Result<(), BusFault> {
+        if !RAM.contains(&transfer.memory) {
+            return Err(BusFault);
+        }
+        let value = self.load(transfer.peripheral, transfer.size, at)?;
+        self.keep(transfer.memory, &value.to_le_bytes()[..usize::from(transfer.size)]);
+        Ok(())
+    }
+
+    /// Serves a request towards a peripheral.
+    pub(crate) fn transfer_to_peripheral(
+        &mut self,
+        controller: usize,
+        request: &[Line],
+        memory: &dyn Memory,
+        at: Time,
+    ) -> Option<bool> {
+        let transfer = self.dmas[controller].serves(request)?.next();
+        if transfer.direction != Direction::MemoryToPeripheral {
+            return None;
+        }
+        let mut bytes = [0; 4];
+        let moved = memory
+            .load(transfer.memory, &mut bytes[..usize::from(transfer.size)])
+            .and_then(|()| self.store(transfer.peripheral, transfer.size, u32::from_le_bytes(bytes), at));
+        Some(self.account(controller, request, moved))
+    }
+
+    fn account(&mut self, controller: usize, request: &[Line], moved: Result<(), BusFault>) -> bool {
+        let Some(stream) = self.dmas[controller].serving(request) else { return false };
+        match moved {
+            Ok(()) => stream.done(),
+            Err(BusFault) => {
+                stream.fail();
+                false
+            }
+        }
+    }
+
+    /// Stores to memory; what follows the last store becomes one with it.
+    fn keep(&mut self, address: u32, new: &[u8]) {
+        if let Some(Effect::Store { address: start, bytes }) = self.effects.back_mut()
+            && start.wrapping_add(bytes.len() as u32) == address
+        {
+            bytes.extend_from_slice(new);
+            return;
+        }
+        self.effects.push_back(Effect::Store { address, bytes: new.to_vec() });
+    }
+
+    /// When conversions next do something that can be seen from outside.
+    pub(crate) fn conversion_deadline(&self) -> Time {
+        let trigger = self.next_trigger();
+        let seen = |count| self.adc.end_after(count, trigger);
+        let transfer = self.dmas[DMA2].serves(&ADC1).map(|stream| stream.until_event() as usize);
+        match transfer {
+            _ if self.adc.awaits_interrupt() => seen(1),
+            Some(count) if self.adc.transfers() => seen(count),
+            _ => Time::NEVER,
+        }
+    }
+
+    /// One cycle of the ADC clock.
+    pub(crate) fn adc_cycle(&self) -> Time {
+        times(self.clocks.pclk2_cycle(), self.adc_common.divider())
+    }
+}

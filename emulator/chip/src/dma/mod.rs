@@ -1,0 +1,96 @@
+//! A DMA controller: eight streams (RM0390 section 9, RM0090 section 10).
+//!
+//! Direct mode between a peripheral and memory, circular and double buffer. Transfers take no time. Memory to memory,
+//! FIFO mode, bursts and flow control by the peripheral are not modelled: a write that asks for them is on record.
+
+mod stream;
+
+pub(crate) use stream::{Direction, Stream, Transfer};
+
+const LISR: u32 = 0x00;
+const HISR: u32 = 0x04;
+const LIFCR: u32 = 0x08;
+const HIFCR: u32 = 0x0C;
+const FIRST_STREAM: u32 = 0x10;
+const STREAM_SIZE: u32 = 0x18;
+
+/// Where the flags of each of four streams begin in a status register.
+const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
+
+#[derive(Clone, Default)]
+pub(crate) struct Dma {
+    streams: [Stream; 8],
+}
+
+impl Dma {
+    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+        match offset {
+            LISR => Some(self.status(0)),
+            HISR => Some(self.status(4)),
+            LIFCR | HIFCR => Some(0),
+            _ => {
+                let (index, register) = locate(offset)?;
+                self.streams.get(index)?.read(register)
+            }
+        }
+    }
+
+    /// `None` when the register, or what is asked of it, is not modelled.
+    pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
+        match offset {
+            LISR | HISR => Some(()),
+            LIFCR => self.clear(0, value),
+            HIFCR => self.clear(4, value),
+            _ => {
+                let (index, register) = locate(offset)?;
+                self.streams.get_mut(index)?.write(register, value)
+            }
+        }
+    }
+
+    fn status(&self, first: usize) -> u32 {
+        let streams = self.streams[first..].iter().zip(FLAG_SHIFT);
+        streams.fold(0, |word, (stream, shift)| word | stream.flags() << shift)
+    }
+
+    fn clear(&mut self, first: usize, value: u32) -> Option<()> {
+        for (stream, shift) in self.streams[first..].iter_mut().zip(FLAG_SHIFT) {
+            stream.clear(value >> shift);
+        }
+        Some(())
+    }
+
+    /// The stream that serves a request: the first enabled one of those that the request is wired to.
+    pub(crate) fn serving(&mut self, request: &[Line]) -> Option<&mut Stream> {
+        let line = *request.iter().find(|line| self.streams[line.stream].listens_to(line.channel))?;
+        self.streams.get_mut(line.stream)
+    }
+
+    /// The same, to look at.
+    pub(crate) fn serves(&self, request: &[Line]) -> Option<&Stream> {
+        let line = request.iter().find(|line| self.streams[line.stream].listens_to(line.channel))?;
+        self.streams.get(line.stream)
+    }
+
+    /// Levels of the interrupt lines of the streams.
+    pub(crate) fn interrupts(&self) -> impl Iterator<Item = bool> {
+        self.streams.iter().map(Stream::interrupt)
+    }
+}
+
+fn locate(offset: u32) -> Option<(usize, u32)> {
+    let place = offset.checked_sub(FIRST_STREAM)?;
+    Some(((place / STREAM_SIZE) as usize, place % STREAM_SIZE))
+}
+
+/// A request line: the stream it ends at and the channel that selects it there (RM0390 tables 28 and 29).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Line {
+    pub(crate) stream: usize,
+    pub(crate) channel: u32,
+}
+
+/// The line to a stream that a channel selects.
+pub(crate) const fn line(stream: usize, channel: u32) -> Line {
+    Line { stream, channel }
+}

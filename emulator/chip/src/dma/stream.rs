@@ -1,0 +1,198 @@
+//! One stream of a DMA controller.
+
+use crate::register::{bit, field, flag};
+
+const CR: u32 = 0x00;
+const NDTR: u32 = 0x04;
+const PAR: u32 = 0x08;
+const M0AR: u32 = 0x0C;
+const M1AR: u32 = 0x10;
+const FCR: u32 = 0x14;
+
+const EN: u32 = 0;
+const CIRC: u32 = 8;
+const PINC: u32 = 9;
+const MINC: u32 = 10;
+const DBM: u32 = 18;
+const CT: u32 = 19;
+/// PFCTRL, PBURST and MBURST.
+const CR_NOT_MODELLED: u32 = 1 << 5 | 0xF << 21;
+/// DMDIS: FIFO mode.
+const FCR_NOT_MODELLED: u32 = 1 << 2;
+
+/// Flags in the order of the status registers.
+const DMEIF: u32 = 2;
+const TEIF: u32 = 3;
+const HTIF: u32 = 4;
+const TCIF: u32 = 5;
+
+/// Which way a transfer goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Direction {
+    PeripheralToMemory,
+    MemoryToPeripheral,
+}
+
+/// The next item that a stream moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Transfer {
+    pub(crate) direction: Direction,
+    pub(crate) peripheral: u32,
+    pub(crate) memory: u32,
+    /// Bytes; in direct mode PSIZE counts on both sides.
+    pub(crate) size: u8,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stream {
+    cr: u32,
+    /// Items left.
+    left: u32,
+    /// Items in a whole round.
+    all: u32,
+    par: u32,
+    memory: [u32; 2],
+    fcr: u32,
+    flags: u32,
+}
+
+impl Default for Stream {
+    fn default() -> Self {
+        Self { cr: 0, left: 0, all: 0, par: 0, memory: [0; 2], fcr: 0x21, flags: 0 }
+    }
+}
+
+impl Stream {
+    pub(super) fn read(&self, register: u32) -> Option<u32> {
+        match register {
+            CR => Some(self.cr),
+            NDTR => Some(self.left),
+            PAR => Some(self.par),
+            M0AR => Some(self.memory[0]),
+            M1AR => Some(self.memory[1]),
+            FCR => Some(self.fcr),
+            _ => None,
+        }
+    }
+
+    pub(super) fn write(&mut self, register: u32, value: u32) -> Option<()> {
+        match register {
+            CR => return self.write_control(value),
+            FCR => {
+                self.fcr = value & 0x87 | self.fcr & 0x38;
+                return (value & FCR_NOT_MODELLED == 0).then_some(());
+            }
+            M0AR => self.write_memory(0, value),
+            M1AR => self.write_memory(1, value),
+            // Protected while the stream is enabled.
+            NDTR | PAR if self.enabled() => {}
+            NDTR => self.left = value & 0xFFFF,
+            PAR => self.par = value,
+            _ => return None,
+        }
+        Some(())
+    }
+
+    fn write_control(&mut self, value: u32) -> Option<()> {
+        let enable = bit(value, EN);
+        if self.enabled() {
+            // Only EN and the interrupt enables can be written; a stop by software raises TCIF (RM0390 section 9.3.17).
+            self.cr = self.cr & !0x1F | value & 0x1F;
+            self.flags |= flag(!enable, TCIF);
+            return Some(());
+        }
+        self.cr = value & 0x0FEF_FFFF;
+        self.all = self.left;
+        let memory_to_memory = field(value, 6, 2) >= 2;
+        (value & CR_NOT_MODELLED == 0 && !memory_to_memory).then_some(())
+    }
+
+    /// In double buffer mode the address that is not in use can be changed while the stream runs.
+    fn write_memory(&mut self, index: usize, value: u32) {
+        let in_use = usize::from(bit(self.cr, CT)) == index;
+        if !self.enabled() || bit(self.cr, DBM) && !in_use {
+            self.memory[index] = value;
+        }
+    }
+
+    fn enabled(&self) -> bool {
+        bit(self.cr, EN)
+    }
+
+    pub(super) fn listens_to(&self, channel: u32) -> bool {
+        self.enabled() && self.left != 0 && field(self.cr, 25, 3) == channel
+    }
+
+    /// The next item; the caller moves it and then says `done` or `fail`.
+    pub(crate) fn next(&self) -> Transfer {
+        let size = 1 << field(self.cr, 11, 2).min(2);
+        let moved = (self.all - self.left) * size;
+        let step = |increments: u32| if bit(self.cr, increments) { moved } else { 0 };
+        let direction = if field(self.cr, 6, 2) == 0 {
+            Direction::PeripheralToMemory
+        } else {
+            Direction::MemoryToPeripheral
+        };
+        let memory = self.memory[usize::from(bit(self.cr, CT))];
+        Transfer {
+            direction,
+            peripheral: self.par.wrapping_add(step(PINC)),
+            memory: memory.wrapping_add(step(MINC)),
+            size: size as u8,
+        }
+    }
+
+    /// Counts an item that was moved; `true` when it was the last one of a round.
+    pub(crate) fn done(&mut self) -> bool {
+        self.left -= 1;
+        // Half transfer (RM0390 section 9.3.7).
+        self.flags |= flag(self.left == self.all / 2, HTIF);
+        let last = self.left == 0;
+        if last {
+            self.end_round();
+        }
+        last
+    }
+
+    fn end_round(&mut self) {
+        self.flags |= 1 << TCIF;
+        let double = bit(self.cr, DBM);
+        if double {
+            self.cr ^= 1 << CT;
+        }
+        if double || bit(self.cr, CIRC) {
+            self.left = self.all;
+        } else {
+            self.cr &= !(1 << EN);
+        }
+    }
+
+    /// A bus error: the stream stops.
+    pub(crate) fn fail(&mut self) {
+        self.flags |= 1 << TEIF;
+        self.cr &= !(1 << EN);
+    }
+
+    /// Items until the next half or full transfer.
+    pub(crate) fn until_event(&self) -> u32 {
+        let half = self.all / 2;
+        if self.left > half { self.left - half } else { self.left }
+    }
+
+    pub(super) fn flags(&self) -> u32 {
+        self.flags
+    }
+
+    pub(super) fn clear(&mut self, flags: u32) {
+        self.flags &= !(flags & 0x3D);
+    }
+
+    /// The level of the interrupt line.
+    pub(super) fn interrupt(&self) -> bool {
+        let enabled = flag(bit(self.cr, 1), DMEIF)
+            | flag(bit(self.cr, 2), TEIF)
+            | flag(bit(self.cr, 3), HTIF)
+            | flag(bit(self.cr, 4), TCIF);
+        self.flags & enabled != 0
+    }
+}

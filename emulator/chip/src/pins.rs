@@ -1,0 +1,99 @@
+//! Pins and what the board wires to them: the encoder on PB5 (index, also TIM3 channel 2), PB6 and PB7 (A and B, also
+//! TIM4 channels 1 and 2), and levels that a test drives.
+
+use canbus::Time;
+
+use crate::gpio::Outside;
+use crate::plant::first_change;
+use crate::stm32f4::Stm32f4;
+
+const PORT_B: usize = 1;
+const INDEX: u32 = 5;
+const PHASE_A: u32 = 6;
+const PHASE_B: u32 = 7;
+/// AF2 is TIM3 on PB5 and TIM4 on PB6 and PB7 (DS10693 table 11).
+const TIMER_FUNCTION: u32 = 2;
+const TIM3: usize = 1;
+const TIM4: usize = 2;
+/// How far ahead edges are looked for.
+const HORIZON: Time = Time::from_millis(1);
+
+impl Stm32f4 {
+    /// What the outside puts on the pins of a port.
+    pub(crate) fn outside(&self, port: usize, now: Time) -> Outside {
+        let mut outside = self.outside[port];
+        if port == PORT_B {
+            let (a, b) = self.plant.phases(now);
+            outside.set(INDEX, Some(self.plant.index(now)));
+            outside.set(PHASE_A, Some(a));
+            outside.set(PHASE_B, Some(b));
+        }
+        outside
+    }
+
+    /// The encoder's position as a timer sees it, in quarter periods; `None` when it sees no encoder. Only TIM4 is wired, and only while both of its
+    /// pins are switched to it.
+    pub(crate) fn encoder_position(&self, timer: usize, now: Time) -> Option<i64> {
+        let wired = timer == TIM4
+            && [PHASE_A, PHASE_B].iter().all(|&pin| self.ports[PORT_B].alternate(pin, TIMER_FUNCTION));
+        wired.then(|| self.plant.quarter(now))
+    }
+
+    /// Drives a pin from outside, or lets go of it (port `'A'` to `'I'`, pin 0 to 15). Pins of the encoder stay with it.
+    pub fn drive(&mut self, port: char, pin: u32, level: Option<bool>, now: Time) {
+        let Some(index) =
+            (port as usize).checked_sub('A' as usize).filter(|&index| index < self.outside.len())
+        else {
+            return;
+        };
+        let before = self.ports[index].level(pin, self.outside(index, now));
+        self.outside[index].set(pin, level);
+        let after = self.ports[index].level(pin, self.outside(index, now));
+        if before != after && self.syscfg.port_of_line(pin) == index {
+            self.exti.edge(pin, after);
+        }
+        self.settle(now);
+    }
+
+    /// Whether somebody waits for edges of the index.
+    fn index_is_watched(&self) -> bool {
+        let by_exti = self.exti.listens(INDEX) && self.syscfg.port_of_line(INDEX) == PORT_B;
+        by_exti || self.index_is_captured()
+    }
+
+    fn index_is_captured(&self) -> bool {
+        self.ports[PORT_B].alternate(INDEX, TIMER_FUNCTION) && self.timers[TIM3].listens(1)
+    }
+
+    /// Hands on an edge of the index that is due. The edges come one by one, as each is a deadline.
+    pub(crate) fn watch_index(&mut self, now: Time) {
+        let level = self.plant.index(now);
+        let changed = level != self.index_level;
+        self.index_level = level;
+        if !changed || !self.index_is_watched() {
+            return;
+        }
+        if self.syscfg.port_of_line(INDEX) == PORT_B {
+            self.exti.edge(INDEX, level);
+        }
+        if self.index_is_captured() {
+            self.run_timer(TIM3, now);
+            self.timers[TIM3].capture(1, level);
+        }
+    }
+
+    /// When the encoder next does something that can be seen from outside, or should be looked at again.
+    pub(crate) fn encoder_deadline(&self, now: Time) -> Time {
+        let horizon = now + HORIZON;
+        let index =
+            self.index_is_watched().then(|| self.plant.next_index_edge(now, horizon).unwrap_or(horizon));
+        let count = self.timers[TIM4]
+            .watches_encoder()
+            .then(|| self.next_count_event(now, horizon).unwrap_or(horizon));
+        index.unwrap_or(Time::NEVER).min(count.unwrap_or(Time::NEVER))
+    }
+
+    fn next_count_event(&self, now: Time, horizon: Time) -> Option<Time> {
+        first_change(now, horizon, |at| self.timers[TIM4].rises_at(self.encoder_position(TIM4, at)))
+    }
+}

@@ -1,0 +1,110 @@
+//! Faults of the sensors, from an instant of virtual time on.
+
+use std::str::FromStr;
+
+use canbus::Time;
+use thiserror::Error;
+
+/// What is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// The wire of the pressure transducer's output is broken.
+    OpenSensor,
+    /// The transducer's output is shorted to its supply.
+    RailHigh,
+    /// The transducer's output is shorted to ground.
+    RailLow,
+    /// The encoder gives no index pulse.
+    MissingIndex,
+}
+
+const NAMES: [(&str, FaultKind); 4] = [
+    ("open-sensor", FaultKind::OpenSensor),
+    ("rail-high", FaultKind::RailHigh),
+    ("rail-low", FaultKind::RailLow),
+    ("missing-index", FaultKind::MissingIndex),
+];
+
+/// A fault and when it is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// What is wrong.
+    pub kind: FaultKind,
+    /// Since when.
+    pub from: Time,
+    /// Until when; [`Time::NEVER`] for ever.
+    pub until: Time,
+}
+
+impl Fault {
+    pub(super) fn is_active(&self, now: Time) -> bool {
+        self.from <= now && now < self.until
+    }
+}
+
+/// Why a fault cannot be understood. Every message is one line.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum FaultError {
+    /// Not `NAME@SECONDS`.
+    #[error("`{0}` is not of the form NAME@SECONDS or NAME@SECONDS..SECONDS, for example open-sensor@2.5")]
+    Form(String),
+    /// No fault has this name.
+    #[error("unknown fault `{0}`; known are open-sensor, rail-high, rail-low and missing-index")]
+    Name(String),
+    /// Not a time from 0 on.
+    #[error("`{0}` is not a time in seconds")]
+    Time(String),
+    /// It ends before it starts.
+    #[error("`{0}` ends before it starts")]
+    Order(String),
+}
+
+impl FromStr for Fault {
+    type Err = FaultError;
+
+    /// `NAME@SECONDS` or `NAME@SECONDS..SECONDS`.
+    fn from_str(spec: &str) -> Result<Self, FaultError> {
+        let (name, times) = spec.split_once('@').ok_or_else(|| FaultError::Form(spec.to_owned()))?;
+        let kind = NAMES.iter().find(|known| known.0 == name).map(|known| known.1);
+        let kind = kind.ok_or_else(|| FaultError::Name(name.to_owned()))?;
+        let (from, until) = match times.split_once("..") {
+            Some((from, until)) => (instant(from)?, instant(until)?),
+            None => (instant(times)?, Time::NEVER),
+        };
+        if until <= from {
+            return Err(FaultError::Order(spec.to_owned()));
+        }
+        Ok(Self { kind, from, until })
+    }
+}
+
+fn instant(seconds: &str) -> Result<Time, FaultError> {
+    let value: Option<f64> = seconds.trim().parse().ok();
+    let value = value.filter(|value| value.is_finite() && *value >= 0.0);
+    let value = value.ok_or_else(|| FaultError::Time(seconds.to_owned()))?;
+    Ok(Time((value * Time::PER_SECOND as f64).round() as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_have_a_start_and_maybe_an_end() {
+        let fault: Fault = "open-sensor@2.5".parse().unwrap();
+        assert_eq!(fault.kind, FaultKind::OpenSensor);
+        assert!(!fault.is_active(Time::from_millis(2499)) && fault.is_active(Time::from_millis(2500)));
+        let fault: Fault = "missing-index@1..2".parse().unwrap();
+        let active = [999, 1000, 1999, 2000].map(|t| fault.is_active(Time::from_millis(t)));
+        assert_eq!(active, [false, true, true, false]);
+    }
+
+    #[test]
+    fn mistakes_are_named_in_one_line() {
+        let message = |spec: &str| spec.parse::<Fault>().unwrap_err().to_string();
+        assert!(message("open-sensor").starts_with("`open-sensor` is not of the form NAME@SECONDS"));
+        assert!(message("broken@1").starts_with("unknown fault `broken`; known are open-sensor"));
+        assert_eq!(message("rail-low@-1"), "`-1` is not a time in seconds");
+        assert_eq!(message("rail-low@2..1"), "`rail-low@2..1` ends before it starts");
+    }
+}

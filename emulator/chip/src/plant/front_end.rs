@@ -1,0 +1,83 @@
+//! The board's analogue front end, as ratios of VDDA.
+//!
+//! ```text
+//! supply 5 V ──┬── transducer ──[ divider 0.66 ]── PA0      10 % of the supply at 0 Pa, 90 % at 1 MPa
+//!              └───────────────[ divider 0.66 ]── PA1
+//! ```
+//!
+//! The transducer is ratiometric and both dividers bring 5 V to 3.3 V, so PA0 over PA1 is the pressure whatever the
+//! supply is, and at 5 V the ADC reads the same ratio of VDDA as the transducer gives of its supply. A broken wire
+//! leaves PA0 to the divider's lower resistor: 0 V. The chip's own temperature sensor and reference follow the factory
+//! calibration words in system memory (DS10693 section 6.3.22 and 6.3.24).
+
+/// Full scale of the transducer in pascal.
+pub const FULL_SCALE: f64 = 1_000_000.0;
+
+/// Both dividers.
+const DIVIDER: f64 = 0.66;
+/// VDDA at which the factory calibrates, in volts.
+const CALIBRATION_VDDA: f64 = 3.3;
+/// Codes of a 12-bit conversion.
+const CODES: f64 = 4096.0;
+
+/// Code of the temperature sensor at 30 degrees Celsius and 3.3 V: 0.7725 V.
+pub(crate) const TS_CAL1: u16 = 959;
+/// Code of the temperature sensor at 110 degrees Celsius and 3.3 V: 0.9725 V.
+pub(crate) const TS_CAL2: u16 = 1207;
+/// Code of the 1.21 V reference at 3.3 V.
+pub(crate) const VREFIN_CAL: u16 = 1502;
+
+const CAL1_KELVIN: f64 = 273.15 + 30.0;
+const CAL2_KELVIN: f64 = 273.15 + 110.0;
+/// Reference in volts.
+const VREFINT: f64 = 1.21;
+
+/// Supplies of the board in volts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rails {
+    /// Supply of the transducer: 5 V.
+    pub transducer: f64,
+    /// Supply and reference of the ADC: 3.3 V.
+    pub vdda: f64,
+}
+
+impl Default for Rails {
+    fn default() -> Self {
+        Self { transducer: 5.0, vdda: CALIBRATION_VDDA }
+    }
+}
+
+impl Rails {
+    /// PA0 for an output of the transducer, as a ratio of its supply.
+    pub(super) fn transducer_ratio(&self, output: f64) -> f64 {
+        output * self.supply_ratio()
+    }
+
+    /// PA1.
+    pub(super) fn supply_ratio(&self) -> f64 {
+        self.transducer * DIVIDER / self.vdda
+    }
+
+    /// The internal temperature sensor: the straight line through its two calibration points.
+    pub(super) fn temperature_ratio(&self, kelvin: f64) -> f64 {
+        let (low, high) = (f64::from(TS_CAL1), f64::from(TS_CAL2));
+        let code = low + (high - low) * (kelvin - CAL1_KELVIN) / (CAL2_KELVIN - CAL1_KELVIN);
+        code / CODES * CALIBRATION_VDDA / self.vdda
+    }
+
+    /// The internal reference.
+    pub(super) fn reference_ratio(&self) -> f64 {
+        VREFINT / self.vdda
+    }
+}
+
+/// What the transducer gives at a pressure in pascal, as a ratio of its supply; it cannot leave its rails.
+pub(super) fn transducer(pascal: f64) -> f64 {
+    (0.1 + 0.8 * pascal / FULL_SCALE).clamp(0.0, 1.0)
+}
+
+/// The 12-bit code of a ratio of VDDA: the first transition is at half a code.
+pub(crate) fn quantise(ratio: f64) -> u32 {
+    // The cast saturates at 0 for a voltage below ground.
+    (ratio * CODES).round().min(CODES - 1.0) as u32
+}

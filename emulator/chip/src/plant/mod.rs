@@ -1,0 +1,137 @@
+//! The physical world around the chip: pressure, temperature and shaft, and what the board makes of them.
+
+mod fault;
+pub(crate) mod front_end;
+mod shaft;
+mod signal;
+mod spec;
+mod table;
+
+use canbus::Time;
+
+pub use fault::{Fault, FaultError, FaultKind};
+pub use front_end::{FULL_SCALE, Rails};
+pub use shaft::Motion;
+use shaft::Shaft;
+pub(crate) use shaft::first_change;
+pub use signal::Signal;
+use signal::Stimulus;
+pub use spec::SpecError;
+pub use table::{Table, TableError};
+
+/// Everything the sensors measure.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    pressure: Stimulus,
+    temperature: Stimulus,
+    shaft: Shaft,
+    faults: Vec<Fault>,
+    /// Supplies of the board.
+    pub rails: Rails,
+}
+
+impl Plant {
+    /// No pressure, 25 degrees Celsius, the shaft at rest at 0, and an encoder with so many lines.
+    pub(crate) fn new(encoder_lines: u32) -> Self {
+        let still = |value| Stimulus::new(Signal::Constant(value), Time::ZERO);
+        Self {
+            pressure: still(0.0),
+            temperature: still(298.15),
+            shaft: Shaft::new(encoder_lines),
+            faults: Vec::new(),
+            rails: Rails::default(),
+        }
+    }
+
+    /// Sets the pressure, in pascal, from `now` on.
+    pub fn set_pressure(&mut self, signal: Signal, now: Time) {
+        self.pressure = Stimulus::new(signal, now);
+    }
+
+    /// Sets the temperature of the chip, in kelvin, from `now` on.
+    pub fn set_temperature(&mut self, signal: Signal, now: Time) {
+        self.temperature = Stimulus::new(signal, now);
+    }
+
+    /// Sets the motion of the shaft from `now` on; even motion starts where the shaft is.
+    pub fn set_shaft(&mut self, motion: Motion, now: Time) {
+        self.shaft.set(motion, now);
+    }
+
+    /// Adds a fault; its times are absolute.
+    pub fn add_fault(&mut self, fault: Fault) {
+        self.faults.push(fault);
+    }
+
+    /// Takes all faults away.
+    pub fn clear_faults(&mut self) {
+        self.faults.clear();
+    }
+
+    /// The true pressure in pascal.
+    pub fn pressure(&self, now: Time) -> f64 {
+        self.pressure.at(now)
+    }
+
+    /// The true temperature in kelvin.
+    pub fn temperature(&self, now: Time) -> f64 {
+        self.temperature.at(now)
+    }
+
+    /// The true position of the shaft in revolutions.
+    pub fn revolutions(&self, now: Time) -> f64 {
+        self.shaft.revolutions(now)
+    }
+
+    /// PA0 as a ratio of VDDA.
+    pub(crate) fn pressure_input(&self, now: Time) -> f64 {
+        let output = if self.has(FaultKind::RailHigh, now) {
+            1.0
+        } else if self.has(FaultKind::RailLow, now) || self.has(FaultKind::OpenSensor, now) {
+            0.0
+        } else {
+            front_end::transducer(self.pressure(now))
+        };
+        self.rails.transducer_ratio(output)
+    }
+
+    /// PA1 as a ratio of VDDA.
+    pub(crate) fn supply_input(&self) -> f64 {
+        self.rails.supply_ratio()
+    }
+
+    /// The temperature sensor as a ratio of VDDA.
+    pub(crate) fn temperature_input(&self, now: Time) -> f64 {
+        self.rails.temperature_ratio(self.temperature(now))
+    }
+
+    /// VREFINT as a ratio of VDDA.
+    pub(crate) fn reference_input(&self) -> f64 {
+        self.rails.reference_ratio()
+    }
+
+    /// The encoder's position in quarter periods.
+    pub(crate) fn quarter(&self, now: Time) -> i64 {
+        self.shaft.quarter(now)
+    }
+
+    /// Levels of the encoder's A and B.
+    pub(crate) fn phases(&self, now: Time) -> (bool, bool) {
+        self.shaft.phases(now)
+    }
+
+    /// Level of the encoder's index.
+    pub(crate) fn index(&self, now: Time) -> bool {
+        let (started, ended) = self.shaft.index_edges(now);
+        started != ended && !self.has(FaultKind::MissingIndex, now)
+    }
+
+    /// The next edge of the index up to `until`.
+    pub(crate) fn next_index_edge(&self, now: Time, until: Time) -> Option<Time> {
+        first_change(now, until, |at| self.shaft.index_edges(at))
+    }
+
+    fn has(&self, kind: FaultKind, now: Time) -> bool {
+        self.faults.iter().any(|fault| fault.kind == kind && fault.is_active(now))
+    }
+}

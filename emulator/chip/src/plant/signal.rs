@@ -1,0 +1,136 @@
+//! Quantities as functions of time.
+
+use std::f64::consts::TAU;
+
+use canbus::Time;
+
+use super::table::Table;
+
+/// A quantity as a function of the time since it was set, in seconds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Signal {
+    /// Always the same.
+    Constant(f64),
+    /// A sine that starts at its offset, rising.
+    Sine {
+        /// Mean value.
+        offset: f64,
+        /// Half of peak to peak.
+        amplitude: f64,
+        /// Frequency.
+        hertz: f64,
+    },
+    /// A straight line, and constant after it.
+    Ramp {
+        /// Value at the start.
+        from: f64,
+        /// Value at the end.
+        to: f64,
+        /// Duration.
+        seconds: f64,
+    },
+    /// One value up to an instant, another from it on.
+    Step {
+        /// Value before.
+        from: f64,
+        /// Value after.
+        to: f64,
+        /// Seconds until the step.
+        at: f64,
+    },
+    /// White noise with a normal distribution. The same seed gives the same noise.
+    Noise {
+        /// Mean value.
+        mean: f64,
+        /// Standard deviation.
+        sigma: f64,
+        /// Chooses one of the possible courses.
+        seed: u64,
+    },
+    /// From a CSV file.
+    Table(Table),
+}
+
+impl Signal {
+    /// The value `age` after the signal was set.
+    pub fn at(&self, age: Time) -> f64 {
+        let seconds = age.as_secs_f64();
+        match self {
+            Signal::Constant(value) => *value,
+            Signal::Sine { offset, amplitude, hertz } => offset + amplitude * (TAU * hertz * seconds).sin(),
+            Signal::Ramp { from, to, seconds: all } => from + (to - from) * (seconds / all).min(1.0),
+            Signal::Step { from, to, at } => *if seconds < *at { from } else { to },
+            Signal::Noise { mean, sigma, seed } => mean + sigma * normal(*seed, age),
+            Signal::Table(table) => table.at(seconds),
+        }
+    }
+}
+
+/// A number of the standard normal distribution that depends on nothing but the seed and the instant (Box-Muller).
+fn normal(seed: u64, age: Time) -> f64 {
+    let first = mix(mix(seed) ^ age.0);
+    let radius = (-2.0 * unit(first).ln()).sqrt();
+    radius * (TAU * unit(mix(first))).cos()
+}
+
+/// From 2^-53 to 1, zero excluded.
+fn unit(bits: u64) -> f64 {
+    ((bits >> 11) + 1) as f64 / (1_u64 << 53) as f64
+}
+
+/// The output function of SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
+fn mix(seed: u64) -> u64 {
+    let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ z >> 31
+}
+
+/// A signal and when it was set.
+#[derive(Clone, Debug)]
+pub(super) struct Stimulus {
+    signal: Signal,
+    since: Time,
+}
+
+impl Stimulus {
+    pub(super) fn new(signal: Signal, since: Time) -> Self {
+        Self { signal, since }
+    }
+
+    pub(super) fn at(&self, now: Time) -> f64 {
+        self.signal.at(now.since(self.since))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(signal: &Signal, millis: u64) -> f64 {
+        signal.at(Time::from_millis(millis))
+    }
+
+    #[test]
+    fn signals_have_their_shape() {
+        let sine = Signal::Sine { offset: 10.0, amplitude: 4.0, hertz: 2.0 };
+        assert!((at(&sine, 125) - 14.0).abs() < 1e-9 && (at(&sine, 375) - 6.0).abs() < 1e-9);
+        let ramp = Signal::Ramp { from: 10.0, to: 0.0, seconds: 2.0 };
+        assert_eq!([0, 500, 2000, 9000].map(|t| at(&ramp, t)), [10.0, 7.5, 0.0, 0.0]);
+        let step = Signal::Step { from: 1.0, to: 2.0, at: 0.5 };
+        assert_eq!([0, 499, 500, 501].map(|t| at(&step, t)), [1.0, 1.0, 2.0, 2.0]);
+    }
+
+    #[test]
+    fn noise_is_normal_and_repeats() {
+        let noise = |seed| Signal::Noise { mean: 100.0, sigma: 2.0, seed };
+        let course = |seed| (0..20_000).map(|t| noise(seed).at(Time::from_micros(t))).collect::<Vec<f64>>();
+        let values = course(1);
+        assert_eq!(values, course(1));
+        assert_ne!(values, course(2));
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+        assert!((mean - 100.0).abs() < 0.05, "{mean}");
+        assert!((variance.sqrt() - 2.0).abs() < 0.05, "{variance}");
+    }
+}

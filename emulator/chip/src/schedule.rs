@@ -1,0 +1,236 @@
+//! What happens by itself, and when: time, clocks, interrupt lines and resets of the whole chip.
+
+use canbus::Time;
+
+use crate::adc::AdcCommon;
+use crate::can::Lines;
+use crate::clocks::Clocks;
+use crate::crc_unit::CrcUnit;
+use crate::dma::Dma;
+use crate::exti::Exti;
+use crate::gpio::Gpio;
+use crate::iwdg::Iwdg;
+use crate::map::{self, ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS, Unit};
+use crate::peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
+use crate::pwr::Pwr;
+use crate::rcc::Cause;
+use crate::spi::Spi;
+use crate::stm32f4::Stm32f4;
+use crate::syscfg::Syscfg;
+use crate::timer::Timer;
+
+impl Peripherals for Stm32f4 {
+    fn read(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
+        self.pass(now);
+        let value = self.core_load(address, size, now)?;
+        self.settle(now);
+        Ok(value)
+    }
+
+    fn write(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault> {
+        self.pass(now);
+        self.core_store(address, size, value, now)?;
+        self.settle(now);
+        Ok(())
+    }
+
+    fn program(&mut self, address: u32, old: &[u8], new: &[u8], now: Time) -> Result<(), BusFault> {
+        self.pass(now);
+        self.flash.advance(now, &mut self.effects);
+        self.flash.program(address, old, new, now, &mut self.effects)?;
+        self.settle(now);
+        Ok(())
+    }
+
+    fn deadline(&self) -> Time {
+        self.deadline.min(self.can.deadline())
+    }
+
+    fn advance(&mut self, now: Time, memory: &dyn Memory) {
+        if now >= self.deadline() {
+            self.catch_up(now);
+            self.feed_spis(now, memory);
+            self.settle(now);
+        }
+    }
+
+    fn lines(&self) -> IrqLines {
+        // The bus moves the CAN controllers without a call here.
+        let mut lines = self.lines;
+        for (irqs, Lines { tx, rx0, rx1, sce }) in CAN_IRQS.iter().zip(self.can.lines()) {
+            irqs.iter().zip([tx, rx0, rx1, sce]).for_each(|(&irq, level)| lines.set(irq, level));
+        }
+        lines
+    }
+
+    fn effect(&mut self) -> Option<Effect> {
+        self.effects.pop_front()
+    }
+
+    fn reset(&mut self, power: bool, now: Time) {
+        self.convert(now);
+        let cause = self.asked.take().unwrap_or(Cause::Software);
+        self.rcc.reset((!power).then_some(cause));
+        self.flash.reset(&mut self.effects);
+        self.clocks = Clocks::RESET;
+        self.announce_clock();
+        map::blocks().for_each(|block| self.reset_unit(block.unit));
+        self.apply_clocks(now);
+        self.settle(now);
+    }
+}
+
+impl Stm32f4 {
+    /// Lets everything that can be seen up to `now` happen.
+    fn pass(&mut self, now: Time) {
+        if now >= self.deadline() {
+            self.catch_up(now);
+            self.settle(now);
+        }
+    }
+
+    /// Brings every peripheral up to `now`.
+    pub(crate) fn catch_up(&mut self, now: Time) {
+        self.convert(now);
+        self.watch_index(now);
+        for index in 0..self.timers.len() {
+            self.run_timer(index, now);
+        }
+        for index in 0..self.spis.len() {
+            self.run_spi(index, now);
+        }
+        self.can.advance(now);
+        self.flash.advance(now, &mut self.effects);
+        self.rcc.advance(now);
+        self.update_clocks(now);
+        self.watch(now);
+    }
+
+    pub(crate) fn run_timer(&mut self, index: usize, now: Time) {
+        let position = self.encoder_position(index, now);
+        self.timers[index].run(now, position);
+    }
+
+    /// Ends the frames of an SPI that are due, and has DMA fetch what came.
+    pub(crate) fn run_spi(&mut self, index: usize, now: Time) {
+        let plant = &self.plant;
+        self.spis[index].run(now, |at| plant.revolutions(at));
+        let place = &SPIS[index];
+        while self.spis[index].asks_to_store()
+            && self.transfer_to_memory(place.dma, &place.receive, now).is_some()
+        {}
+    }
+
+    /// Has DMA bring what the SPIs are to send.
+    fn feed_spis(&mut self, now: Time, memory: &dyn Memory) {
+        for (index, place) in SPIS.iter().enumerate() {
+            while self.spis[index].asks_to_load()
+                && self.transfer_to_peripheral(place.dma, &place.transmit, memory, now).is_some()
+            {
+            }
+        }
+    }
+
+    /// The watchdog bites when its time has come.
+    fn watch(&mut self, now: Time) {
+        if now >= self.iwdg.deadline() {
+            self.iwdg = Iwdg::new();
+            self.asked = Some(Cause::Watchdog);
+            self.effects.push_back(Effect::Reset);
+        }
+    }
+
+    /// After a change: what is due next, and which lines are up.
+    pub(crate) fn settle(&mut self, now: Time) {
+        self.deadline = self.next_event(now);
+        self.lines = self.levels();
+        if self.can.take_poke() {
+            self.effects.push_back(Effect::Poke);
+        }
+    }
+
+    fn next_event(&self, now: Time) -> Time {
+        let timers = self.timers.iter().map(Timer::deadline);
+        let spis = (0..self.spis.len()).map(|index| self.spi_deadline(index, now));
+        let others = [
+            self.rcc.deadline(),
+            self.conversion_deadline(),
+            self.encoder_deadline(now),
+            self.flash.deadline(),
+            self.iwdg.deadline(),
+        ];
+        timers.chain(spis).chain(others).fold(Time::NEVER, Time::min)
+    }
+
+    fn spi_deadline(&self, index: usize, now: Time) -> Time {
+        let (spi, place) = (&self.spis[index], &SPIS[index]);
+        let feeds = spi.asks_to_load() && self.dmas[place.dma].serves(&place.transmit).is_some();
+        if feeds { now } else { spi.deadline() }
+    }
+
+    fn levels(&self) -> IrqLines {
+        let mut lines = IrqLines::default();
+        let mut raise = |irq: u8, level: bool| lines.0 |= u128::from(level) << irq;
+        self.timers.iter().zip(&TIMERS).for_each(|(timer, place)| raise(place.irq, timer.interrupt()));
+        self.spis.iter().zip(&SPIS).for_each(|(spi, place)| raise(place.irq, spi.interrupt()));
+        for (dma, irqs) in self.dmas.iter().zip(DMA_IRQS) {
+            dma.interrupts().zip(irqs).for_each(|(level, irq)| raise(irq, level));
+        }
+        self.exti.interrupts().for_each(|(irq, level)| raise(irq, level));
+        raise(ADC_IRQ, self.adc.interrupt());
+        raise(FLASH_IRQ, self.flash.interrupt());
+        lines
+    }
+
+    /// Brings every clocked unit to a clock tree that may have changed; all of them are up to `now`.
+    pub(crate) fn update_clocks(&mut self, now: Time) {
+        let clocks = self.rcc.clocks();
+        if clocks == self.clocks {
+            return;
+        }
+        let core_changed = clocks.hclk != self.clocks.hclk;
+        self.clocks = clocks;
+        self.apply_clocks(now);
+        if core_changed {
+            self.announce_clock();
+        }
+    }
+
+    fn apply_clocks(&mut self, now: Time) {
+        for (timer, place) in self.timers.iter_mut().zip(&TIMERS) {
+            timer.set_cycle(self.clocks.timer_cycle(place.bus), now);
+        }
+        for (spi, place) in self.spis.iter_mut().zip(&SPIS) {
+            spi.set_pclk(self.clocks.apb_cycle(place.bus));
+        }
+        self.adc.set_cycle(self.adc_cycle());
+        self.can.set_clock(self.clocks.pclk1());
+    }
+
+    pub(crate) fn announce_clock(&mut self) {
+        self.effects.push_back(Effect::CoreClock(self.clocks.hclk));
+    }
+
+    /// Puts one peripheral into its state after reset. FLASH and RCC have resets of their own.
+    pub(crate) fn reset_unit(&mut self, unit: Unit) {
+        match unit {
+            Unit::Timer(index) => {
+                let place = &TIMERS[index];
+                self.timers[index] = Timer::new(place.kind, self.clocks.timer_cycle(place.bus));
+            }
+            Unit::Gpio(port) => self.ports[port] = Gpio::new(port),
+            Unit::Pwr => self.pwr = Pwr::new(self.variant),
+            Unit::Syscfg => self.syscfg = Syscfg::new(),
+            Unit::Exti => self.exti = Exti::default(),
+            Unit::Adc => self.adc.reset(),
+            Unit::AdcCommon => self.adc_common = AdcCommon::default(),
+            Unit::Dma(index) => self.dmas[index] = Dma::default(),
+            Unit::Spi(index) => Spi::reset(&mut self.spis[index]),
+            Unit::Can(0) => self.can.reset_can1(),
+            Unit::Can(_) => self.can.reset_can2(),
+            Unit::Iwdg => self.iwdg = Iwdg::new(),
+            Unit::Crc => self.crc = CrcUnit::new(),
+            Unit::Rcc | Unit::Flash | Unit::Dbgmcu | Unit::Signature | Unit::Absent => {}
+        }
+    }
+}
