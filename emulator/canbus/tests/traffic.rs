@@ -223,3 +223,27 @@ fn a_hundred_and_fifty_participants() {
     assert_eq!(events.len(), 450);
     assert!(nodes.iter_mut().all(|node| std::iter::from_fn(|| node.receive()).count() == 447));
 }
+
+#[test]
+fn the_size_of_the_steps_does_not_matter() {
+    let traffic = |quantum: Time| {
+        let (mut babbler, mut a, mut b) =
+            (Babbler::new(BIT, 0.7, Babbler::foreign(), 3), HostNode::new(BIT), HostNode::new(BIT));
+        for n in 0..100 {
+            a.send(standard(n, &[n as u8]), Time::from_micros(333) * u64::from(n));
+            b.send(standard(0x7F0 - n, &[]), Time::from_micros(277) * u64::from(n));
+        }
+        let mut bus = Bus::new();
+        bus.faults.noise(5, 0.1);
+        let (mut now, end, mut events) = (Time::ZERO, Time::from_millis(50), Vec::new());
+        while now < end {
+            now = (now + quantum).min(end);
+            events.extend(run(&mut bus, &mut [&mut babbler, &mut a, &mut b], now));
+        }
+        events
+    };
+    let whole = traffic(Time::from_millis(50));
+    assert!(whole.len() > 200);
+    assert_eq!(traffic(BIT * 12), whole);
+    assert_eq!(traffic(Time(BIT.0 / 3)), whole);
+}

@@ -7,7 +7,6 @@ use canbus::{ErrorState, Frame, Monitor, Time};
 
 use self::loop_back::Loop;
 use self::modes::Mode;
-
 use super::fifo::Fifo;
 use super::filter::FilterBanks;
 use super::mailbox::Registers;
