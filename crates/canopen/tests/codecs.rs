@@ -6,6 +6,11 @@ use canopen::pdo::{MappedObject, Transmission};
 use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response, Segment};
 use canopen::{CobId, NodeId};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+fn repeatable() -> ProptestConfig {
+    ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
+}
 
 fn multiplexer() -> impl Strategy<Value = Multiplexer> {
     any::<(u16, u8)>().prop_map(|(index, sub)| Multiplexer { index, sub })
@@ -50,6 +55,8 @@ fn response() -> impl Strategy<Value = Response> {
 }
 
 proptest! {
+    #![proptest_config(repeatable())]
+
     #[test]
     fn sdo_requests(request in request()) {
         prop_assert_eq!(Request::parse(request.encode()), Some(request));

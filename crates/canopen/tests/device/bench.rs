@@ -5,6 +5,8 @@ use canopen::dictionary::{
 };
 use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response, Segment};
 use canopen::{Application, Device, Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+use proptest::prelude::ProptestConfig;
+use proptest::test_runner::RngSeed;
 
 const fn parameter(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadWrite).saved(Group::Communication)
@@ -253,4 +255,9 @@ impl Bench {
     pub(crate) fn write32(&mut self, index: u16, sub: u8, value: u32) -> Result<(), u32> {
         self.write(index, sub, &value.to_le_bytes())
     }
+}
+
+/// Property tests that take the same course each time.
+pub(crate) fn repeatable() -> ProptestConfig {
+    ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
 }

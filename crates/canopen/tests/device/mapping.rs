@@ -1,6 +1,6 @@
 //! The mapping procedure and its interlocks, 1800h and 1A00h.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, repeatable};
 use proptest::prelude::*;
 
 const INVALID: u32 = 0x8000_0185;
@@ -120,6 +120,8 @@ fn writes() -> impl Strategy<Value = (u16, u8, Vec<u8>)> {
 }
 
 proptest! {
+    #![proptest_config(repeatable())]
+
     /// Whatever is written in whatever order: a TPDO that exists has a mapping of one to eight bytes, made of the
     /// entries that can be read back, and an identifier that is free for PDOs.
     #[test]
