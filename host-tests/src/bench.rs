@@ -1,0 +1,197 @@
+//! A node on a bench: frames in and out, an SDO client, and the time under control.
+
+use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response};
+use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+use node::{FactoryCalibration, Measurement, Personality, Protocol, RawSample, Setup};
+
+/// Node-ID of the node on the bench.
+pub const ID: u8 = 0x21;
+
+/// A transmit queue that keeps all it gets.
+#[derive(Debug, Default)]
+pub struct Queue(pub Vec<Frame>);
+
+impl Transmit for Queue {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.0.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+}
+
+/// A node with both halves.
+#[derive(Debug)]
+pub struct Bench {
+    /// The CANopen half.
+    pub protocol: Protocol,
+    /// The sampling half.
+    pub measurement: Measurement,
+    /// What it has sent.
+    pub out: Queue,
+    /// The time.
+    pub now: Instant,
+}
+
+/// A setup with recognisable values.
+#[must_use]
+pub fn setup() -> Setup {
+    Setup {
+        personality: Personality::Pressure,
+        node_id: NodeId::new(ID).expect("a node-ID"),
+        bit_rate: 250,
+        serial_number: 0x1234_5678,
+        hardware_version: "NUCLEO-F446RE",
+        software_version: "0.1.0",
+    }
+}
+
+/// The readings of an intact sensor at this pressure in Pa and temperature in K: 16 conversions at VDDA = 3.3 V.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
+    let factory = FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
+    let supply = 16 * 4000;
+    let ratio = 0.1 + 0.8 * pascal / 1.0e6;
+    let temperature = 940.0 + (kelvin - 303.15) * (1210.0 - 940.0) / 80.0;
+    RawSample {
+        pressure: (ratio * f64::from(supply)).round() as u32,
+        supply,
+        temperature: (16.0 * temperature).round() as u32,
+        vrefint: 16 * 1500,
+        count: 16,
+        factory,
+    }
+}
+
+impl Bench {
+    /// A node that has booted, its boot-up message out of the way.
+    #[must_use]
+    pub fn booted() -> Bench {
+        let mut bench = Bench {
+            protocol: Protocol::new(&setup()),
+            measurement: Measurement::new(),
+            out: Queue::default(),
+            now: Instant(0),
+        };
+        bench.protocol.start(bench.now, &mut bench.out);
+        bench.take();
+        bench
+    }
+
+    /// All frames sent since the last call, as identifier and data.
+    pub fn take(&mut self) -> Vec<(u16, Vec<u8>)> {
+        self.out.0.drain(..).map(|frame| (frame.id(), frame.data().to_vec())).collect()
+    }
+
+    /// Hands over a frame the way the filters do.
+    pub fn receive(&mut self, frame: &Frame) {
+        let is_process = self.protocol.process_ids().any(|id| id == frame.id());
+        let is_service = self.protocol.service_ids().any(|id| id == frame.id());
+        if is_process {
+            self.protocol.on_process_frame(frame, self.now, &mut self.out);
+        }
+        if is_service {
+            self.protocol.on_service_frame(frame, self.now, &mut self.out);
+        }
+        self.poll();
+    }
+
+    /// An NMT command for this node.
+    pub fn nmt(&mut self, command: u8) {
+        self.receive(&Frame::new(0, &[command, ID]).expect("a frame"));
+    }
+
+    /// Does what is due and returns the next deadline.
+    pub fn poll(&mut self) -> Instant {
+        let process = self.protocol.poll_process(self.now, &mut self.out);
+        process.min(self.protocol.poll_services(self.now, &mut self.out))
+    }
+
+    /// Lets a millisecond pass with these readings.
+    pub fn sample(&mut self, raw: &RawSample) {
+        self.now = self.now + Duration::from_millis(1);
+        if let Some(parameters) = self.protocol.take_parameters() {
+            self.measurement.apply(&parameters);
+        }
+        let snapshot = self.measurement.sample(raw);
+        self.protocol.publish(&snapshot, self.now, &mut self.out);
+        self.poll();
+    }
+
+    /// One SDO exchange. Other frames of the node stay in the queue.
+    ///
+    /// # Panics
+    /// Unless there is one valid response.
+    pub fn ask(&mut self, request: Request) -> Response {
+        let before = std::mem::take(&mut self.out.0);
+        self.receive(&Frame::new(0x600 + u16::from(ID), &request.encode()).expect("a frame"));
+        let (responses, others): (Vec<_>, Vec<_>) = std::mem::take(&mut self.out.0)
+            .into_iter()
+            .partition(|frame| frame.id() == 0x580 + u16::from(ID));
+        self.out.0 = before.into_iter().chain(others).collect();
+        let [response] = responses.try_into().expect("one response");
+        Response::parse(response.data().try_into().expect("eight bytes")).expect("a valid response")
+    }
+
+    /// Reads a value.
+    ///
+    /// # Errors
+    /// The abort code.
+    ///
+    /// # Panics
+    /// On a response that answers another question.
+    pub fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, u32> {
+        let at = Multiplexer { index, sub };
+        match self.ask(Request::Upload(at)) {
+            Response::Uploaded(of, bytes) if of == at => Ok(bytes.as_slice().to_vec()),
+            Response::UploadSegmented(of, size) if of == at => Ok(self.read_segments(size)),
+            Response::Abort(of, code) if of == at => Err(code),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn read_segments(&mut self, size: u32) -> Vec<u8> {
+        let mut value = vec![];
+        for toggle in [false, true].into_iter().cycle() {
+            let Response::UploadedSegment(segment) = self.ask(Request::UploadSegment { toggle }) else {
+                panic!("no segment");
+            };
+            value.extend_from_slice(segment.data.as_slice());
+            if segment.last {
+                break;
+            }
+        }
+        assert_eq!(value.len(), size as usize);
+        value
+    }
+
+    /// Writes up to four bytes.
+    ///
+    /// # Errors
+    /// The abort code.
+    ///
+    /// # Panics
+    /// On a response that answers another question.
+    pub fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) -> Result<(), u32> {
+        let at = Multiplexer { index, sub };
+        match self.ask(Request::Download(at, Initiate::Expedited(Bytes::from_slice(bytes)))) {
+            Response::Downloaded(of) if of == at => Ok(()),
+            Response::Abort(of, code) if of == at => Err(code),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Makes a TPDO invalid and its mapping empty, steps 1 and 2 of the mapping procedure.
+    ///
+    /// # Panics
+    /// When the node refuses.
+    pub fn disable_tpdo(&mut self, number: u16) {
+        let cob_id = self.read(0x1800 + number, 1).expect("a COB-ID");
+        let [a, b, c, d] = cob_id.try_into().expect("four bytes");
+        self.write(0x1800 + number, 1, &[a, b, c, d | 0x80]).expect("step 1");
+        self.write(0x1A00 + number, 0, &[0]).expect("step 2");
+    }
+}

@@ -1,0 +1,220 @@
+//! The pressure node as a whole: from converter readings to frames, parameters back into the chain, faults.
+
+use canopen::Frame;
+use host_tests::bench::{Bench, ID, raw};
+use node::{BusEvent, Fault, Request, State};
+
+const TPDO1: u16 = 0x180 + ID as u16;
+const EMCY: u16 = 0x080 + ID as u16;
+
+fn operational() -> Bench {
+    let mut bench = Bench::booted();
+    bench.nmt(1);
+    bench.take();
+    bench
+}
+
+fn real(bench: &mut Bench, index: u16, sub: u8) -> f32 {
+    f32::from_le_bytes(bench.read(index, sub).unwrap().try_into().unwrap())
+}
+
+/// EMCY messages sent since the last look, as code and error register.
+fn emergencies(bench: &mut Bench) -> Vec<(u16, u8)> {
+    let messages = bench.take().into_iter().filter(|(id, _)| *id == EMCY);
+    messages.map(|(_, data)| (u16::from_le_bytes([data[0], data[1]]), data[2])).collect()
+}
+
+fn is_close(value: f32, expected: f32, tolerance: f32) -> bool {
+    (value - expected).abs() <= tolerance
+}
+
+#[test]
+fn tpdo1_carries_the_live_pressure_and_temperature() {
+    let mut bench = operational();
+    for pascal in [0.0, 250_000.0, 1_000_000.0] {
+        bench.sample(&raw(pascal, 298.15));
+        bench.take();
+        (0..1000).for_each(|_| bench.sample(&raw(pascal, 298.15)));
+        let frames: Vec<_> = bench.take().into_iter().filter(|(id, _)| *id == TPDO1).collect();
+        let [(_, data)] = &frames[..] else { panic!("{frames:?}") };
+        let bar = f32::from_le_bytes(data[..4].try_into().unwrap());
+        let celsius = f32::from_le_bytes(data[4..].try_into().unwrap());
+        // One step of the sum of 16 conversions.
+        assert!(is_close(bar, pascal as f32 / 100_000.0, 10.0 / (0.8 * 64_000.0)), "{bar}");
+        assert!(is_close(celsius, 25.0, 80.0 / (16.0 * 270.0)), "{celsius}");
+    }
+}
+
+#[test]
+fn parameters_act_from_the_next_sample_on() {
+    let mut bench = Bench::booted();
+    bench.write(0x6131, 1, &0x0322_0000_u32.to_le_bytes()).unwrap();
+    bench.write(0x6126, 1, &2.0_f32.to_le_bytes()).unwrap();
+    bench.write(0x6132, 1, &[1]).unwrap();
+    bench.sample(&raw(500_000.0, 298.15));
+    assert!(is_close(real(&mut bench, 0x6130, 1), 1000.0, 0.1));
+    assert_eq!(bench.read(0x7130, 1), Ok(10_000_i16.to_le_bytes().to_vec()));
+    assert_eq!(bench.read(0x9130, 1), Ok(10_000_i32.to_le_bytes().to_vec()));
+    assert!(is_close(real(&mut bench, 0x6100, 1), 500_000.0, 1.0));
+}
+
+#[test]
+fn values_that_cannot_be_parameters_are_refused() {
+    let mut bench = Bench::booted();
+    for (sub, code) in [(1, 0x002D_0000_u32), (2, 0x004E_0000), (1, 0x134E_0000), (1, 0x004E_0001)] {
+        assert_eq!(bench.write(0x6131, sub, &code.to_le_bytes()), Err(0x0609_0030));
+    }
+    assert_eq!(bench.write(0x61A1, 1, &[0]), Err(0x0609_0032));
+    assert_eq!(bench.write(0x6132, 2, &[39]), Err(0x0609_0031));
+    assert_eq!(bench.write(0x61A0, 1, &[255]), Ok(()));
+    assert_eq!(bench.write(0x6124, 1, &f32::NAN.to_le_bytes()), Err(0x0609_0030));
+}
+
+#[test]
+fn autozero_moves_the_offset_until_the_value_is_zero() {
+    let mut bench = Bench::booted();
+    bench.write(0x6124, 1, &0.5_f32.to_le_bytes()).unwrap();
+    bench.sample(&raw(123_456.0, 298.15));
+    assert_eq!(bench.write(0x6125, 1, b"zerO"), Err(0x0800_0020));
+    assert_eq!(bench.write(0x6125, 1, b"zero"), Ok(()));
+    bench.sample(&raw(123_456.0, 298.15));
+    assert!(is_close(real(&mut bench, 0x6130, 1), 0.0, 1e-6));
+    assert!(is_close(real(&mut bench, 0x6124, 1), -1.23456, 1e-3));
+    assert!(real(&mut bench, 0x6130, 2) > 20.0);
+}
+
+#[test]
+fn autozero_needs_a_valid_value() {
+    let mut bench = Bench::booted();
+    let mut broken = raw(0.0, 298.15);
+    broken.pressure = 100;
+    bench.sample(&broken);
+    assert_eq!(bench.write(0x6125, 1, b"zero"), Err(0x0800_0022));
+    assert_eq!(bench.write(0x6125, 2, b"zero"), Ok(()));
+}
+
+#[test]
+fn a_broken_sensor_is_found_within_a_second_and_signalled_everywhere() {
+    let mut bench = operational();
+    let intact = raw(100_000.0, 298.15);
+    let mut broken = intact;
+    broken.pressure = 100;
+    bench.sample(&intact);
+    (0..999).for_each(|_| bench.sample(&broken));
+    assert_eq!((emergencies(&mut bench), bench.read(0x6150, 1)), (vec![], Ok(vec![4])));
+    bench.sample(&broken);
+    assert_eq!(emergencies(&mut bench), [(0x5006, 1)]);
+    assert_eq!(bench.read(0x6150, 1), Ok(vec![1 | 4]));
+    assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 5, 0, 0, 0]));
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![1, 0, 0, 0]));
+    assert_eq!(bench.read(0x1001, 0), Ok(vec![1]));
+    assert_eq!(bench.read(0x1003, 1), Ok(vec![0x06, 0x50, 0, 0]));
+    assert_eq!(bench.protocol.state(), State::PreOperational);
+    (0..1000).for_each(|_| bench.sample(&intact));
+    assert_eq!(emergencies(&mut bench), [(0, 0)]);
+    assert_eq!(bench.read(0x3000, 1), Ok(vec![0; 4]));
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![0; 4]));
+    assert_eq!(bench.read(0x1003, 0), Ok(vec![1]));
+}
+
+#[test]
+fn rails_are_found_at_once() {
+    let mut bench = Bench::booted();
+    bench.write(0x1029, 2, &[1]).unwrap();
+    bench.nmt(1);
+    bench.sample(&raw(0.0, 298.15));
+    bench.take();
+    let mut rail = raw(0.0, 298.15);
+    (rail.pressure, rail.temperature) = (16 * 4095, 0);
+    bench.sample(&rail);
+    assert_eq!(emergencies(&mut bench), [(0x8002, 1), (0x8001, 1)]);
+    assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 3 | 1 << 4, 0, 0, 0]));
+    assert_eq!(bench.protocol.state(), State::Operational);
+    rail.factory.ts_cal1 = rail.factory.ts_cal2;
+    bench.sample(&rail);
+    assert!(real(&mut bench, 0x6100, 2).abs() < f32::EPSILON);
+    assert_eq!(bench.read(0x7130, 2), Ok((-273_i16).to_le_bytes().to_vec()));
+}
+
+#[test]
+fn a_transducer_without_supply_is_a_break_and_not_a_division_by_zero() {
+    let mut bench = Bench::booted();
+    let mut dead = raw(0.0, 298.15);
+    (dead.supply, dead.vrefint) = (0, 0);
+    bench.sample(&dead);
+    assert!(real(&mut bench, 0x6130, 1).is_finite() && real(&mut bench, 0x6130, 2).is_finite());
+    assert_eq!(emergencies(&mut bench), [(0x5006, 1), (0x8001, 1)]);
+}
+
+#[test]
+fn the_span_sets_the_overload_bits() {
+    let mut bench = Bench::booted();
+    for (pascal, status) in [(-10_000.0, 4), (10_000.0, 0), (1_050_000.0, 2)] {
+        bench.sample(&raw(pascal, 298.15));
+        assert_eq!(bench.read(0x6150, 1), Ok(vec![status]));
+    }
+}
+
+#[test]
+fn flags_survive_a_reset_as_what_they_report_does() {
+    let mut bench = Bench::booted();
+    bench.protocol.set_fault(Fault::UnexpectedReset, true, bench.now, &mut bench.out);
+    assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
+    bench.nmt(0x81);
+    while bench.protocol.take_request().is_some_and(|request| request != Request::ResetNode) {}
+    bench.protocol.start(bench.now, &mut bench.out);
+    assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
+    assert_eq!(bench.read(0x3000, 3), Ok(vec![1 << 6, 0, 0, 0]));
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![4, 0, 0, 0]));
+}
+
+#[test]
+fn bus_off_applies_the_communication_error_behaviour_and_is_told_afterwards() {
+    let mut bench = operational();
+    bench.protocol.bus_event(BusEvent::Passive, bench.now, &mut bench.out);
+    assert_eq!(emergencies(&mut bench), [(0x8120, 0x11)]);
+    bench.protocol.bus_event(BusEvent::BusOff, bench.now, &mut bench.out);
+    assert_eq!(bench.protocol.state(), State::PreOperational);
+    bench.protocol.bus_event(BusEvent::Recovered, bench.now, &mut bench.out);
+    assert_eq!(emergencies(&mut bench), [(0x8140, 0x11), (0, 0)]);
+}
+
+#[test]
+fn a_warning_says_nothing_and_an_overrun_is_an_event() {
+    let mut bench = operational();
+    bench.protocol.bus_event(BusEvent::Warning, bench.now, &mut bench.out);
+    assert_eq!(emergencies(&mut bench), []);
+    bench.protocol.bus_event(BusEvent::Overrun, bench.now, &mut bench.out);
+    assert_eq!(emergencies(&mut bench), [(0x8110, 0x11), (0, 0)]);
+    assert_eq!(bench.protocol.state(), State::Operational);
+}
+
+#[test]
+fn the_firmware_is_told_what_it_must_do() {
+    let mut bench = Bench::booted();
+    assert_eq!(bench.protocol.take_request(), Some(Request::Filters));
+    assert_eq!(bench.protocol.take_request(), None);
+    bench.write(0x1005, 0, &[0x90, 0, 0, 0]).unwrap();
+    assert_eq!(bench.protocol.take_request(), Some(Request::Filters));
+    bench.nmt(0x82);
+    assert_eq!(bench.protocol.take_request(), Some(Request::ResetCommunication));
+    assert_eq!(bench.protocol.take_request(), None);
+}
+
+#[test]
+fn identifiers_are_those_of_the_services_that_exist() {
+    let bench = Bench::booted();
+    assert_eq!(bench.protocol.process_ids().collect::<Vec<_>>(), [0, 0x80, TPDO1]);
+    assert_eq!(bench.protocol.service_ids().collect::<Vec<_>>(), [0x600 + u16::from(ID)]);
+}
+
+#[test]
+fn a_remote_frame_is_answered_with_the_live_values() {
+    let mut bench = operational();
+    bench.sample(&raw(250_000.0, 298.15));
+    bench.take();
+    bench.receive(&Frame::remote(TPDO1, 8).unwrap());
+    let frames = bench.take();
+    let pressure = bench.read(0x6130, 1).unwrap();
+    assert!(matches!(&frames[..], [(TPDO1, data)] if data[..4] == pressure[..]), "{frames:?}");
+}
