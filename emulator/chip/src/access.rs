@@ -28,7 +28,12 @@ impl Stm32f4 {
     pub(crate) fn core_load(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
         let unit = map::find(self.variant, address).ok_or(BusFault)?.unit;
         self.refresh(unit, now);
-        self.load(address, size, now)
+        let value = self.load(address, size, now)?;
+        // To read these can change flags.
+        if matches!(unit, Unit::Adc | Unit::AdcCommon | Unit::Dma(_) | Unit::Spi(_)) {
+            self.settle(now);
+        }
+        Ok(value)
     }
 
     /// A store by the core.

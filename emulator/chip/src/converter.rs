@@ -7,7 +7,7 @@ use canbus::Time;
 
 use crate::adc::{Sample, Trigger};
 use crate::clocks::times;
-use crate::dma::{Direction, Line, Transfer, line};
+use crate::dma::{Direction, Line, Stream, Transfer, line};
 use crate::peripherals::{BusFault, Effect, Memory};
 use crate::plant::front_end::quantise;
 use crate::stm32f4::Stm32f4;
@@ -170,8 +170,11 @@ impl Stm32f4 {
     pub(crate) fn conversion_deadline(&self) -> Time {
         let trigger = self.next_trigger();
         let seen = |count| self.adc.end_after(count, trigger);
-        let transfer = self.dmas[DMA2].serves(&ADC1).map(|stream| stream.until_event() as usize);
-        match transfer {
+        let until_event = |stream: &Stream| {
+            let fails = !RAM.contains(&stream.next().memory);
+            if fails { 1 } else { stream.until_event() as usize }
+        };
+        match self.dmas[DMA2].serves(&ADC1).map(until_event) {
             _ if self.adc.awaits_interrupt() => seen(1),
             Some(count) if self.adc.transfers() => seen(count),
             _ => Time::NEVER,

@@ -22,9 +22,7 @@ use crate::timer::Timer;
 impl Peripherals for Stm32f4 {
     fn read(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
         self.pass(now);
-        let value = self.core_load(address, size, now)?;
-        self.settle(now);
-        Ok(value)
+        self.core_load(address, size, now)
     }
 
     fn write(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault> {

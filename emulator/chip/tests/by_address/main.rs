@@ -1,4 +1,10 @@
 //! The chip as a program sees it: loads and stores by address, interrupt lines, effects.
 
 mod clocks;
+mod conversions;
+mod encoder;
+mod flash;
+mod others;
 mod support;
+mod timers;
+mod watchdog;

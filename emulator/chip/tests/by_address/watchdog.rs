@@ -1,0 +1,84 @@
+//! IWDG.
+
+use canbus::Time;
+use chip::{Effect, Peripherals};
+
+use crate::support::{RCC, Rig};
+
+const KR: u32 = 0x4000_3000;
+const PR: u32 = KR + 0x04;
+const RLR: u32 = KR + 0x08;
+const SR: u32 = KR + 0x0C;
+
+/// Starts it as the firmware does: /16 and 199, a tick of 0.5 ms.
+fn start(rig: &mut Rig) {
+    rig.write(KR, 0xCCCC);
+    rig.write(KR, 0x5555);
+    rig.write(PR, 2);
+    rig.write(RLR, 199);
+    while rig.read(SR) != 0 {
+        rig.wait(Time::from_micros(10));
+    }
+    rig.write(KR, 0xAAAA);
+}
+
+#[test]
+fn it_bites_after_its_time() {
+    let mut rig = Rig::new();
+    start(&mut rig);
+    assert_eq!(rig.read(RCC + 0x74) & 1, 1, "it has turned on the LSI");
+    let fed = rig.now;
+    rig.run_to(fed + Time(Time::from_millis(100).0 - 1));
+    assert!(!rig.effects.contains(&Effect::Reset));
+    rig.run_to(fed + Time::from_millis(100));
+    assert!(rig.effects.contains(&Effect::Reset));
+    rig.chip.reset(false, rig.now);
+    assert_eq!(
+        rig.read(RCC + 0x74) >> 24,
+        0x0E | 0x20 | 0x04,
+        "IWDGRSTF and PINRSTF beside those of power-on"
+    );
+    rig.wait(Time::from_millis(1000));
+    assert_eq!(
+        rig.effects.iter().filter(|&effect| *effect == Effect::Reset).count(),
+        1,
+        "the reset stops it"
+    );
+}
+
+#[test]
+fn it_is_quiet_while_fed() {
+    let mut rig = Rig::new();
+    start(&mut rig);
+    for _ in 0..50 {
+        rig.wait(Time::from_millis(99));
+        rig.write(KR, 0xAAAA);
+    }
+    assert!(!rig.effects.contains(&Effect::Reset));
+}
+
+#[test]
+fn an_update_takes_five_cycles_of_the_lsi() {
+    let mut rig = Rig::new();
+    rig.write(KR, 0x5555);
+    rig.write(PR, 3);
+    rig.write(RLR, 0x123);
+    assert_eq!(rig.read(SR), 0b11);
+    // 5 / 32 kHz = 156.25 us.
+    rig.wait(Time::from_micros(156));
+    assert_eq!(rig.read(SR) & 1, 1);
+    rig.wait(Time::from_micros(1));
+    assert_eq!(rig.read(SR), 0);
+}
+
+#[test]
+fn its_registers_are_locked_without_the_key() {
+    let mut rig = Rig::new();
+    rig.write(PR, 5);
+    rig.write(RLR, 1);
+    assert_eq!((rig.read(PR), rig.read(RLR)), (0, 0xFFF));
+    rig.write(KR, 0x5555);
+    rig.write(KR, 0xAAAA);
+    rig.write(RLR, 1);
+    assert_eq!(rig.read(RLR), 0xFFF, "any other key locks again");
+}
