@@ -31,12 +31,14 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         if !entry.access.is_writable() {
             return Err(Abort::ReadOnly);
         }
-        entry.check_value(bytes)?;
-        self.admit(entry, bytes)?;
+        entry.check_length(bytes.len())?;
+        let value = little_endian(bytes);
+        entry.check_value(value)?;
+        self.admit(entry, value, bytes)?;
         if !entry.rule.is_computed() {
             entry.field.set(&mut self.image, bytes);
         }
-        self.follow(entry, now);
+        self.follow(entry, value, now);
         Ok(())
     }
 }
@@ -60,8 +62,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     /// Whether the rule of the entry allows the value.
-    fn admit(&mut self, entry: &Entry, bytes: &[u8]) -> Result<(), Abort> {
-        let value = little_endian(bytes);
+    fn admit(&mut self, entry: &Entry, value: u32, bytes: &[u8]) -> Result<(), Abort> {
         match entry.rule {
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
             Rule::SyncCobId => sync::check_cob_id(value),
@@ -78,9 +79,11 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     /// What follows from a new value.
-    fn follow(&mut self, entry: &Entry, now: Instant) {
-        let value = self.word(entry.field);
+    fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
+        self.pending.parameters |= entry.group == Group::Application;
         match entry.rule {
+            Rule::Plain => return,
+            Rule::Application(_) => self.pending.parameters = true,
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId => self.sync.configure(value),
             Rule::EmcyCobId => self.emcy.configure(value),
@@ -91,8 +94,6 @@ impl<A: Application, const N: usize> Core<A, N> {
             _ => (),
         }
         self.pending.identifiers |= matches!(entry.rule, Rule::SyncCobId | Rule::TpdoCobId);
-        self.pending.parameters |=
-            matches!(entry.rule, Rule::Application(_)) || entry.group == Group::Application;
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 }
@@ -106,7 +107,10 @@ fn stored<'a>(entry: &Entry, image: &'a [u8]) -> &'a [u8] {
     }
 }
 
-/// The number in up to four bytes.
+/// The number in the first four bytes.
 fn little_endian(bytes: &[u8]) -> u32 {
+    if let Some(bytes) = bytes.first_chunk() {
+        return u32::from_le_bytes(*bytes);
+    }
     bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
 }

@@ -40,23 +40,25 @@ impl Entry {
         self.field
     }
 
-    /// Checks the bytes of an SDO download against type and limits.
-    ///
-    /// # Errors
-    /// The abort code for what is wrong with them.
-    pub(crate) fn check_value(&self, bytes: &[u8]) -> Result<(), Abort> {
+    /// Checks the length of a value to be written. A string may be shorter than its place.
+    pub(crate) fn check_length(&self, len: usize) -> Result<(), Abort> {
+        let size = usize::from(self.field.size);
+        if len > size {
+            return Err(Abort::TooLong);
+        }
+        if len < size && !matches!(self.kind, Type::VisibleString(_)) { Err(Abort::TooShort) } else { Ok(()) }
+    }
+
+    /// Checks a value to be written, in its first four bytes.
+    pub(crate) fn check_value(&self, word: u32) -> Result<(), Abort> {
         match self.kind {
-            Type::VisibleString(capacity) if bytes.len() > usize::from(capacity) => Err(Abort::TooLong),
             Type::VisibleString(_) => Ok(()),
-            _ if bytes.len() > usize::from(self.field.size) => Err(Abort::TooLong),
-            _ if bytes.len() < usize::from(self.field.size) => Err(Abort::TooShort),
-            Type::Real32 => check_real(bytes),
-            _ => self.check_limits(bytes),
+            Type::Real32 => check_real(f32::from_bits(word)),
+            _ => self.check_limits(self.kind.integer(word)),
         }
     }
 
-    fn check_limits(&self, bytes: &[u8]) -> Result<(), Abort> {
-        let value = self.kind.integer(bytes).ok_or(Abort::Length)?;
+    fn check_limits(&self, value: i64) -> Result<(), Abort> {
         if value > i64::from(self.high) {
             return Err(Abort::ValueTooHigh);
         }
@@ -65,8 +67,7 @@ impl Entry {
 }
 
 /// A parameter that is not a number would turn every measured value into one that is not.
-fn check_real(bytes: &[u8]) -> Result<(), Abort> {
-    let value = bytes.first_chunk().map_or(f32::NAN, |bytes| f32::from_le_bytes(*bytes));
+fn check_real(value: f32) -> Result<(), Abort> {
     if value.is_finite() { Ok(()) } else { Err(Abort::InvalidValue) }
 }
 

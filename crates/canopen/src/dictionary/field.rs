@@ -21,9 +21,11 @@ impl Field {
     pub fn set(self, image: &mut [u8], bytes: &[u8]) {
         let start = usize::from(self.offset);
         let Some(place) = image.get_mut(start..start + usize::from(self.size)) else { return };
-        for (i, byte) in place.iter_mut().enumerate() {
-            *byte = bytes.get(i).copied().unwrap_or(0);
+        let (value, rest) = place.split_at_mut(bytes.len().min(place.len()));
+        for (to, from) in value.iter_mut().zip(bytes) {
+            *to = *from;
         }
+        rest.fill(0);
     }
 
     /// The first `K` bytes from the start of the value.

@@ -62,12 +62,15 @@ impl Type {
         }
     }
 
-    /// The value of the little-endian bytes of an integer type.
-    pub(crate) fn integer(self, bytes: &[u8]) -> Option<i64> {
-        let (low, _) = self.range()?;
-        let mut wide = if low < 0 && bytes.last()? & 0x80 != 0 { [0xFF; 8] } else { [0; 8] };
-        wide.get_mut(..bytes.len())?.copy_from_slice(bytes);
-        Some(i64::from_le_bytes(wide))
+    /// The value of an integer type whose bytes, and zeros above them, are this word.
+    pub(crate) fn integer(self, word: u32) -> i64 {
+        let [a, b, c, d] = word.to_le_bytes();
+        match self {
+            Type::Integer8 => i8::from_le_bytes([a]).into(),
+            Type::Integer16 => i16::from_le_bytes([a, b]).into(),
+            Type::Integer32 => i32::from_le_bytes([a, b, c, d]).into(),
+            _ => word.into(),
+        }
     }
 }
 
@@ -77,10 +80,10 @@ mod tests {
 
     #[test]
     fn integers_are_sign_extended_by_their_type() {
-        assert_eq!(Type::Integer8.integer(&[0xFE]), Some(-2));
-        assert_eq!(Type::Unsigned8.integer(&[0xFE]), Some(254));
-        assert_eq!(Type::Integer16.integer(&[0x00, 0x80]), Some(-32768));
-        assert_eq!(Type::Unsigned32.integer(&[0xFF; 4]), Some(0xFFFF_FFFF));
-        assert_eq!(Type::Real32.integer(&[0; 4]), None);
+        assert_eq!(Type::Integer8.integer(0xFE), -2);
+        assert_eq!(Type::Unsigned8.integer(0xFE), 254);
+        assert_eq!(Type::Integer16.integer(0x8000), -32768);
+        assert_eq!(Type::Integer32.integer(0xFFFF_FFFF), -1);
+        assert_eq!(Type::Unsigned32.integer(0xFFFF_FFFF), 0xFFFF_FFFF);
     }
 }
