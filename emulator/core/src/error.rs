@@ -1,38 +1,24 @@
 //! What can go wrong outside of the emulated program.
 
-use std::fmt;
-
+use thiserror::Error as ThisError;
 use unicorn_engine::uc_error;
 
-/// Why a machine could not be made or an image not be loaded.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What cannot be done.
+#[derive(Clone, Debug, PartialEq, Eq, ThisError)]
 pub enum Error {
-    /// The CPU library refused; the text names the call.
-    Engine(&'static str, uc_error),
-    /// The file is not an ELF file, or is cut short.
-    NotElf(String),
-    /// An ELF file for another machine than a little-endian 32-bit ARM.
-    NotArm(String),
-    /// A segment does not lie in flash.
-    OutOfRange {
-        /// First address of the segment.
-        address: u32,
-        /// Its length in bytes.
-        length: usize,
-    },
+    /// The ELF file is not a program for this chip.
+    #[error("{0}")]
+    Elf(String),
+    /// More bytes than the flash array has.
+    #[error("{0} bytes do not fit the flash")]
+    FlashSize(usize),
+    /// The CPU library refused.
+    #[error("the CPU library failed: {0:?}")]
+    Engine(uc_error),
 }
 
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Error::Engine(call, error) => write!(f, "the CPU library failed in {call}: {error:?}"),
-            Error::NotElf(reason) => write!(f, "not an ELF file: {reason}"),
-            Error::NotArm(found) => write!(f, "not an ELF file for a 32-bit ARM: {found}"),
-            Error::OutOfRange { address, length } => {
-                write!(f, "the image has {length} bytes for {address:#010x}, which is not in flash")
-            }
-        }
+impl From<uc_error> for Error {
+    fn from(error: uc_error) -> Error {
+        Error::Engine(error)
     }
 }
-
-impl std::error::Error for Error {}

@@ -50,27 +50,25 @@ impl Array {
 
 /// All memory of the chip.
 pub(crate) struct Memory {
-    arrays: Vec<Array>,
+    flash: Array,
+    ram: Array,
 }
 
 impl Memory {
     pub(crate) fn new(model: &Model) -> Memory {
-        let ranges = std::iter::once(&model.flash).chain(&model.ram);
-        Memory { arrays: ranges.map(|range| Array::new(range.clone())).collect() }
+        Memory { flash: Array::new(model.flash.clone()), ram: Array::new(model.ram.clone()) }
     }
 
-    /// The flash array.
     pub(crate) fn flash(&self) -> &Array {
-        &self.arrays[0]
+        &self.flash
     }
 
-    /// The RAM arrays.
-    pub(crate) fn ram(&self) -> &[Array] {
-        &self.arrays[1..]
+    pub(crate) fn ram(&self) -> &Array {
+        &self.ram
     }
 
     fn at(&self, address: u32, length: usize) -> Result<*mut u8, BusFault> {
-        self.arrays.iter().find_map(|array| array.at(address, length)).ok_or(BusFault)
+        self.flash.at(address, length).or_else(|| self.ram.at(address, length)).ok_or(BusFault)
     }
 
     /// Copies bytes out.
@@ -103,21 +101,6 @@ impl Memory {
         let mut bytes = [0; 4];
         self.load(address, &mut bytes).map(|()| u32::from_le_bytes(bytes))
     }
-
-    /// Fills RAM with what it holds at power-on.
-    pub(crate) fn paint(&self) {
-        for array in self.ram() {
-            for address in array.range().step_by(4) {
-                // A word of RAM is always inside it.
-                let _ = self.store(address, &paint(address).to_le_bytes());
-            }
-        }
-    }
-
-    /// The lowest word in `range` that is not as at power-on.
-    pub(crate) fn lowest_touched(&self, range: Range<u32>) -> Option<u32> {
-        range.step_by(4).find(|&address| self.word(address).is_ok_and(|word| word != paint(address)))
-    }
 }
 
 impl chip::Memory for Memory {
@@ -126,23 +109,13 @@ impl chip::Memory for Memory {
     }
 }
 
-/// What RAM holds at power-on: noise that is the same in every run, so that a program that reads what it did not
-/// write is seen, and the depth of a stack too.
-fn paint(address: u32) -> u32 {
-    address.wrapping_mul(0x9E37_79B1) ^ 0xA5C3_5A3C
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn memory() -> Memory {
-        let model = Model {
-            flash: 0x0800_0000..0x0800_2000,
-            ram: vec![0x2000_0000..0x2000_1000],
-            windows: vec![],
-            reset_clock: 16_000_000,
-        };
+        let model =
+            Model { flash: 0x0800_0000..0x0800_2000, ram: 0x2000_0000..0x2000_1000, ..Model::stm32f4(0) };
         Memory::new(&model)
     }
 
@@ -155,11 +128,10 @@ mod tests {
     }
 
     #[test]
-    fn deepest_touch_is_found() {
+    fn a_fill_ends_where_it_should() {
         let memory = memory();
-        memory.paint();
-        assert_eq!(memory.lowest_touched(0x2000_0000..0x2000_1000), None);
-        memory.store(0x2000_0804, &[0; 4]).unwrap();
-        assert_eq!(memory.lowest_touched(0x2000_0000..0x2000_1000), Some(0x2000_0804));
+        assert_eq!(memory.fill(&(0x0800_0004..0x0800_0006), 0xAA), Ok(()));
+        assert_eq!(memory.word(0x0800_0004), Ok(0x0000_AAAA));
+        assert_eq!(memory.fill(&(0x0800_1FFF..0x0800_2001), 0), Err(BusFault));
     }
 }

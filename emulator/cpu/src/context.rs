@@ -140,7 +140,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// The exception that follows without unstacking.
     fn follower(&self) -> Option<Exception> {
         let core = self.cpu.get_data();
-        let next = core.nvic.to_take(engine::masks(&self.cpu))?;
+        let next = core.to_take(engine::masks(&self.cpu))?;
         (!core.lacks(Mechanism::TailChain)).then_some(next)
     }
 

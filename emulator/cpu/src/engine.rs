@@ -13,7 +13,7 @@ use crate::ppb;
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
 /// A page of our own, outside everything the chip has, for code that the emulator itself runs.
-const HIDDEN: u64 = 0xFFFF_F000;
+const HIDDEN: u64 = 0x1F00_0000;
 /// `clrex; wfi`
 const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
 
@@ -49,7 +49,7 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
 
 /// The clock: charges a block before it runs, or stops before it when something is due.
 fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
-    if address >= HIDDEN {
+    if address & !0xFFF == HIDDEN {
         return;
     }
     let core = cpu.get_data();
@@ -73,7 +73,7 @@ fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32)
 }
 
 fn preempts<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> bool {
-    cpu.get_data().nvic.to_take(masks(cpu)).is_some()
+    cpu.get_data().to_take(masks(cpu)).is_some()
 }
 
 /// The masking registers, less what a test has switched off.
@@ -92,7 +92,7 @@ fn on_interrupt<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, number: u32) {
         2 => Halt::SupervisorCall,
         7 => Halt::Breakpoint,
         8 => Halt::ExceptionReturn,
-        _ => return,
+        _ => Halt::Undefined,
     });
     let _ = cpu.emu_stop();
 }

@@ -1,0 +1,189 @@
+//! The state that the hooks of the CPU library share with the run loop: clock, interrupt controller, system
+//! registers, and the chip behind them.
+
+use std::collections::{HashMap, VecDeque};
+
+use canbus::Time;
+use chip::{Effect, Memory, Peripherals};
+
+use crate::cost::Cost;
+use crate::exception::Exception;
+use crate::mechanism::Mechanism;
+use crate::nvic::{Masks, Nvic};
+use crate::scb::Scb;
+use crate::stats::Stats;
+use crate::systick::SysTick;
+
+/// Why the CPU library was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Halt {
+    /// Something is due: time, an effect, an interrupt.
+    Attention,
+    /// The core branched to an EXC_RETURN value.
+    ExceptionReturn,
+    /// SVC; the address after it.
+    SupervisorCall,
+    /// BKPT.
+    Breakpoint,
+    /// An exception of the CPU library's own, such as an access that it forbids.
+    Undefined,
+    /// A data access that nothing answers, seen by the chip or by the system space.
+    DataFault(u32),
+}
+
+/// An access to memory that is not mapped, as the hook saw it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Unmapped {
+    pub(crate) address: u32,
+    pub(crate) fetch: bool,
+}
+
+/// Everything but the registers and the memory.
+pub(crate) struct Core<P> {
+    pub(crate) chip: P,
+    pub(crate) now: Time,
+    /// Length of a core cycle.
+    pub(crate) cycle: Time,
+    /// The run loop wants control back here.
+    pub(crate) until: Time,
+    pub(crate) nvic: Nvic,
+    pub(crate) scb: Scb,
+    pub(crate) systick: SysTick,
+    pub(crate) stats: Stats,
+    pub(crate) halt: Option<Halt>,
+    pub(crate) unmapped: Option<Unmapped>,
+    pub(crate) effects: VecDeque<Effect>,
+    /// When an exception became pending, for its latency.
+    pub(crate) pended: [Time; Exception::COUNT],
+    pub(crate) costs: HashMap<(u32, u32), Cost>,
+    pub(crate) reset_requested: bool,
+    pub(crate) without: Option<Mechanism>,
+    cyccnt: Option<Cyccnt>,
+}
+
+/// DWT_CYCCNT: its value at some instant, and it runs from there.
+#[derive(Clone, Copy, Debug)]
+struct Cyccnt {
+    at: Time,
+    value: u32,
+}
+
+impl<P: Peripherals> Core<P> {
+    pub(crate) fn new(chip: P) -> Core<P> {
+        Core {
+            chip,
+            now: Time::ZERO,
+            cycle: Time::of_cycle(16_000_000),
+            until: Time::ZERO,
+            nvic: Nvic::default(),
+            scb: Scb::default(),
+            systick: SysTick::default(),
+            stats: Stats::default(),
+            halt: None,
+            unmapped: None,
+            effects: VecDeque::new(),
+            pended: [Time::ZERO; Exception::COUNT],
+            costs: HashMap::new(),
+            reset_requested: false,
+            without: None,
+            cyccnt: None,
+        }
+    }
+
+    /// Back to the state after a reset; the clock of virtual time and the counters go on.
+    pub(crate) fn reset(&mut self) {
+        self.nvic = Nvic::default();
+        self.scb = Scb::default();
+        self.systick = SysTick::default();
+        self.stats.unwound();
+        self.halt = None;
+        self.unmapped = None;
+        self.reset_requested = false;
+        self.cyccnt = None;
+        self.cycle = Time::of_cycle(16_000_000);
+    }
+
+    /// The exception to take now, if one may preempt.
+    pub(crate) fn to_take(&self, masks: Masks) -> Option<Exception> {
+        let nested = self.nvic.any_active();
+        self.nvic.to_take(masks).filter(|_| !(nested && self.lacks(Mechanism::Preemption)))
+    }
+
+    pub(crate) fn lacks(&self, mechanism: Mechanism) -> bool {
+        self.without == Some(mechanism)
+    }
+
+    /// The next instant at which something happens by itself.
+    pub(crate) fn deadline(&self) -> Time {
+        self.chip.deadline().min(self.systick.deadline())
+    }
+
+    /// Whether the run loop has something to do before the next block runs.
+    pub(crate) fn needs_attention(&self) -> bool {
+        self.now >= self.until
+            || self.reset_requested
+            || !self.effects.is_empty()
+            || self.now >= self.deadline()
+    }
+
+    /// Lets everything due happen, and samples the interrupt lines.
+    pub(crate) fn advance(&mut self, memory: &dyn Memory) {
+        if self.chip.deadline() <= self.now {
+            self.chip.advance(self.now, memory);
+        }
+        if self.systick.advance(self.now) {
+            self.pend(Exception::SYS_TICK);
+        }
+        self.settle();
+    }
+
+    /// Takes over what a call into the chip changed.
+    pub(crate) fn settle(&mut self) {
+        while let Some(effect) = self.chip.effect() {
+            self.effects.push_back(effect);
+        }
+        let before = self.nvic.pending_set();
+        self.nvic.sample(self.chip.lines());
+        self.stamp(self.nvic.pending_set() & !before);
+    }
+
+    pub(crate) fn pend(&mut self, exception: Exception) {
+        if !self.nvic.is_pending(exception) {
+            self.pended[usize::from(exception.0)] = self.now;
+        }
+        self.nvic.pend(exception);
+    }
+
+    /// Remembers when these exceptions became pending.
+    pub(crate) fn stamp(&mut self, mut fresh: u128) {
+        while fresh != 0 {
+            self.pended[fresh.trailing_zeros() as usize] = self.now;
+            fresh &= fresh - 1;
+        }
+    }
+
+    pub(crate) fn spend(&mut self, instructions: u32, cycles: u32) {
+        self.now += Time(self.cycle.0 * u64::from(cycles));
+        self.stats.ran(instructions, cycles);
+    }
+
+    /// HCLK is now `hertz`; the cycle counter goes on from where it is.
+    pub(crate) fn set_clock(&mut self, hertz: u64) {
+        let count = self.cyccnt();
+        self.cycle = Time::of_cycle(hertz.max(1));
+        self.set_cyccnt(self.cyccnt_runs(), count);
+    }
+
+    pub(crate) fn cyccnt(&self) -> u32 {
+        self.cyccnt
+            .map_or(0, |count| count.value.wrapping_add((self.now.since(count.at).0 / self.cycle.0) as u32))
+    }
+
+    pub(crate) fn cyccnt_runs(&self) -> bool {
+        self.cyccnt.is_some()
+    }
+
+    pub(crate) fn set_cyccnt(&mut self, runs: bool, value: u32) {
+        self.cyccnt = runs.then_some(Cyccnt { at: self.now, value });
+    }
+}

@@ -1,0 +1,414 @@
+//! The machine: a core with its memory and a chip around it, run in virtual time.
+
+use std::ops::Range;
+
+use canbus::Time;
+use chip::{BusFault, Effect, Memory, Peripherals};
+use thiserror::Error as ThisError;
+use unicorn_engine::{RegisterARM, uc_error};
+
+use crate::core::{Core, Halt};
+use crate::engine::{self, Cpu};
+use crate::exception::Exception;
+use crate::fault::Fault;
+use crate::loader::{self, Image};
+use crate::mechanism::Mechanism;
+use crate::stats::Stats;
+
+/// The value of every byte of RAM after power-on: what still has it was never written.
+pub const RAM_PATTERN: u8 = 0xA5;
+
+/// The memory of a chip.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The flash array.
+    pub flash: Range<u32>,
+    /// The RAM.
+    pub ram: Range<u32>,
+    /// Where the chip answers instead of memory.
+    pub peripherals: Vec<Range<u32>>,
+}
+
+impl Model {
+    /// An STM32F4 with 128 KiB of RAM and this much flash.
+    pub fn stm32f4(flash: u32) -> Model {
+        Model {
+            flash: 0x0800_0000..0x0800_0000 + flash,
+            ram: 0x2000_0000..0x2002_0000,
+            // The peripherals of both buses, and the system memory with identification and calibration.
+            peripherals: vec![0x1FFF_0000..0x1FFF_8000, 0x4000_0000..0x4008_0000, 0x5000_0000..0x5006_1000],
+        }
+    }
+}
+
+/// What cannot be done.
+#[derive(Debug, ThisError)]
+pub enum Error {
+    /// The ELF file is not one for this chip.
+    #[error("{0}")]
+    Elf(String),
+    /// The CPU library refused.
+    #[error("the CPU library failed: {0:?}")]
+    Cpu(uc_error),
+}
+
+impl From<uc_error> for Error {
+    fn from(error: uc_error) -> Error {
+        Error::Cpu(error)
+    }
+}
+
+/// Why [`Machine::run_until`] came back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The time is reached.
+    Reached,
+    /// The chip wants the world to look at the bus.
+    Poked,
+    /// A fault inside of a fault: the core stands still until a reset.
+    Lockup {
+        /// Where it happened.
+        pc: u32,
+    },
+    /// The supply is gone, as a test asked for.
+    PowerCut,
+}
+
+/// A reset or a fault, with its instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Incident {
+    /// A fault was taken.
+    Fault(Fault),
+    /// The program asked for a reset.
+    SoftwareReset,
+    /// The chip reset itself: a watchdog.
+    ChipReset,
+}
+
+/// A core, its memory, and a chip.
+pub struct Machine<P: Peripherals + 'static> {
+    pub(crate) cpu: Cpu<P>,
+    model: Model,
+    powered: bool,
+    sleeping: bool,
+    locked: Option<u32>,
+    stall: Time,
+    incidents: Vec<(Time, Incident)>,
+}
+
+impl<P: Peripherals + 'static> Machine<P> {
+    /// A machine without power, its flash erased.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn new(model: Model, peripherals: P) -> Result<Machine<P>, Error> {
+        let mut cpu = engine::new(&model, Core::new(peripherals))?;
+        cpu.mem_write(model.flash.start.into(), &vec![0xFF; model.flash.len()])?;
+        Ok(Machine {
+            cpu,
+            model,
+            powered: false,
+            sleeping: false,
+            locked: None,
+            stall: Time::ZERO,
+            incidents: vec![],
+        })
+    }
+
+    /// Writes the segments of an ELF file into flash, as a debug probe does.
+    ///
+    /// # Errors
+    /// [`Error::Elf`] for anything but a program for this chip; nothing is written then.
+    pub fn load_elf(&mut self, file: &[u8]) -> Result<Image, Error> {
+        let image = loader::parse(file, &self.model)?;
+        for segment in &image.segments {
+            engine::store(&mut self.cpu, segment.address, &segment.bytes)?;
+        }
+        Ok(image)
+    }
+
+    /// The flash array.
+    pub fn flash(&self) -> Vec<u8> {
+        self.cpu.mem_read_as_vec(self.model.flash.start.into(), self.model.flash.len()).unwrap_or_default()
+    }
+
+    /// Replaces the flash array, from its start.
+    ///
+    /// # Errors
+    /// When `contents` is longer than the array.
+    pub fn set_flash(&mut self, contents: &[u8]) -> Result<(), Error> {
+        engine::store(&mut self.cpu, self.model.flash.start, contents)
+    }
+
+    /// Reads memory, not registers.
+    ///
+    /// # Errors
+    /// [`BusFault`] where there is no memory.
+    pub fn read(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
+        self.cpu.mem_read(address.into(), bytes).map_err(|_| BusFault)
+    }
+
+    /// Writes memory, not registers.
+    ///
+    /// # Errors
+    /// [`BusFault`] where there is no memory.
+    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), BusFault> {
+        engine::store(&mut self.cpu, address, bytes).map_err(|_| BusFault)
+    }
+
+    /// Sets a core register, as a debugger does: 0..=12, 13 the stack pointer, 14 the link register.
+    pub fn set_register(&mut self, number: u8, value: u32) {
+        let register = RegisterARM::R0 as i32 + i32::from(number.min(12));
+        let register = match number {
+            13 => RegisterARM::SP as i32,
+            14 => RegisterARM::LR as i32,
+            _ => register,
+        };
+        let _ = self.cpu.reg_write(register, value.into());
+    }
+
+    /// Switches the supply on at an instant.
+    pub fn power_on(&mut self, at: Time) {
+        let pattern = vec![RAM_PATTERN; self.model.ram.len()];
+        let _ = self.write(self.model.ram.start, &pattern);
+        let core = self.cpu.get_data_mut();
+        core.now = core.now.max(at);
+        core.chip.reset(true, core.now);
+        self.powered = true;
+        self.restart();
+    }
+
+    /// Switches the supply off: RAM is lost, flash stays.
+    pub fn power_off(&mut self) {
+        self.powered = false;
+    }
+
+    /// Virtual time.
+    pub fn now(&self) -> Time {
+        self.cpu.get_data().now
+    }
+
+    /// The chip.
+    pub fn peripherals(&self) -> &P {
+        &self.cpu.get_data().chip
+    }
+
+    /// The chip.
+    pub fn peripherals_mut(&mut self) -> &mut P {
+        &mut self.cpu.get_data_mut().chip
+    }
+
+    /// What was counted.
+    pub fn stats(&self) -> &Stats {
+        &self.cpu.get_data().stats
+    }
+
+    /// Faults and resets since power-on of the machine, with their instants.
+    pub fn incidents(&self) -> &[(Time, Incident)] {
+        &self.incidents
+    }
+
+    /// The memory of the chip.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Switches one mechanism off, for the negative control of a test.
+    pub fn without(&mut self, mechanism: Mechanism) {
+        self.cpu.get_data_mut().without = Some(mechanism);
+    }
+
+    /// The next instant at which something happens here when the outside does nothing: now, unless the core sleeps.
+    pub fn next_event(&self) -> Time {
+        let core = self.cpu.get_data();
+        match (self.powered, self.sleeping || self.locked.is_some()) {
+            (false, _) => Time::NEVER,
+            (true, true) => core.deadline().max(core.now),
+            (true, false) => core.now,
+        }
+    }
+
+    /// Runs to `until`, or to what stops it earlier.
+    pub fn run_until(&mut self, until: Time) -> Stop {
+        self.cpu.get_data_mut().until = until;
+        loop {
+            if !self.powered {
+                let core = self.cpu.get_data_mut();
+                core.now = core.now.max(until);
+                return Stop::Reached;
+            }
+            if let Some(stop) = self.attend() {
+                return stop;
+            }
+            if self.now() >= until {
+                return self.locked.map_or(Stop::Reached, |pc| Stop::Lockup { pc });
+            }
+            self.step(until);
+        }
+    }
+
+    /// Everything that is due before the next block: events, effects, resets.
+    fn attend(&mut self) -> Option<Stop> {
+        self.advance_chip();
+        while let Some(effect) = self.cpu.get_data_mut().effects.pop_front() {
+            if let Some(stop) = self.carry_out(effect) {
+                return Some(stop);
+            }
+        }
+        if std::mem::take(&mut self.cpu.get_data_mut().reset_requested) {
+            self.reset(Incident::SoftwareReset);
+        }
+        None
+    }
+
+    fn advance_chip(&mut self) {
+        let core: *mut Core<P> = self.cpu.get_data_mut();
+        // SAFETY: `View` reads guest memory only, through the library's handle; it does not touch the user data
+        // that `core` points to, and nothing else holds a reference to it meanwhile.
+        unsafe { (*core).advance(&View(&self.cpu)) };
+    }
+
+    fn carry_out(&mut self, effect: Effect) -> Option<Stop> {
+        match engine::apply(&mut self.cpu, effect) {
+            Ok(Some(Effect::StallFlash(end))) => self.stall = self.stall.max(end),
+            Ok(Some(Effect::CoreClock(hertz))) => self.cpu.get_data_mut().set_clock(hertz),
+            Ok(Some(Effect::Reset)) => self.reset(Incident::ChipReset),
+            Ok(Some(Effect::Poke)) => return Some(Stop::Poked),
+            Ok(Some(Effect::PowerCut)) => {
+                self.power_off();
+                return Some(Stop::PowerCut);
+            }
+            // The address of an effect was checked when the chip made it: outside of memory it is lost, as on a
+            // real bus.
+            Ok(_) | Err(_) => {}
+        }
+        None
+    }
+
+    /// One step of the core: an exception, sleep, or code.
+    fn step(&mut self, until: Time) {
+        let masks = engine::masks(&self.cpu);
+        let core = self.cpu.get_data();
+        if self.locked.is_some() {
+            return self.idle(until);
+        }
+        if self.sleeping {
+            if !core.nvic.wakes(masks) && !core.lacks(Mechanism::Sleep) {
+                return self.idle(until);
+            }
+            self.sleeping = false;
+        }
+        if let Some(exception) = core.to_take(masks) {
+            return self.enter(exception);
+        }
+        if self.stalls() {
+            return self.pass_to(self.stall.min(until));
+        }
+        self.run_code();
+    }
+
+    fn stalls(&self) -> bool {
+        self.now() < self.stall && self.model.flash.contains(&self.pc())
+    }
+
+    /// Nothing runs until the next event.
+    fn idle(&mut self, until: Time) {
+        let before = self.now();
+        let next = self.cpu.get_data().deadline().min(until);
+        self.pass_to(next);
+        let core = self.cpu.get_data_mut();
+        core.stats.asleep += core.now - before;
+    }
+
+    fn pass_to(&mut self, instant: Time) {
+        let core = self.cpu.get_data_mut();
+        core.now = core.now.max(instant);
+    }
+
+    fn run_code(&mut self) {
+        let core = self.cpu.get_data_mut();
+        core.halt = None;
+        core.unmapped = None;
+        let result = self.cpu.emu_start(u64::from(self.pc() | 1), 0, 0, 0);
+        match (result, self.cpu.get_data_mut().halt.take()) {
+            (_, Some(Halt::Attention)) => {}
+            (_, Some(Halt::ExceptionReturn)) => self.leave(),
+            (_, Some(Halt::SupervisorCall)) => self.raise(Exception::SV_CALL),
+            (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),
+            (_, Some(Halt::Undefined)) => self.take_fault(Fault::undefined(self.pc())),
+            (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
+            (Err(error), None) => self.take_fault(self.fault_of(error)),
+            (Ok(()), None) => self.sleeping = true,
+        }
+    }
+
+    fn fault_of(&self, error: uc_error) -> Fault {
+        let pc = self.pc();
+        match self.cpu.get_data().unmapped {
+            Some(access) if access.fetch => Fault::fetch(pc),
+            Some(access) => Fault::data(pc, access.address),
+            None if matches!(error, uc_error::FETCH_PROT | uc_error::FETCH_UNMAPPED) => Fault::fetch(pc),
+            None => Fault::undefined(pc),
+        }
+    }
+
+    /// Pends an exception of the core itself.
+    fn raise(&mut self, exception: Exception) {
+        self.cpu.get_data_mut().pend(exception);
+    }
+
+    pub(crate) fn note(&mut self, incident: Incident) {
+        let now = self.now();
+        self.incidents.push((now, incident));
+    }
+
+    pub(crate) fn lock_up(&mut self, pc: u32) {
+        self.locked = Some(pc);
+    }
+
+    fn reset(&mut self, incident: Incident) {
+        self.note(incident);
+        let core = self.cpu.get_data_mut();
+        core.chip.reset(false, core.now);
+        self.restart();
+    }
+
+    /// The core after any reset: stack pointer and program counter from the start of flash.
+    fn restart(&mut self) {
+        self.cpu.get_data_mut().reset();
+        self.sleeping = false;
+        self.locked = None;
+        self.stall = Time::ZERO;
+        let vectors = self.model.flash.start;
+        let (stack, entry) = (self.word(vectors).unwrap_or(0), self.word(vectors + 4).unwrap_or(0));
+        self.reset_registers(stack, entry);
+        self.cpu.get_data_mut().settle();
+    }
+
+    pub(crate) fn word(&self, address: u32) -> Option<u32> {
+        let mut bytes = [0; 4];
+        self.cpu.mem_read(address.into(), &mut bytes).ok()?;
+        Some(u32::from_le_bytes(bytes))
+    }
+
+    pub(crate) fn register(&self, register: RegisterARM) -> u32 {
+        self.cpu.reg_read(register).unwrap_or(0) as u32
+    }
+
+    pub(crate) fn set(&mut self, register: RegisterARM, value: u32) {
+        let _ = self.cpu.reg_write(register, value.into());
+    }
+
+    pub(crate) fn pc(&self) -> u32 {
+        self.register(RegisterARM::PC) & !1
+    }
+}
+
+/// Guest memory for a DMA transfer.
+struct View<'a, P: 'static>(&'a unicorn_engine::Unicorn<'static, Core<P>>);
+
+impl<P: 'static> Memory for View<'_, P> {
+    fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
+        self.0.mem_read(address.into(), bytes).map_err(|_| BusFault)
+    }
+}

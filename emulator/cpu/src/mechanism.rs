@@ -1,0 +1,24 @@
+//! Parts of the core that a test may switch off, to see that another test notices.
+
+/// One mechanism.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mechanism {
+    /// BASEPRI masks interrupts.
+    Basepri,
+    /// A higher priority interrupts a lower one.
+    Preemption,
+    /// Exception entry saves the floating-point registers in use.
+    FloatFrame,
+    /// Exception return restores the state of an IT block.
+    ItState,
+    /// Exception entry and return clear the exclusive monitor.
+    ExclusiveMonitor,
+    /// Code written to flash takes the place of what was translated before.
+    Retranslation,
+    /// A pending exception follows the ending one without unstacking.
+    TailChain,
+    /// A fault that cannot be taken becomes a HardFault.
+    Escalation,
+    /// WFI sleeps until something is pending.
+    Sleep,
+}

@@ -1,0 +1,228 @@
+//! The nested vectored interrupt controller, for interrupts and system exceptions alike (ARMv7-M, B1.5 and B3.4).
+
+use chip::IrqLines;
+
+use crate::exception::Exception;
+
+/// Bits of priority that the STM32F4 implements, in the high bits of the byte.
+const PRIORITY_BITS: u32 = 4;
+
+/// Exceptions that are always enabled: Reset to SysTick.
+const ALWAYS_ENABLED: u128 = 0xFFFF;
+
+/// The registers that mask exceptions.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Masks {
+    pub(crate) primask: bool,
+    pub(crate) faultmask: bool,
+    pub(crate) basepri: u8,
+}
+
+/// Pending, enabled and active exceptions with their priorities.
+#[derive(Clone, Debug)]
+pub(crate) struct Nvic {
+    pending: u128,
+    enabled: u128,
+    active: u128,
+    lines: u128,
+    priority: [u8; Exception::COUNT],
+    /// AIRCR.PRIGROUP: how many low bits of a priority do not preempt, less one.
+    group: u32,
+}
+
+impl Default for Nvic {
+    fn default() -> Nvic {
+        Nvic {
+            pending: 0,
+            enabled: ALWAYS_ENABLED,
+            active: 0,
+            lines: 0,
+            priority: [0; Exception::COUNT],
+            group: 0,
+        }
+    }
+}
+
+impl Nvic {
+    /// Takes the levels of the interrupt lines. A rising line pends; a line that stays high pends again when its
+    /// exception ends.
+    pub(crate) fn sample(&mut self, lines: IrqLines) {
+        let lines = lines.0 << 16;
+        self.pending |= lines & !self.lines;
+        self.lines = lines;
+    }
+
+    pub(crate) fn pend(&mut self, exception: Exception) {
+        self.pending |= exception.bit();
+    }
+
+    /// Clears a pending state; a line that is still high sets it again at once.
+    pub(crate) fn clear(&mut self, exceptions: u128) {
+        self.pending &= !exceptions;
+        self.pending |= self.lines & exceptions & !self.active;
+    }
+
+    pub(crate) fn is_pending(&self, exception: Exception) -> bool {
+        self.pending & exception.bit() != 0
+    }
+
+    pub(crate) fn is_active(&self, exception: Exception) -> bool {
+        self.active & exception.bit() != 0
+    }
+
+    /// Whether any exception is active.
+    pub(crate) fn any_active(&self) -> bool {
+        self.active != 0
+    }
+
+    /// Whether an interrupt (not a system exception) is pending.
+    pub(crate) fn any_irq_pending(&self) -> bool {
+        self.pending >> 16 != 0
+    }
+
+    /// Everything pending, as a set of exception numbers.
+    pub(crate) fn pending_set(&self) -> u128 {
+        self.pending
+    }
+
+    /// Makes a pending exception the active one.
+    pub(crate) fn activate(&mut self, exception: Exception) {
+        self.pending &= !exception.bit();
+        self.active |= exception.bit();
+    }
+
+    /// Ends an active exception.
+    pub(crate) fn deactivate(&mut self, exception: Exception) {
+        self.active &= !exception.bit();
+        self.pending |= self.lines & exception.bit();
+    }
+
+    /// The priority at which the core runs, masks left out: -1 in HardFault, 256 in Thread mode.
+    fn active_priority(&self) -> i16 {
+        bits(self.active).map(|exception| self.group_priority(exception)).min().unwrap_or(256)
+    }
+
+    /// The priority at which the core runs.
+    pub(crate) fn execution_priority(&self, masks: Masks) -> i16 {
+        let mut priority = self.active_priority();
+        if masks.basepri != 0 {
+            priority = priority.min(self.grouped(masks.basepri));
+        }
+        if masks.primask {
+            priority = priority.min(0);
+        }
+        if masks.faultmask {
+            priority = priority.min(-1);
+        }
+        priority
+    }
+
+    /// Whether anything enabled is pending, whatever the masks say: the cheap question before the exact one.
+    pub(crate) fn wants_attention(&self) -> bool {
+        self.pending & self.enabled != 0
+    }
+
+    /// The exception to take now, if one may preempt.
+    pub(crate) fn to_take(&self, masks: Masks) -> Option<Exception> {
+        let candidate = self.first()?;
+        (self.group_priority(candidate) < self.execution_priority(masks)).then_some(candidate)
+    }
+
+    /// Whether WFI ends: the same question with PRIMASK left out.
+    pub(crate) fn wakes(&self, masks: Masks) -> bool {
+        self.to_take(Masks { primask: false, ..masks }).is_some()
+    }
+
+    /// Whether a fault of this exception could be taken now instead of escalating.
+    pub(crate) fn may_preempt(&self, exception: Exception, masks: Masks) -> bool {
+        self.group_priority(exception) < self.execution_priority(masks)
+    }
+
+    /// Highest priority first, then the lowest number.
+    fn first(&self) -> Option<Exception> {
+        bits(self.pending & self.enabled).min_by_key(|exception| (self.full_priority(*exception), *exception))
+    }
+
+    fn full_priority(&self, exception: Exception) -> i16 {
+        match exception {
+            Exception::NMI => -2,
+            Exception::HARD_FAULT => -1,
+            Exception(number) => i16::from(self.priority[usize::from(number)]),
+        }
+    }
+
+    fn group_priority(&self, exception: Exception) -> i16 {
+        match self.full_priority(exception) {
+            fixed @ ..0 => fixed,
+            priority => self.grouped(priority as u8),
+        }
+    }
+
+    fn grouped(&self, priority: u8) -> i16 {
+        i16::from(priority) & !((2 << self.group) - 1)
+    }
+
+    pub(crate) fn group(&self) -> u32 {
+        self.group
+    }
+
+    pub(crate) fn set_group(&mut self, group: u32) {
+        self.group = group & 7;
+    }
+
+    pub(crate) fn priority(&self, exception: Exception) -> u8 {
+        self.priority[usize::from(exception.0)]
+    }
+
+    pub(crate) fn set_priority(&mut self, exception: Exception, priority: u8) {
+        self.priority[usize::from(exception.0)] = priority & !(0xFF >> PRIORITY_BITS);
+    }
+
+    pub(crate) fn enabled_word(&self, word: u32) -> u32 {
+        irq_word(self.enabled, word)
+    }
+
+    pub(crate) fn pending_word(&self, word: u32) -> u32 {
+        irq_word(self.pending, word)
+    }
+
+    pub(crate) fn active_word(&self, word: u32) -> u32 {
+        irq_word(self.active, word)
+    }
+
+    pub(crate) fn enable(&mut self, word: u32, bits: u32) {
+        self.enabled |= irq_bits(word, bits);
+    }
+
+    pub(crate) fn disable(&mut self, word: u32, bits: u32) {
+        self.enabled &= !irq_bits(word, bits);
+    }
+
+    pub(crate) fn set_pending(&mut self, word: u32, bits: u32) {
+        self.pending |= irq_bits(word, bits);
+    }
+
+    pub(crate) fn clear_pending(&mut self, word: u32, bits: u32) {
+        self.clear(irq_bits(word, bits));
+    }
+}
+
+/// The exceptions of a set.
+fn bits(mut set: u128) -> impl Iterator<Item = Exception> {
+    std::iter::from_fn(move || {
+        let number = set.trailing_zeros();
+        (number < 128).then(|| {
+            set &= set - 1;
+            Exception(number as u8)
+        })
+    })
+}
+
+/// A word of 32 interrupts in a set of exceptions.
+fn irq_word(set: u128, word: u32) -> u32 {
+    (set >> 16).checked_shr(word * 32).unwrap_or(0) as u32
+}
+
+fn irq_bits(word: u32, bits: u32) -> u128 {
+    u128::from(bits).checked_shl(word * 32 + 16).unwrap_or(0)
+}

@@ -1,0 +1,146 @@
+//! The private peripheral bus: every register of the core by address (ARMv7-M, B3.1).
+
+use chip::Peripherals;
+
+use crate::core::Core;
+use crate::exception::Exception;
+
+/// Where the system space begins.
+pub(crate) const BASE: u32 = 0xE000_0000;
+/// How long it is.
+pub(crate) const SIZE: u32 = 0x0010_0000;
+
+const CPUID: u32 = 0x410F_C241;
+const AIRCR_KEY: u32 = 0x05FA;
+const SYSRESETREQ: u32 = 1 << 2;
+
+/// ICSR.
+const PENDSVSET: u32 = 1 << 28;
+const PENDSVCLR: u32 = 1 << 27;
+const PENDSTSET: u32 = 1 << 26;
+const PENDSTCLR: u32 = 1 << 25;
+const ISRPENDING: u32 = 1 << 22;
+
+impl<P: Peripherals> Core<P> {
+    /// A word of the system space; `None` where there is no register.
+    pub(crate) fn ppb_read(&mut self, address: u32, ipsr: u32) -> Option<u32> {
+        Some(match address {
+            0xE000_1000 => u32::from(self.cyccnt_runs()) | 0x4000_0000,
+            0xE000_1004 => self.cyccnt(),
+            0xE000_1FB0..=0xE000_1FFF => 0,
+            0xE000_E004 => 3,
+            0xE000_E008 => 0,
+            0xE000_E010..=0xE000_E01C => self.systick.read(address - 0xE000_E010, self.now),
+            0xE000_E100..=0xE000_E11C => self.nvic.enabled_word((address - 0xE000_E100) / 4),
+            0xE000_E180..=0xE000_E19C => self.nvic.enabled_word((address - 0xE000_E180) / 4),
+            0xE000_E200..=0xE000_E21C => self.nvic.pending_word((address - 0xE000_E200) / 4),
+            0xE000_E280..=0xE000_E29C => self.nvic.pending_word((address - 0xE000_E280) / 4),
+            0xE000_E300..=0xE000_E31C => self.nvic.active_word((address - 0xE000_E300) / 4),
+            0xE000_E400..=0xE000_E4EF => self.priorities(16 + (address - 0xE000_E400)),
+            0xE000_ED00 => CPUID,
+            0xE000_ED04 => self.icsr(ipsr),
+            0xE000_ED08 => self.scb.vtor,
+            0xE000_ED0C => 0xFA05_0000 | self.nvic.group() << 8,
+            0xE000_ED10 => self.scb.scr,
+            0xE000_ED14 => self.scb.ccr,
+            0xE000_ED18..=0xE000_ED20 => self.priorities(4 + (address - 0xE000_ED18)),
+            0xE000_ED24 => self.scb.shcsr,
+            0xE000_ED28 => self.scb.cfsr,
+            0xE000_ED2C => self.scb.hfsr,
+            0xE000_ED34 => self.scb.mmfar,
+            0xE000_ED38 => self.scb.bfar,
+            0xE000_ED88 => self.scb.cpacr,
+            // MPU_TYPE: no regions.
+            0xE000_ED90 => 0,
+            0xE000_EDF0 => 0,
+            0xE000_EDFC => self.scb.demcr,
+            0xE000_EF34 => self.scb.fpccr,
+            _ => return None,
+        })
+    }
+
+    /// Writes a word of the system space; `None` where there is no register.
+    pub(crate) fn ppb_write(&mut self, address: u32, value: u32) -> Option<()> {
+        match address {
+            0xE000_1000 => self.set_cyccnt(value & 1 != 0, self.cyccnt()),
+            0xE000_1004 => self.set_cyccnt(self.cyccnt_runs(), value),
+            // The lock access register of the DWT: unlocked as a debugger would see it.
+            0xE000_1FB0 => {}
+            0xE000_E008 => {}
+            0xE000_E010..=0xE000_E01C => {
+                self.systick.write(address - 0xE000_E010, value, self.now, self.cycle)
+            }
+            0xE000_E100..=0xE000_E11C => self.nvic.enable((address - 0xE000_E100) / 4, value),
+            0xE000_E180..=0xE000_E19C => self.nvic.disable((address - 0xE000_E180) / 4, value),
+            0xE000_E200..=0xE000_E21C => self.pend_irqs((address - 0xE000_E200) / 4, value),
+            0xE000_E280..=0xE000_E29C => self.nvic.clear_pending((address - 0xE000_E280) / 4, value),
+            0xE000_E400..=0xE000_E4EF => self.set_priorities(16 + (address - 0xE000_E400), value),
+            0xE000_ED04 => self.set_icsr(value),
+            0xE000_ED08 => self.scb.vtor = value & 0x3FFF_FF80,
+            0xE000_ED0C => self.set_aircr(value),
+            0xE000_ED10 => self.scb.scr = value & 0x16,
+            0xE000_ED14 => self.scb.ccr = value,
+            0xE000_ED18..=0xE000_ED20 => self.set_priorities(4 + (address - 0xE000_ED18), value),
+            0xE000_ED24 => self.scb.shcsr = value & 0x0007_0000,
+            0xE000_ED28 => self.scb.cfsr &= !value,
+            0xE000_ED2C => self.scb.hfsr &= !value,
+            0xE000_ED34 => self.scb.mmfar = value,
+            0xE000_ED38 => self.scb.bfar = value,
+            0xE000_ED88 => self.scb.cpacr = value,
+            0xE000_EDFC => self.scb.demcr = value,
+            0xE000_EF00 => self.pend_irqs((value >> 5) & 3, 1 << (value & 31)),
+            0xE000_EF34 => self.scb.fpccr = value,
+            _ => return None,
+        }
+        Some(())
+    }
+
+    fn pend_irqs(&mut self, word: u32, bits: u32) {
+        let before = self.nvic.pending_set();
+        self.nvic.set_pending(word, bits);
+        self.stamp(self.nvic.pending_set() & !before);
+    }
+
+    /// Four priority bytes from exception number `first` on.
+    fn priorities(&self, first: u32) -> u32 {
+        let byte =
+            |n: u32| if n < Exception::COUNT as u32 { self.nvic.priority(Exception(n as u8)) } else { 0 };
+        u32::from_le_bytes([byte(first), byte(first + 1), byte(first + 2), byte(first + 3)])
+    }
+
+    fn set_priorities(&mut self, first: u32, value: u32) {
+        for (number, priority) in (first..).zip(value.to_le_bytes()) {
+            if number < Exception::COUNT as u32 {
+                self.nvic.set_priority(Exception(number as u8), priority);
+            }
+        }
+    }
+
+    fn icsr(&self, ipsr: u32) -> u32 {
+        let flag = |exception, bit| if self.nvic.is_pending(exception) { bit } else { 0 };
+        let irq = if self.nvic.any_irq_pending() { ISRPENDING } else { 0 };
+        ipsr | irq | flag(Exception::PEND_SV, PENDSVSET) | flag(Exception::SYS_TICK, PENDSTSET)
+    }
+
+    fn set_icsr(&mut self, value: u32) {
+        for (bit, exception) in
+            [(PENDSVSET, Exception::PEND_SV), (PENDSTSET, Exception::SYS_TICK), (1 << 31, Exception::NMI)]
+        {
+            if value & bit != 0 {
+                self.pend(exception);
+            }
+        }
+        for (bit, exception) in [(PENDSVCLR, Exception::PEND_SV), (PENDSTCLR, Exception::SYS_TICK)] {
+            if value & bit != 0 {
+                self.nvic.clear(exception.bit());
+            }
+        }
+    }
+
+    fn set_aircr(&mut self, value: u32) {
+        if value >> 16 == AIRCR_KEY {
+            self.nvic.set_group(value >> 8 & 7);
+            self.reset_requested |= value & SYSRESETREQ != 0;
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! The system control block's own registers (ARMv7-M, B3.2): vector table, fault status, sleep, configuration.
+
+use crate::exception::Exception;
+
+/// Fault status bits of CFSR.
+pub(crate) mod cfsr {
+    pub(crate) const IACCVIOL: u32 = 1 << 0;
+    pub(crate) const IBUSERR: u32 = 1 << 8;
+    pub(crate) const PRECISERR: u32 = 1 << 9;
+    pub(crate) const UNSTKERR: u32 = 1 << 11;
+    pub(crate) const STKERR: u32 = 1 << 12;
+    pub(crate) const BFARVALID: u32 = 1 << 15;
+    pub(crate) const UNDEFINSTR: u32 = 1 << 16;
+    pub(crate) const INVPC: u32 = 1 << 18;
+}
+
+/// HFSR: a configurable fault escalated.
+const FORCED: u32 = 1 << 30;
+/// HFSR: a breakpoint without a debugger.
+const DEBUGEVT: u32 = 1 << 31;
+
+/// The registers.
+#[derive(Clone, Debug)]
+pub(crate) struct Scb {
+    pub(crate) vtor: u32,
+    pub(crate) scr: u32,
+    pub(crate) ccr: u32,
+    pub(crate) shcsr: u32,
+    pub(crate) cfsr: u32,
+    pub(crate) hfsr: u32,
+    pub(crate) bfar: u32,
+    pub(crate) mmfar: u32,
+    pub(crate) cpacr: u32,
+    pub(crate) fpccr: u32,
+    pub(crate) demcr: u32,
+}
+
+impl Default for Scb {
+    fn default() -> Scb {
+        Scb {
+            vtor: 0,
+            scr: 0,
+            ccr: 1 << 9,
+            shcsr: 0,
+            cfsr: 0,
+            hfsr: 0,
+            bfar: 0,
+            mmfar: 0,
+            cpacr: 0,
+            fpccr: 0xC000_0000,
+            demcr: 0,
+        }
+    }
+}
+
+impl Scb {
+    /// Notes a fault that was taken as HardFault instead.
+    pub(crate) fn note_escalation(&mut self) {
+        self.hfsr |= FORCED;
+    }
+
+    /// Notes a breakpoint that nobody handles.
+    pub(crate) fn note_breakpoint(&mut self) {
+        self.hfsr |= DEBUGEVT;
+    }
+
+    /// Notes a precise data access to an address where nothing answers.
+    pub(crate) fn note_data_fault(&mut self, address: u32) {
+        self.cfsr |= cfsr::PRECISERR | cfsr::BFARVALID;
+        self.bfar = address;
+    }
+
+    /// Whether software has enabled a configurable fault (SHCSR).
+    pub(crate) fn enables(&self, fault: Exception) -> bool {
+        let bit = match fault {
+            Exception::MEM_MANAGE => 16,
+            Exception::BUS_FAULT => 17,
+            Exception::USAGE_FAULT => 18,
+            _ => return true,
+        };
+        self.shcsr & 1 << bit != 0
+    }
+
+    /// Which configurable fault a set of CFSR bits belongs to.
+    pub(crate) fn fault_of(status: u32) -> Exception {
+        match status {
+            0..=0xFF => Exception::MEM_MANAGE,
+            0x100..=0xFFFF => Exception::BUS_FAULT,
+            _ => Exception::USAGE_FAULT,
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! What the core counted.
+
+use canbus::Time;
+
+use crate::exception::Exception;
+
+/// What ran at one exception, without what preempted it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Activity {
+    /// How often it was entered.
+    pub entries: u64,
+    /// Instructions in all.
+    pub instructions: u64,
+    /// Modelled cycles in all.
+    pub cycles: u64,
+    /// Most instructions in one activation.
+    pub worst_instructions: u64,
+    /// Most cycles in one activation.
+    pub worst_cycles: u64,
+    /// Longest time from pending to the first instruction.
+    pub worst_latency: Time,
+    /// Shortest time from pending to the first instruction; zero before the first entry.
+    pub least_latency: Time,
+    /// Instant of the first entry.
+    pub first_entry: Time,
+    /// Instant of the latest entry.
+    pub last_entry: Time,
+    /// Shortest time between two entries; zero before the second.
+    pub shortest_interval: Time,
+    /// Longest time between two entries; zero before the second.
+    pub longest_interval: Time,
+}
+
+impl Activity {
+    fn note_entry(&mut self, latency: Time, at: Time) {
+        self.least_latency = if self.entries == 0 { latency } else { self.least_latency.min(latency) };
+        self.worst_latency = self.worst_latency.max(latency);
+        let interval = at.since(self.last_entry);
+        match self.entries {
+            0 => self.first_entry = at,
+            1 => (self.shortest_interval, self.longest_interval) = (interval, interval),
+            _ => {
+                self.shortest_interval = self.shortest_interval.min(interval);
+                self.longest_interval = self.longest_interval.max(interval);
+            }
+        }
+        self.last_entry = at;
+        self.entries += 1;
+    }
+
+    /// How far the entries are from an even beat.
+    pub fn jitter(&self) -> Time {
+        self.worst_latency.since(self.least_latency)
+    }
+}
+
+/// Counters since power-on.
+#[derive(Clone, Debug)]
+pub struct Stats {
+    /// Instructions executed.
+    pub instructions: u64,
+    /// Cycles awake.
+    pub cycles: u64,
+    /// Time spent in WFI.
+    pub asleep: Time,
+    /// By exception number; 0 is Thread mode.
+    pub exceptions: [Activity; Exception::COUNT],
+    /// Exceptions that followed another without unstacking.
+    pub tail_chained: u64,
+    /// A hash over every exception entry with its time and return address: equal runs have equal hashes.
+    pub trace: u64,
+    running: Vec<Running>,
+}
+
+/// One activation that has not ended.
+#[derive(Clone, Copy, Debug)]
+struct Running {
+    exception: Exception,
+    instructions: u64,
+    cycles: u64,
+}
+
+impl Default for Stats {
+    fn default() -> Stats {
+        Stats {
+            instructions: 0,
+            cycles: 0,
+            asleep: Time::ZERO,
+            exceptions: [Activity::default(); Exception::COUNT],
+            tail_chained: 0,
+            trace: 0xCBF2_9CE4_8422_2325,
+            running: Vec::new(),
+        }
+    }
+}
+
+impl Stats {
+    /// The activity of one exception.
+    pub fn of(&self, exception: Exception) -> &Activity {
+        &self.exceptions[usize::from(exception.0)]
+    }
+
+    pub(crate) fn ran(&mut self, instructions: u32, cycles: u32) {
+        self.instructions += u64::from(instructions);
+        self.cycles += u64::from(cycles);
+        match self.running.last_mut() {
+            Some(running) => {
+                running.instructions += u64::from(instructions);
+                running.cycles += u64::from(cycles);
+            }
+            None => {
+                self.exceptions[0].instructions += u64::from(instructions);
+                self.exceptions[0].cycles += u64::from(cycles);
+            }
+        }
+    }
+
+    pub(crate) fn entered(&mut self, exception: Exception, latency: Time, at: Time, pc: u32) {
+        let activity = &mut self.exceptions[usize::from(exception.0)];
+        activity.note_entry(latency, at);
+        self.running.push(Running { exception, instructions: 0, cycles: 0 });
+        for word in [u64::from(exception.0), at.0, u64::from(pc)] {
+            // FNV-1a over words.
+            self.trace = (self.trace ^ word).wrapping_mul(0x0000_0100_0000_01B3);
+        }
+    }
+
+    pub(crate) fn left(&mut self) {
+        let Some(Running { exception, instructions, cycles }) = self.running.pop() else { return };
+        let activity = &mut self.exceptions[usize::from(exception.0)];
+        activity.instructions += instructions;
+        activity.cycles += cycles;
+        activity.worst_instructions = activity.worst_instructions.max(instructions);
+        activity.worst_cycles = activity.worst_cycles.max(cycles);
+    }
+
+    /// A reset ends every activation.
+    pub(crate) fn unwound(&mut self) {
+        while !self.running.is_empty() {
+            self.left();
+        }
+    }
+}

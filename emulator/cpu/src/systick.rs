@@ -1,0 +1,84 @@
+//! SysTick, the 24-bit timer of the core (ARMv7-M, B3.3). Computed from virtual time, not counted down.
+
+use canbus::Time;
+
+const ENABLE: u32 = 1 << 0;
+const TICKINT: u32 = 1 << 1;
+const CLKSOURCE: u32 = 1 << 2;
+const COUNTFLAG: u32 = 1 << 16;
+
+/// The timer; it wraps to the reload value one tick after zero.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SysTick {
+    control: u32,
+    reload: u32,
+    flag: bool,
+    /// The instant of the next change from 1 to 0.
+    zero: Time,
+    tick: Time,
+}
+
+impl SysTick {
+    /// The instant of the next event; [`Time::NEVER`] when it stands.
+    pub(crate) fn deadline(&self) -> Time {
+        if self.runs() { self.zero } else { Time::NEVER }
+    }
+
+    /// Lets time pass; `true` when the exception becomes pending.
+    pub(crate) fn advance(&mut self, now: Time) -> bool {
+        let mut pend = false;
+        while self.runs() && self.zero <= now {
+            self.flag = true;
+            pend |= self.control & TICKINT != 0;
+            self.zero += self.period();
+        }
+        pend
+    }
+
+    pub(crate) fn read(&mut self, offset: u32, now: Time) -> u32 {
+        match offset {
+            0x0 => self.control | if std::mem::take(&mut self.flag) { COUNTFLAG } else { 0 },
+            0x4 => self.reload,
+            0x8 => self.count(now),
+            // No reference clock calibration: NOREF is 0, SKEW 1, TENMS unknown.
+            _ => 1 << 30,
+        }
+    }
+
+    /// `cycle` is the length of a core cycle now.
+    pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time, cycle: Time) {
+        match offset {
+            0x0 => {
+                self.control = value & (ENABLE | TICKINT | CLKSOURCE);
+                // The external reference clock of the STM32F4 is HCLK / 8 (RM0390, 10.1).
+                self.tick = if value & CLKSOURCE == 0 { Time(cycle.0 * 8) } else { cycle };
+                self.restart(now);
+            }
+            0x4 => self.reload = value & 0x00FF_FFFF,
+            0x8 => {
+                self.flag = false;
+                self.restart(now);
+            }
+            _ => {}
+        }
+    }
+
+    fn runs(&self) -> bool {
+        self.control & ENABLE != 0 && self.reload != 0
+    }
+
+    fn period(&self) -> Time {
+        Time(self.tick.0 * (u64::from(self.reload) + 1))
+    }
+
+    fn restart(&mut self, now: Time) {
+        self.zero = now + self.period();
+    }
+
+    fn count(&self, now: Time) -> u32 {
+        if !self.runs() {
+            return 0;
+        }
+        ((self.zero.since(now).0 / self.tick.0) as u32) & 0x00FF_FFFF
+    }
+}

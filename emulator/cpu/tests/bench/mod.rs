@@ -1,0 +1,120 @@
+//! A machine with nothing around the core but flash that can be programmed, for programs that tell a verdict.
+
+use std::path::PathBuf;
+
+use canbus::Time;
+use chip::{BusFault, Effect, IrqLines, Memory, Peripherals};
+use emulator::{Machine, Model};
+use object::{Object, ObjectSymbol};
+
+const PASSED: u32 = 0x600D_600D;
+const FAILED: u32 = 0xBAD0_BAD0;
+
+/// What the program found out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// All is well.
+    Passed,
+    /// Something does not hold; the program's own number for it.
+    Failed(u32),
+    /// No verdict within a tenth of a virtual second.
+    Silent,
+}
+
+/// Flash that takes any store as programming; nothing else.
+#[derive(Default)]
+pub(crate) struct Bare {
+    effects: Vec<Effect>,
+}
+
+impl Peripherals for Bare {
+    fn read(&mut self, _: u32, _: u8, _: Time) -> Result<u32, BusFault> {
+        Err(BusFault)
+    }
+
+    fn write(&mut self, _: u32, _: u8, _: u32, _: Time) -> Result<(), BusFault> {
+        Err(BusFault)
+    }
+
+    fn program(&mut self, address: u32, old: &[u8], new: &[u8], _: Time) -> Result<(), BusFault> {
+        let bytes = old.iter().zip(new).map(|(old, new)| old & new).collect();
+        self.effects.push(Effect::Store { address, bytes });
+        Ok(())
+    }
+
+    fn deadline(&self) -> Time {
+        Time::NEVER
+    }
+
+    fn advance(&mut self, _: Time, _: &dyn Memory) {}
+
+    fn lines(&self) -> IrqLines {
+        IrqLines::default()
+    }
+
+    fn effect(&mut self) -> Option<Effect> {
+        self.effects.pop()
+    }
+
+    fn reset(&mut self, _: bool, _: Time) {}
+}
+
+/// A machine with a program.
+pub(crate) struct Bench {
+    /// The machine.
+    pub(crate) machine: Machine<Bare>,
+    verdict: u32,
+}
+
+impl Bench {
+    /// Loads a program of `mechanics-images`.
+    pub(crate) fn new(program: &str) -> Bench {
+        let path = directory().join(program);
+        let file = std::fs::read(&path)
+            .unwrap_or_else(|error| panic!("{}: {error}; run `cargo xtask images` first", path.display()));
+        let elf = object::File::parse(file.as_slice()).unwrap();
+        let verdict = elf.symbols().find(|symbol| symbol.name() == Ok("VERDICT")).expect("a verdict").address();
+        let mut machine = Machine::new(Model::stm32f4(512 * 1024), Bare::default()).unwrap();
+        machine.load_elf(&file).unwrap();
+        machine.power_on(Time::ZERO);
+        Bench { machine, verdict: u32::try_from(verdict).unwrap() }
+    }
+
+    /// Runs to the verdict, or for a tenth of a second.
+    pub(crate) fn run(&mut self) -> Verdict {
+        self.run_in_slices(Time::from_millis(1))
+    }
+
+    /// The same in slices, always to the end of the tenth.
+    pub(crate) fn run_in_slices(&mut self, slice: Time) -> Verdict {
+        let end = Time::from_millis(100);
+        while self.machine.now() < end {
+            let until = (self.machine.now() + slice).min(end);
+            self.machine.run_until(until);
+        }
+        match self.word(0) {
+            PASSED => Verdict::Passed,
+            FAILED => Verdict::Failed(self.word(1)),
+            _ => Verdict::Silent,
+        }
+    }
+
+    /// A number that the program noted.
+    pub(crate) fn note(&self, index: u32) -> u32 {
+        self.word(2 + index)
+    }
+
+    fn word(&self, index: u32) -> u32 {
+        let mut bytes = [0; 4];
+        self.machine.read(self.verdict + 4 * index, &mut bytes).unwrap();
+        u32::from_le_bytes(bytes)
+    }
+}
+
+/// Where the ELF files are.
+fn directory() -> PathBuf {
+    std::env::var_os("MECHANICS_IMAGES").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/thumbv7em-none-eabihf/release")),
+        PathBuf::from,
+    )
+}

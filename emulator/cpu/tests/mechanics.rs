@@ -1,0 +1,117 @@
+//! The mechanics of the core, each shown by a program of `mechanics-images`, and each with a negative control: the
+//! same program must notice when the mechanism is switched off.
+
+mod bench;
+
+use bench::{Bench, Verdict};
+use canbus::Time;
+use emulator::Mechanism;
+
+/// The program passes as it is, and fails or hangs without the mechanism.
+fn shows(program: &str, mechanism: Mechanism) {
+    assert_eq!(Bench::new(program).run(), Verdict::Passed, "{program}");
+    let mut crippled = Bench::new(program);
+    crippled.machine.without(mechanism);
+    assert_ne!(crippled.run(), Verdict::Passed, "{program} does not notice that {mechanism:?} is missing");
+}
+
+#[test]
+fn a_higher_priority_interrupts_a_lower_one() {
+    shows("preemption", Mechanism::Preemption);
+}
+
+#[test]
+fn basepri_holds_back_its_level_and_below() {
+    shows("basepri", Mechanism::Basepri);
+}
+
+#[test]
+fn locks_of_rtic_keep_others_out() {
+    shows("rtic_tasks", Mechanism::Basepri);
+}
+
+#[test]
+fn software_tasks_of_rtic_preempt_each_other() {
+    shows("rtic_tasks", Mechanism::Preemption);
+}
+
+#[test]
+fn four_contexts_keep_their_floating_point_registers() {
+    shows("float_contexts", Mechanism::FloatFrame);
+}
+
+#[test]
+fn an_it_block_goes_on_after_an_exception() {
+    shows("it_block", Mechanism::ItState);
+}
+
+#[test]
+fn an_interrupt_breaks_exclusive_access() {
+    shows("exclusive", Mechanism::ExclusiveMonitor);
+}
+
+#[test]
+fn code_programmed_into_flash_runs() {
+    shows("self_modified", Mechanism::Retranslation);
+}
+
+#[test]
+fn wfi_sleeps_until_the_next_tick() {
+    shows("systick", Mechanism::Sleep);
+}
+
+#[test]
+fn a_second_interrupt_is_chained() {
+    shows("tail_chain", Mechanism::TailChain);
+}
+
+#[test]
+fn faults_escalate() {
+    shows("escalation", Mechanism::Escalation);
+}
+
+#[test]
+fn a_stack_overflow_reaches_the_fault_handler() {
+    shows("stack_overflow", Mechanism::Escalation);
+}
+
+#[test]
+fn a_reset_keeps_ram_and_clears_the_core() {
+    let mut bench = Bench::new("restart");
+    assert_eq!(bench.run(), Verdict::Passed);
+    assert_eq!(bench.machine.incidents().len(), 1);
+}
+
+#[test]
+fn sleeping_takes_virtual_time_but_no_cycles() {
+    let mut bench = Bench::new("systick");
+    assert_eq!(bench.run(), Verdict::Passed);
+    let asleep = bench.machine.stats().asleep;
+    assert!(asleep > Time::from_millis(9) && asleep < Time::from_millis(12), "{asleep}");
+}
+
+#[test]
+fn tail_chaining_is_shorter_than_unstacking() {
+    let gap = |bench: &mut Bench| {
+        bench.run();
+        bench.note(0)
+    };
+    let chained = gap(&mut Bench::new("tail_chain"));
+    let mut bench = Bench::new("tail_chain");
+    bench.machine.without(Mechanism::TailChain);
+    assert!(chained < gap(&mut bench));
+}
+
+#[test]
+fn the_same_run_has_the_same_trace_however_it_is_sliced() {
+    let trace = |slice: Time| {
+        let mut bench = Bench::new("rtic_tasks");
+        bench.run_in_slices(slice);
+        let stats = bench.machine.stats();
+        (stats.trace, stats.instructions)
+    };
+    let whole = trace(Time::from_millis(1));
+    assert_eq!(whole, trace(Time::from_millis(1)));
+    assert_eq!(whole, trace(Time::from_micros(1)));
+    assert_eq!(whole, trace(Time(12_345)));
+}
