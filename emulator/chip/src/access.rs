@@ -188,6 +188,10 @@ impl Stm32f4 {
     fn write_rcc(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         self.catch_up(now);
         let done = self.rcc.write(offset, value, now);
+        if self.iwdg.is_running() {
+            // The watchdog keeps the LSI on whatever LSION says.
+            self.rcc.start_lsi(now);
+        }
         self.rcc.advance(now);
         self.update_clocks(now);
         if Rcc::is_reset_register(offset) {

@@ -93,7 +93,7 @@ impl Iwdg {
         count.saturating_sub((now.since(since).0 / self.tick()) as u32)
     }
 
-    /// When it resets the chip: a count of 0 lasts one tick too (RM0390 table 108).
+    /// When it resets the chip: a count of 0 lasts one tick too (RM0390 section 20, table of time-outs).
     pub(crate) fn deadline(&self) -> Time {
         self.count.map_or(Time::NEVER, |(count, since)| since + Time((u64::from(count) + 1) * self.tick()))
     }

@@ -120,7 +120,7 @@ pub(crate) struct Rcc {
     /// Frequency of the clock on OSC_IN; `None` without one.
     hse_hertz: Option<u64>,
     plain: RegisterFile,
-    /// HSI, HSE, PLL, PLLI2S, PLLSAI. Start-up times from the data sheet (DS10693 section 6.3.8 to 6.3.12).
+    /// HSI, HSE, PLL, PLLI2S, PLLSAI. Start-up times as in the data sheet (DS10693, electrical characteristics).
     sources: [Source; 5],
     trim_and_bypass: u32,
     lsi_ready: Time,
@@ -188,7 +188,7 @@ impl Rcc {
     /// The independent watchdog turns the LSI on by itself.
     pub(crate) fn start_lsi(&mut self, now: Time) {
         if self.lsi_ready == Time::NEVER {
-            // tsu(LSI), DS10693 table 44: 15 us typical, 40 us at most.
+            // tsu(LSI) of DS10693: 15 us typical, 40 us at most.
             self.lsi_ready = now + Time::from_micros(15);
         }
     }
@@ -294,7 +294,8 @@ impl Rcc {
         let cfgr = self.plain.get(CFGR);
         let timpre = self.variant == Variant::F446 && bit(self.plain.get(DCKCFGR), 24);
         Clocks {
-            hclk: self.system_clock() / u64::from(ahb_divider(field(cfgr, 4, 4))),
+            // A PLL that is set to nothing stands still; one hertz is as good.
+            hclk: (self.system_clock() / u64::from(ahb_divider(field(cfgr, 4, 4)))).max(1),
             apb1_divider: apb_divider(field(cfgr, 10, 3)),
             apb2_divider: apb_divider(field(cfgr, 13, 3)),
             fast_timers: timpre,

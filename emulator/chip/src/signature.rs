@@ -1,5 +1,5 @@
 //! The electronic signature in system memory: unique identifier, flash size and factory calibration
-//! (RM0390 section 34, DS10693 tables 75 and 78).
+//! (RM0390 section 34, DS10693, calibration values).
 
 use crate::plant::front_end::{TS_CAL1, TS_CAL2, VREFIN_CAL};
 use crate::variant::Variant;

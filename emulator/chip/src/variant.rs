@@ -27,7 +27,7 @@ impl Variant {
         }
     }
 
-    /// Sizes of the flash sectors in bytes, in order (RM0390 table 4, RM0090 table 5).
+    /// Sizes of the flash sectors in bytes, in order (RM0390 and RM0090 section 3.4, flash module organisation).
     pub fn sectors(self) -> impl Iterator<Item = u32> {
         let size = |index| match index {
             0..=3 => 16 * KIB,

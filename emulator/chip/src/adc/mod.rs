@@ -29,13 +29,13 @@ const PLAIN: &[Plain] = &[Plain::new(0x24, 0x0FFF, 0x0FFF), Plain::new(0x28, 0, 
 const EOC: u32 = 1;
 const STRT: u32 = 4;
 const OVR: u32 = 5;
-/// What CR1 may ask for: EOCIE, SCAN, RES and OVRIE.
-const CR1_MODELLED: u32 = 1 << 5 | 1 << 8 | 3 << 24 | 1 << 26;
+/// What CR1 may ask for: EOCIE, SCAN, RES, OVRIE, and AWDCH, which has no effect alone.
+const CR1_MODELLED: u32 = 0x1F | 1 << 5 | 1 << 8 | 3 << 24 | 1 << 26;
 /// What CR2 may ask for: all but JEXTEN and JSWSTART.
-const CR2_MODELLED: u32 = 0x7F00_0F03 & !(0x40 << 24);
-/// tSTAB, DS10693 section 6.3.20: 3 us at most.
+const CR2_MODELLED: u32 = 0x7F0F_0F03;
+/// tSTAB of DS10693: 3 us at most.
 const STABILISATION: Time = Time::from_micros(3);
-/// Regular trigger conversion latency, DS10693 section 6.3.20: 2 cycles of the ADC clock.
+/// Regular trigger conversion latency, tlatr of DS10693: 2 cycles of the ADC clock.
 const TRIGGER_LATENCY: u32 = 2;
 
 /// A timer whose TRGO starts conversions.
@@ -128,7 +128,7 @@ impl Adc {
             }
             CR1 => {
                 self.cr1 = value & 0x07C0_FFFF;
-                (value & !CR1_MODELLED & 0xFFFF_FFE0 == 0).then_some(())
+                (value & !CR1_MODELLED == 0).then_some(())
             }
             CR2 => self.write_control(value, now),
             SMPR1 | SMPR2 | SQR1..=SQR3 => self.sequence.write(offset, value),
@@ -144,14 +144,14 @@ impl Adc {
         if !self.uses_dma() || !bit(value, 8) {
             self.exhausted = false;
         }
-        self.cr2 = value & 0x3F7F_0F03;
+        self.cr2 = value & 0x3F3F_0F03;
         if !self.is_on() {
             self.conversion = None;
         } else if bit(value, 30) {
             self.start(now);
         }
         let known_trigger = field(value, 28, 2) == 0 || self.trigger().is_some();
-        (value & !CR2_MODELLED & 0xFF3F_FFFF == 0 && known_trigger).then_some(())
+        (value & !CR2_MODELLED == 0 && known_trigger).then_some(())
     }
 
     /// Reads DR.
@@ -173,7 +173,7 @@ impl Adc {
         bit(self.cr2, 8)
     }
 
-    /// The timer that starts conversions (EXTSEL, RM0390 table 78).
+    /// The timer that starts conversions (EXTSEL, RM0390 section 13.13.3).
     pub(crate) fn trigger(&self) -> Option<Trigger> {
         match (field(self.cr2, 28, 2), field(self.cr2, 24, 4)) {
             (1.., 6) if self.is_on() => Some(Trigger::Tim2),

@@ -1,4 +1,4 @@
-//! How long the flash works: typical times of DS10693 table 46 (the F405's DS8626 table 38 has the same ones).
+//! How long the flash works: typical times of the data sheets DS10693 and DS8626 (flash memory programming).
 
 use canbus::Time;
 

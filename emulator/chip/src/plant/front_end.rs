@@ -8,7 +8,7 @@
 //! The transducer is ratiometric and both dividers bring 5 V to 3.3 V, so PA0 over PA1 is the pressure whatever the
 //! supply is, and at 5 V the ADC reads the same ratio of VDDA as the transducer gives of its supply. A broken wire
 //! leaves PA0 to the divider's lower resistor: 0 V. The chip's own temperature sensor and reference follow the factory
-//! calibration words in system memory (DS10693 section 6.3.22 and 6.3.24).
+//! calibration words in system memory (DS10693, temperature sensor and reference voltage).
 
 /// Full scale of the transducer in pascal.
 pub const FULL_SCALE: f64 = 1_000_000.0;

@@ -3,7 +3,9 @@
 //! Up-counting, update and compare events, preloads, TRGO, encoder mode and input capture. Output pins, DMA requests
 //! of the timer, counting down and the other slave modes are not modelled: a write that asks for them is on record.
 
+mod capture;
 mod counter;
+mod encoder;
 
 use canbus::Time;
 use counter::{Counter, Shadow};
@@ -239,76 +241,6 @@ impl Timer {
             let hit = !self.is_input(channel) && reached(self.compare[channel].active);
             self.sr |= flag(hit, channel as u32 + 1);
         }
-    }
-
-    /// Takes the value of the counter into the register of an input channel (an edge that it is set up for).
-    pub(crate) fn capture(&mut self, channel: usize, rising: bool) {
-        let enabled = bit(self.ccer, channel as u32 * 4);
-        if enabled && self.captures(channel, rising) {
-            let flag_bit = channel as u32 + 1;
-            // A capture over one that was not read: CCxOF.
-            self.sr |= flag(bit(self.sr, flag_bit), flag_bit + 8) | flag(true, flag_bit);
-            self.compare[channel].write(self.counter.value(), false);
-        }
-    }
-
-    /// Whether a channel is an input that takes its own pin and this edge (CCxP and CCxNP).
-    fn captures(&self, channel: usize, rising: bool) -> bool {
-        let own_pin = field(self.mode(channel), 0, 2) == 1;
-        let polarity = field(self.ccer, channel as u32 * 4, 4) & 0b1010;
-        let both = polarity == 0b1010;
-        own_pin && (both || rising == (polarity == 0))
-    }
-
-    /// Whether edges on the pin of a channel are taken.
-    pub(crate) fn listens(&self, channel: usize) -> bool {
-        self.is_input(channel) && bit(self.ccer, channel as u32 * 4)
-    }
-
-    /// Whether the two first inputs drive the counter.
-    pub(crate) fn is_encoder(&self) -> bool {
-        matches!(field(self.smcr, 0, 3), 1..=3)
-    }
-
-    fn follow(&mut self, position: Option<i64>) {
-        let steps = self.steps_to(position);
-        if steps == 0 || !self.counter.running() {
-            return;
-        }
-        let forwards = steps > 0;
-        let turn = self.counter.turn(steps);
-        self.backwards = !forwards;
-        self.match_channels(|value| turn.reached(value, forwards));
-        if turn.wrapped {
-            self.update_event(false);
-        }
-    }
-
-    /// Counts between the last position and this one (RM0390 section 17.3.12): every edge of both inputs, or only
-    /// those of input 2 (mode 1) or input 1 (mode 2). One inverted input turns the direction around.
-    fn steps_to(&self, position: Option<i64>) -> i64 {
-        let (Some(before), Some(position)) = (self.position, position) else { return 0 };
-        let counted = |position: i64| match field(self.smcr, 0, 3) {
-            1 => position.div_euclid(2),
-            2 => (position + 1).div_euclid(2),
-            _ => position,
-        };
-        let steps = counted(position) - counted(before);
-        if bit(self.ccer, 1) == bit(self.ccer, 5) { steps } else { -steps }
-    }
-
-    /// Whether a move of the encoder from the last position raises an interrupt that is not up yet.
-    pub(crate) fn rises_at(&self, position: Option<i64>) -> bool {
-        let steps = self.steps_to(position);
-        let turn = self.counter.look(steps);
-        let wraps = turn.wrapped && self.awaits(SR_UIF);
-        wraps || self.awaited_channels().any(|channel| turn.reached(self.compare[channel].active, steps > 0))
-    }
-
-    /// Whether the encoder drives the counter and an interrupt can come of it.
-    pub(crate) fn watches_encoder(&self) -> bool {
-        let watches = self.awaits(SR_UIF) || self.awaited_channels().next().is_some();
-        self.is_encoder() && self.counter.running() && watches
     }
 
     /// An interrupt is enabled whose flag is not up.

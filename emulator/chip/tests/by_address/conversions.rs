@@ -103,6 +103,7 @@ fn a_block_holds_the_value_of_each_conversion_s_own_instant() {
         assert_eq!(value, expected, "conversion {n}");
     }
     assert_eq!(rig.half_word(BUFFER + 128), 0xFFFF, "the second half is still empty");
+    assert_eq!(rig.chip.unmodelled(), []);
 }
 
 #[test]
@@ -132,6 +133,36 @@ fn only_half_and_full_transfers_wake_the_chip() {
         deadlines += 1;
     }
     assert!(deadlines <= 102, "{deadlines} in 100 ms");
+}
+
+#[test]
+fn to_look_more_often_changes_nothing() {
+    let run = |look: bool| {
+        let mut rig = rig();
+        let noise = Signal::Noise { mean: 500_000.0, sigma: 50_000.0, seed: 1 };
+        rig.chip.plant_mut(rig.now).set_pressure(noise, rig.now);
+        let end = start(&mut rig, 128, CIRCULAR | HALF_AND_FULL) + Time::from_micros(2500);
+        let mut raised = Vec::new();
+        while rig.now < end {
+            let step = if look { Time(13_777) } else { Time::NEVER };
+            let next = rig.chip.deadline().min(rig.now + step).min(end);
+            rig.run_to(next);
+            if rig.irq(DMA_IRQ) {
+                raised.push(rig.now);
+                rig.write(LIFCR, 0x3D);
+            }
+            if look {
+                rig.read(S0NDTR);
+                rig.read(SR);
+                rig.read(TIM3 + 0x24);
+            }
+        }
+        rig.read(S0NDTR);
+        (raised, rig.memory.0)
+    };
+    let (raised, memory) = run(false);
+    assert_eq!(raised.len(), 2);
+    assert_eq!((raised, memory), run(true));
 }
 
 #[test]
@@ -192,6 +223,7 @@ fn a_conversion_takes_its_cycles_and_raises_its_interrupt() {
     rig.read(DR);
     assert_eq!(rig.read(SR) >> 1 & 1, 0, "reading DR clears EOC");
     assert!(!rig.irq(ADC_IRQ));
+    assert_eq!(rig.chip.unmodelled(), []);
 }
 
 #[test]
@@ -208,6 +240,16 @@ fn resolution_and_alignment_shape_the_code() {
     rig.write(CR2, ADON | SWSTART | 1 << 11);
     rig.wait(Time::from_micros(10));
     assert_eq!(rig.read(DR), 2048 << 4);
+}
+
+#[test]
+fn what_the_converter_cannot_do_here_is_on_record() {
+    let mut rig = rig();
+    rig.write(CR1, 1 << 23);
+    rig.write(CR2, ADON | 1 << 22);
+    rig.write(ADC + 0x38, 0);
+    let names: Vec<String> = rig.chip.unmodelled().into_iter().map(|entry| entry.name).collect();
+    assert_eq!(names, ["ADC1+0x04", "ADC1+0x08", "ADC1+0x38"]);
 }
 
 #[test]

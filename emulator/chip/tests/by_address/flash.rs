@@ -19,6 +19,7 @@ const MER: u32 = 1 << 2;
 const STRT: u32 = 1 << 16;
 const X32: u32 = 2 << 8;
 const WRPERR: u32 = 1 << 4;
+const PGAERR: u32 = 1 << 5;
 const PGPERR: u32 = 1 << 6;
 const PGSERR: u32 = 1 << 7;
 const FLASH_IRQ: u8 = 4;
@@ -119,6 +120,14 @@ fn every_width_must_match_psize() {
             assert_eq!(rig.read(SR) & PGPERR != 0, !matches && !half, "psize {psize}, width {width}");
         }
     }
+}
+
+#[test]
+fn a_store_over_a_row_of_16_bytes_is_refused() {
+    let mut rig = unlocked();
+    rig.write(CR, PG | X32);
+    rig.program(PAGE + 14, &[0; 4]);
+    assert_eq!((rig.read(SR), rig.byte(PAGE + 14)), (PGAERR, 0xFF));
 }
 
 #[test]
