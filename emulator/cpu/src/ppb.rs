@@ -10,6 +10,10 @@ pub(crate) const BASE: u32 = 0xE000_0000;
 /// How long it is.
 pub(crate) const SIZE: u32 = 0x0010_0000;
 
+/// The debug unit of the chip lies among the registers of the core (RM0390, section 33.16).
+const DBGMCU: u32 = 0xE004_2000;
+const DBGMCU_END: u32 = 0xE004_23FF;
+
 const CPUID: u32 = 0x410F_C241;
 const AIRCR_KEY: u32 = 0x05FA;
 const SYSRESETREQ: u32 = 1 << 2;
@@ -55,6 +59,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_EDF0 => 0,
             0xE000_EDFC => self.scb.demcr,
             0xE000_EF34 => self.scb.fpccr,
+            DBGMCU..=DBGMCU_END => self.chip.read(address, 4, self.now).ok()?,
             _ => return None,
         })
     }
@@ -90,6 +95,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_EDFC => self.scb.demcr = value,
             0xE000_EF00 => self.pend_irqs((value >> 5) & 3, 1 << (value & 31)),
             0xE000_EF34 => self.scb.fpccr = value,
+            DBGMCU..=DBGMCU_END => self.chip.write(address, 4, value, self.now).ok()?,
             _ => return None,
         }
         Some(())
