@@ -6,7 +6,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `map`, `access`, `lane` | addresses: which peripheral answers, whether it is clocked, narrow accesses |
-//! | `stm32f4`, `schedule` | the peripherals together: time, interrupt lines, clocks, resets |
+//! | `stm32f4`, `schedule`, `clock_and_reset` | the peripherals together: time, interrupt lines, clocks, resets |
 //! | `converter`, `pins` | what crosses peripherals: timer to ADC to DMA to memory; encoder to timers and EXTI |
 //! | one file or folder each | the peripherals, which know nothing of each other |
 //! | `plant` | pressure, temperature, shaft, faults and the board's analogue front end |
@@ -14,11 +14,15 @@
 //! Nothing is stepped: a peripheral computes its state at the instant of an access from its state at the last one, and
 //! `deadline` tells when something can be seen without an access. An access that the models cannot answer as silicon
 //! would is on record: [`Stm32f4::unmodelled`].
+//!
+//! Of the chip's peripherals the images do not use RTC, WWDG, TIM1 and TIM8, ADC2 and ADC3, DAC, USARTs, I2C, SAI, SDIO,
+//! USB, DCMI, CEC, FMC, QUADSPI and the power-down modes: these have a name in the map and no model.
 
 mod access;
 mod adc;
 mod board;
 pub mod can;
+mod clock_and_reset;
 mod clocks;
 mod converter;
 mod crc_unit;

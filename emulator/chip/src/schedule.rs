@@ -1,22 +1,13 @@
-//! What happens by itself, and when: time, clocks, interrupt lines and resets of the whole chip.
+//! What happens by itself, and when: the chip in time, and its interrupt lines.
 
 use canbus::Time;
 
-use crate::adc::AdcCommon;
 use crate::can::Lines;
-use crate::clocks::Clocks;
-use crate::crc_unit::CrcUnit;
-use crate::dma::Dma;
-use crate::exti::Exti;
-use crate::gpio::Gpio;
 use crate::iwdg::Iwdg;
-use crate::map::{self, ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS, Unit};
+use crate::map::{ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS};
 use crate::peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
-use crate::pwr::Pwr;
 use crate::rcc::Cause;
-use crate::spi::Spi;
 use crate::stm32f4::Stm32f4;
-use crate::syscfg::Syscfg;
 use crate::timer::Timer;
 
 impl Peripherals for Stm32f4 {
@@ -67,13 +58,7 @@ impl Peripherals for Stm32f4 {
 
     fn reset(&mut self, power: bool, now: Time) {
         self.convert(now);
-        let cause = self.asked.take().unwrap_or(Cause::Software);
-        self.rcc.reset((!power).then_some(cause));
-        self.flash.reset(&mut self.effects);
-        self.clocks = Clocks::RESET;
-        self.announce_clock();
-        map::blocks().for_each(|block| self.reset_unit(block.unit));
-        self.apply_clocks(now);
+        self.reset_all(power, now);
         self.settle(now);
     }
 }
@@ -178,57 +163,5 @@ impl Stm32f4 {
         raise(ADC_IRQ, self.adc.interrupt());
         raise(FLASH_IRQ, self.flash.interrupt());
         lines
-    }
-
-    /// Brings every clocked unit to a clock tree that may have changed; all of them are up to `now`.
-    pub(crate) fn update_clocks(&mut self, now: Time) {
-        let clocks = self.rcc.clocks();
-        if clocks == self.clocks {
-            return;
-        }
-        let core_changed = clocks.hclk != self.clocks.hclk;
-        self.clocks = clocks;
-        self.apply_clocks(now);
-        if core_changed {
-            self.announce_clock();
-        }
-    }
-
-    fn apply_clocks(&mut self, now: Time) {
-        for (timer, place) in self.timers.iter_mut().zip(&TIMERS) {
-            timer.set_cycle(self.clocks.timer_cycle(place.bus), now);
-        }
-        for (spi, place) in self.spis.iter_mut().zip(&SPIS) {
-            spi.set_pclk(self.clocks.apb_cycle(place.bus));
-        }
-        self.adc.set_cycle(self.adc_cycle());
-        self.can.set_clock(self.clocks.pclk1());
-    }
-
-    pub(crate) fn announce_clock(&mut self) {
-        self.effects.push_back(Effect::CoreClock(self.clocks.hclk));
-    }
-
-    /// Puts one peripheral into its state after reset. FLASH and RCC have resets of their own.
-    pub(crate) fn reset_unit(&mut self, unit: Unit) {
-        match unit {
-            Unit::Timer(index) => {
-                let place = &TIMERS[index];
-                self.timers[index] = Timer::new(place.kind, self.clocks.timer_cycle(place.bus));
-            }
-            Unit::Gpio(port) => self.ports[port] = Gpio::new(port),
-            Unit::Pwr => self.pwr = Pwr::new(self.variant),
-            Unit::Syscfg => self.syscfg = Syscfg::new(),
-            Unit::Exti => self.exti = Exti::default(),
-            Unit::Adc => self.adc.reset(),
-            Unit::AdcCommon => self.adc_common = AdcCommon::default(),
-            Unit::Dma(index) => self.dmas[index] = Dma::default(),
-            Unit::Spi(index) => Spi::reset(&mut self.spis[index]),
-            Unit::Can(0) => self.can.reset_can1(),
-            Unit::Can(_) => self.can.reset_can2(),
-            Unit::Iwdg => self.iwdg = Iwdg::new(),
-            Unit::Crc => self.crc = CrcUnit::new(),
-            Unit::Rcc | Unit::Flash | Unit::Dbgmcu | Unit::Signature | Unit::Absent => {}
-        }
     }
 }

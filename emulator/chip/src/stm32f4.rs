@@ -109,6 +109,7 @@ impl Stm32f4 {
     }
 
     /// Takes the clock on OSC_IN away (`None`) or gives one, in hertz: the HSE is then dead or alive.
+    /// A dead one never gets ready; a system clock that already comes from it goes on.
     pub fn set_hse(&mut self, hertz: Option<u64>) {
         self.rcc.set_hse(hertz);
     }

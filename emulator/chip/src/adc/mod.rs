@@ -123,6 +123,8 @@ impl Adc {
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         match offset {
             SR => {
+                // Software clears flags by writing 0. What an overrun left in DR is lost.
+                self.unread &= !bit(self.sr & !value, OVR);
                 self.sr &= value;
                 Some(())
             }

@@ -273,6 +273,20 @@ fn a_value_nobody_fetches_is_an_overrun() {
 }
 
 #[test]
+fn an_overrun_is_over_when_it_is_cleared_and_the_stream_runs_again() {
+    let mut rig = rig();
+    start(&mut rig, 4, CIRCULAR & !(1 << 8));
+    rig.wait(Time::from_millis(1));
+    rig.write(LIFCR, 0x3D);
+    rig.write(S0NDTR, 8);
+    rig.write(S0CR, CIRCULAR | 1);
+    rig.write(SR, 0);
+    rig.wait(Time::from_millis(1));
+    assert_eq!(rig.read(SR) >> 5 & 1, 0);
+    assert_eq!(rig.read(LISR), 1 << 4 | 1 << 5);
+}
+
+#[test]
 fn without_dds_requests_end_with_the_stream() {
     let mut rig = rig();
     start(&mut rig, 8, CIRCULAR);
