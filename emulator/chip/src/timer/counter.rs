@@ -43,12 +43,14 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Whether the counter reached `value` on the way (the value before does not count).
+    /// Whether the counter reached `value` on the way (the value before does not count). A value above the top counts
+    /// as reached at the overflow (RM0390 section 17.4.5, CC1IF).
     pub(super) fn reached(&self, value: u32) -> bool {
         let value = u64::from(value);
+        let goal = if value < self.modulus { value } else { 0 };
         let from = u64::from(self.from) % self.modulus;
-        let distance = (value + self.modulus - from) % self.modulus;
-        value < self.modulus && (if distance == 0 { self.modulus } else { distance }) <= self.ticks
+        let distance = (goal + self.modulus - from) % self.modulus;
+        (if distance == 0 { self.modulus } else { distance }) <= self.ticks
     }
 }
 
@@ -173,9 +175,7 @@ impl Counter {
     pub(super) fn reaches(&self, value: u32) -> Time {
         if value > self.value && value <= self.top.active {
             self.after(u64::from(value - self.value))
-        } else if value > self.top.active && self.top.is_loaded() {
-            Time::NEVER
-        } else if self.top.is_loaded() && self.prescaler.is_loaded() {
+        } else if value <= self.top.active && self.top.is_loaded() && self.prescaler.is_loaded() {
             self.after(self.ticks_to_overflow() + u64::from(value))
         } else {
             self.overflow()

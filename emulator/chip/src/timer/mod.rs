@@ -2,6 +2,9 @@
 //!
 //! Up-counting, update and compare events, preloads, TRGO, encoder mode and input capture. Output pins, DMA requests
 //! of the timer, counting down and the other slave modes are not modelled: a write that asks for them is on record.
+//!
+//! A compare value is reached when the counter comes to it. One that is written when the counter already has it waits for
+//! the next round: a program must not count on more.
 
 mod capture;
 mod counter;
@@ -222,7 +225,8 @@ impl Timer {
             return;
         }
         self.update_event(false);
-        self.match_channels(|value| value == 0);
+        let top = self.counter.top.active;
+        self.match_channels(|value| value == 0 || value > top);
         if bit(self.cr1, CR1_OPM) {
             self.cr1 &= !(1 << CR1_CEN);
             self.counter.set_running(false, now);

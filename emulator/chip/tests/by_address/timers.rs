@@ -75,6 +75,23 @@ fn a_compare_value_that_has_passed_waits_for_the_next_round() {
 }
 
 #[test]
+fn a_compare_value_above_the_top_is_reached_at_the_overflow() {
+    let mut rig = rig();
+    rig.write(TIM3 + ARR, 999);
+    rig.write(TIM3 + CCR1, 5000);
+    rig.write(TIM3 + DIER, 0b10);
+    rig.write(TIM3 + CR1, 1);
+    let start = rig.now;
+    for n in 1..3 {
+        assert_eq!(rig.run_to_irq(TIM3_IRQ, Time::from_millis(1)), Some(start + Time(CYCLE.0 * 1000 * n)));
+        rig.write(TIM3 + SR, 0);
+    }
+    rig.write(TIM3 + SR, 0);
+    rig.wait(Time(CYCLE.0 * 5000));
+    assert_eq!(rig.read(TIM3 + SR) & 0b10, 0b10, "over several rounds at once too");
+}
+
+#[test]
 fn a_compare_event_by_software_raises_the_interrupt() {
     let mut rig = rig();
     time_base(&mut rig);
