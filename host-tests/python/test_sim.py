@@ -9,12 +9,20 @@ from simulator import BOOT_UP, Master, Simulator
 
 STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
 
-#: One step of the 12-bit converter in pascal, with the transducer of the emulated board.
+#: One step of the 12-bit converter in pascal: the transducer gives 80 % of its supply over 1 MPa.
 ADC_STEP = 1_000_000 / 4096 / 0.8
+
+#: The process value is in bar unless 6131h says otherwise.
+BAR = 100_000
 
 
 def real32(data: bytes) -> float:
     return struct.unpack_from("<f", data)[0]
+
+
+def pascal(tpdo: bytes) -> float:
+    """The pressure in TPDO 1, whose first object is 6130h:1."""
+    return real32(tpdo) * BAR
 
 
 def test_boot_up_and_a_heartbeat_every_second(master: Master):
@@ -49,7 +57,7 @@ def test_tpdo1_follows_a_constant_pressure(master: Master, pressure: int):
     tpdo = master.listen(0x181)
     # The first may have been measured before the change.
     tpdo.next()
-    assert real32(tpdo.next()[1]) == pytest.approx(pressure, abs=ADC_STEP)
+    assert pascal(tpdo.next()[1]) == pytest.approx(pressure, abs=ADC_STEP)
 
 
 def test_nmt_commands_show_in_the_heartbeat(master: Master):
@@ -79,7 +87,7 @@ def test_a_remapped_tpdo_answers_sync(master: Master):
             tpdo = next_frame(observer, 0x181)
             assert 0 < tpdo.timestamp - sync.timestamp < 0.001
             assert len(tpdo.data) == 5
-            assert real32(tpdo.data) == pytest.approx(250_000, abs=ADC_STEP)
+            assert real32(tpdo.data) == pytest.approx(250_000, abs=ADC_STEP), "6100h is in pascal"
             assert tpdo.data[4] == 0
 
 
@@ -91,14 +99,15 @@ def next_frame(bus, cob_id: int):
 
 
 def test_slcan_clients_are_on_the_same_bus(master: Master):
-    with master.simulator.slcan_bus(bitrate=1_000_000) as bus:
-        assert bus.get_version(20) == (1, 1)
-        network = canopen.Network(bus)
-        network.connect()
-        node = network.add_node(1, canopen.ObjectDictionary())
-        node.sdo.RESPONSE_TIMEOUT = 20
-        assert node.sdo.upload(0x1000, 0) == struct.pack("<I", 0x0002_0194)
-        network.disconnect()
+    bus = master.simulator.slcan_bus(bitrate=1_000_000)
+    assert bus.get_version(20) == (1, 1)
+    network = canopen.Network(bus)
+    network.connect()
+    node = network.add_node(1, canopen.ObjectDictionary())
+    node.sdo.RESPONSE_TIMEOUT = 20
+    assert node.sdo.upload(0x1000, 0) == struct.pack("<I", 0x0002_0194)
+    # It closes the bus as well.
+    network.disconnect()
 
 
 def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
@@ -112,9 +121,11 @@ def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
         time, data = tpdo.next()
         ramp = 100_000 + 100_000 * min(time / 4, 1)
         # Sampled up to two milliseconds before the time stamp, which is the end of the frame.
-        assert real32(data) == pytest.approx(ramp, abs=ADC_STEP + 50)
-    simulator.command("pressure step:300000")
-    tpdo.until(lambda data: math.isclose(real32(data), 300_000, abs_tol=ADC_STEP))
+        assert pascal(data) == pytest.approx(ramp, abs=ADC_STEP + 50)
+    simulator.command("pressure step:150000,300000,0.5")
+    before, _ = tpdo.until(lambda data: math.isclose(pascal(data), 150_000, abs_tol=ADC_STEP))
+    after, _ = tpdo.until(lambda data: math.isclose(pascal(data), 300_000, abs_tol=ADC_STEP))
+    assert after - before <= 0.6
     master.close()
     summary = simulator.quit()
     node = summary["nodes"][0]

@@ -43,7 +43,7 @@ impl Board {
     /// # Errors
     /// When an image does not fit the chip.
     pub(crate) fn new(id: u8, personality: Personality, flash: &[u8], images: Rc<Images>) -> Result<Board> {
-        let chip = Stm32f4::new(Variant::F446, Wiring::default());
+        let chip = Stm32f4::new(Variant::F446, wiring(id));
         let mut machine = Machine::new(Model::stm32f4(flash::SIZE as u32), chip)?;
         machine.set_flash(flash)?;
         let bootloader = images.bootloader.as_ref().map(|image| load(&mut machine, image)).transpose()?;
@@ -81,7 +81,7 @@ impl Board {
     }
 
     pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
-        stimulus.act_on(self.machine.peripherals_mut().plant_mut(), now);
+        stimulus.act_on(self.machine.peripherals_mut().plant_mut(now), now);
     }
 
     /// What the firmware has logged since the last call.
@@ -131,6 +131,13 @@ impl Board {
             unmodelled: figures::unmodelled(&self.machine),
         }
     }
+}
+
+/// Every chip has its own unique identifier, of which the firmware makes its serial number.
+fn wiring(id: u8) -> Wiring {
+    let mut wiring = Wiring::default();
+    wiring.unique_id[0] = id.into();
+    wiring
 }
 
 fn load(machine: &mut Machine<Stm32f4>, image: &Image) -> Result<emulator::Image> {

@@ -14,6 +14,7 @@ use crate::stimuli::{Stimulus, Targeted};
 /// Runs the firmware on emulated boards that share a CAN bus with your programs.
 #[derive(Debug, Parser)]
 #[command(name = "cargo sim", bin_name = "cargo sim", version, max_term_width = 100)]
+#[command(override_usage = "cargo sim [OPTIONS]")]
 pub struct Options {
     /// ELF file of the firmware.
     #[arg(long, value_name = "PATH", hide = true)]

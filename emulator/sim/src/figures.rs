@@ -18,8 +18,10 @@ const PERIOD: Time = Time::from_millis(1);
 /// The 1 kHz measurement.
 pub(crate) fn sampling(machine: &Machine<Stm32f4>) -> Sampling {
     let activity = machine.stats().of(SAMPLING);
-    let early = PERIOD.since(activity.least_interval);
-    let late = activity.worst_interval.since(PERIOD);
+    // The intervals are zero before the second sample.
+    let measured = activity.entries > 1;
+    let early = if measured { PERIOD.since(activity.shortest_interval) } else { Time::ZERO };
+    let late = activity.longest_interval.since(PERIOD);
     Sampling {
         samples: activity.entries,
         rate: per_second(activity.entries.saturating_sub(1), activity.last_entry.since(activity.first_entry)),
@@ -68,14 +70,21 @@ fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
     (stack.len() - untouched) as u32
 }
 
-/// Faults and resets after power-on.
+/// Faults and resets after power-on; of a board that resets in circles only the first of them.
 pub(crate) fn resets(machine: &Machine<Stm32f4>) -> Vec<String> {
-    machine.incidents().iter().map(|(at, incident)| format!("{at} s: {}", describe(incident))).collect()
+    const SHOWN: usize = 10;
+    let incidents = machine.incidents();
+    let shown = incidents.iter().take(SHOWN).map(|(at, incident)| format!("{at} s: {}", describe(incident)));
+    let rest = incidents.len().checked_sub(SHOWN + 1).map(|rest| format!("and {} more", rest + 1));
+    shown.chain(rest).collect()
 }
 
 fn describe(incident: &Incident) -> String {
     match incident {
-        Incident::Fault(fault) => format!("fault at {:#010x}, CFSR {:#x}", fault.pc, fault.status),
+        Incident::Fault(fault) => {
+            let access = fault.address.map(|address| format!(", access to {address:#010x}")).unwrap_or_default();
+            format!("fault at {:#010x}, CFSR {:#x}{access}", fault.pc, fault.status)
+        }
         Incident::SoftwareReset => "reset by software".to_owned(),
         Incident::ChipReset => "reset by the chip (watchdog)".to_owned(),
     }

@@ -106,12 +106,12 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// A frame has ended on the bus.
-    pub fn on_frame(&mut self, frame: &Frame) {
-        let Id::Standard(id) = frame.id() else { return };
+    /// A frame has ended on the bus. Answers with the node if this was its boot-up.
+    pub fn on_frame(&mut self, frame: &Frame) -> Option<u8> {
+        let Id::Standard(id) = frame.id() else { return None };
         let (function, node) = (id.as_raw() & 0x780, (id.as_raw() & 0x7F) as u8);
         if node == 0 || frame.is_remote() {
-            return;
+            return None;
         }
         match function {
             0x080 => self.sender(node).on_emcy(frame.bytes()),
@@ -121,6 +121,7 @@ impl Traffic {
             0x700 => self.sender(node).on_heartbeat(frame.bytes()),
             _ => {}
         }
+        (function == 0x700 && frame.bytes() == [0]).then_some(node)
     }
 
     fn sender(&mut self, node: u8) -> &mut Heard {
@@ -141,14 +142,14 @@ mod tests {
 
     use super::*;
 
-    fn hear(traffic: &mut Traffic, id: u16, bytes: &[u8]) {
-        traffic.on_frame(&Frame::data(StandardId::new(id).unwrap(), bytes).unwrap());
+    fn hear(traffic: &mut Traffic, id: u16, bytes: &[u8]) -> Option<u8> {
+        traffic.on_frame(&Frame::data(StandardId::new(id).unwrap(), bytes).unwrap())
     }
 
     #[test]
     fn every_service_of_a_node_is_counted() {
         let mut traffic = Traffic::default();
-        hear(&mut traffic, 0x705, &[0]);
+        assert_eq!(hear(&mut traffic, 0x705, &[0]), Some(5));
         assert_eq!(traffic.node(5).state, NmtState::Initialising);
         hear(&mut traffic, 0x705, &[127]);
         hear(&mut traffic, 0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]);
@@ -169,7 +170,7 @@ mod tests {
         let mut traffic = Traffic::default();
         for (id, bytes) in [(0x000, &[1u8, 5][..]), (0x080, &[]), (0x705, &[]), (0x085, &[1]), (0x7E5, &[4])]
         {
-            hear(&mut traffic, id, bytes);
+            assert_eq!(hear(&mut traffic, id, bytes), None);
         }
         assert_eq!(traffic.node(5), Heard { sent: 2, ..Heard::default() });
     }

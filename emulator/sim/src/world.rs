@@ -3,7 +3,7 @@
 //! The loop is the one that the documentation of [`canbus`] describes. With one board it is exact; with several,
 //! a board may be ahead of a start of frame by [`QUANTUM_BITS`], too little to miss anything of the frame.
 
-use canbus::{Babbler, Bus, Controller, Event, HostNode, Stamped, Time};
+use canbus::{Babbler, Bus, Controller, Event, Frame, HostNode, Stamped, StandardId, Time};
 
 use crate::board::Board;
 use crate::log::Line;
@@ -29,8 +29,8 @@ pub struct World {
     bit: Time,
     bus: Bus,
     boards: Vec<Board>,
-    /// The adapter of the machine that everything runs on. It acknowledges frames also when no client is there:
-    /// a board alone on its bus could send nothing.
+    /// The adapter of the machine that everything runs on. It acknowledges frames also when no client is there,
+    /// for a board alone on its bus could send nothing, and is the NMT master then.
     host: HostNode,
     load: Option<Babbler>,
     /// Places are used again but never given up: the bus knows its participants by their order.
@@ -51,6 +51,8 @@ struct Records {
     traffic: Traffic,
     frames: Vec<Stamped>,
     log: Vec<Line>,
+    /// Nodes whose boot-up was heard since the last look.
+    booted: Vec<u8>,
     good: u64,
     bad: u64,
 }
@@ -114,7 +116,7 @@ impl World {
     /// Lets everything up to `end` happen. An error is a fault of the emulator, not of the firmware.
     pub fn run_until(&mut self, end: Time) -> anyhow::Result<()> {
         loop {
-            let next = self.step_bus();
+            let next = self.step_bus().min(self.start_nodes());
             if self.now >= end {
                 break;
             }
@@ -141,6 +143,17 @@ impl World {
             boards.chain(host).chain(load).chain(ports).collect();
         let records = &mut self.records;
         self.bus.step(&mut participants, self.now, &mut |event| records.on_event(&event))
+    }
+
+    /// Starts the nodes that have booted while there was no client that could do it. Returns when the bus has to
+    /// look at the request: now, if there is one.
+    fn start_nodes(&mut self) -> Time {
+        let booted = std::mem::take(&mut self.records.booted);
+        if booted.is_empty() || self.ports.iter().any(|place| place.taken) {
+            return Time::NEVER;
+        }
+        booted.iter().for_each(|&node| self.host.send(start_command(node), self.now));
+        self.now
     }
 
     /// The frames since the last call, each with the end of its end of frame.
@@ -183,10 +196,15 @@ impl Records {
         match event {
             &Event::Frame { end: at, frame, .. } => {
                 self.good += 1;
-                self.traffic.on_frame(&frame);
+                self.booted.extend(self.traffic.on_frame(&frame));
                 self.frames.push(Stamped { at, frame });
             }
             Event::Error { .. } => self.bad += 1,
         }
     }
+}
+
+/// NMT: start this node (CiA 301, 7.2.8.3.1.1).
+fn start_command(node: u8) -> Frame {
+    Frame::data(StandardId::ZERO, &[1, node]).unwrap_or_else(|| unreachable!("two bytes fit"))
 }
