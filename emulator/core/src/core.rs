@@ -1,167 +1,189 @@
-//! The CPU: the library with the chip's memory map, and the runs that it makes.
+//! The state that the hooks of the CPU library share with the run loop: clock, interrupt controller, system
+//! registers, and the chip behind them.
 
-use std::ops::Range;
-use std::rc::Rc;
+use std::collections::{HashMap, VecDeque};
 
-use chip::Peripherals;
-use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn, uc_error};
+use canbus::Time;
+use chip::{Effect, Memory, Peripherals};
 
-use crate::error::Error;
-use crate::fault::Fault;
-use crate::hooks;
-use crate::memory::Array;
-use crate::model::Model;
-use crate::registers::{Registers, THUMB};
-use crate::system::{Cause, System};
+use crate::cost::Cost;
+use crate::exception::Exception;
+use crate::mechanism::Mechanism;
+use crate::nvic::{Masks, Nvic};
+use crate::scb::Scb;
+use crate::stats::Stats;
+use crate::systick::SysTick;
 
-/// Regions of registers besides the model's windows: bit-band aliases, peripherals, the private peripheral bus.
-const REGISTERS: [(u32, u64); 5] = [
-    (0x2200_0000, 0x0200_0000),
-    (0x4000_0000, 0x0200_0000),
-    (0x4200_0000, 0x0200_0000),
-    (0x4400_0000, 0x1C00_0000),
-    (0xE000_0000, 0x0010_0000),
-];
-
-/// A page outside of the chip's map with the code that clears the exclusive monitor: CLREX, WFI.
-const HIDDEN: u32 = 0xF000_0000;
-const CLEAR_MONITOR: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
-
-/// The CPU with all state around it.
-pub(crate) struct Core<P: 'static> {
-    pub(crate) uc: Unicorn<'static, System<P>>,
+/// Why the CPU library was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Halt {
+    /// Something is due: time, an effect, an interrupt.
+    Attention,
+    /// The core branched to an EXC_RETURN value.
+    ExceptionReturn,
+    /// SVC; the address after it.
+    SupervisorCall,
+    /// BKPT.
+    Breakpoint,
+    /// An exception of the CPU library's own, such as an access that it forbids.
+    Undefined,
+    /// A data access that nothing answers, seen by the chip or by the system space.
+    DataFault(u32),
 }
 
-impl<P: Peripherals + 'static> Core<P> {
-    pub(crate) fn new(model: Model, peripherals: P) -> Result<Core<P>, Error> {
-        let system = System::new(model, peripherals);
-        // Not MCLASS: with it the library silently takes a Cortex-M33.
-        let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, system)?;
-        let model = ArmCpuModel::CORTEX_M4 as i32;
-        uc.ctl_set_cpu_model(model)?;
-        // An empty set of end addresses: none, not even 0, which is an address like any other here.
-        uc.ctl_exits_enable()?;
-        let mut core = Core { uc };
-        core.map()?;
-        hooks::install(&mut core.uc)?;
-        Ok(core)
-    }
+/// An access to memory that is not mapped, as the hook saw it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Unmapped {
+    pub(crate) address: u32,
+    pub(crate) fetch: bool,
+}
 
-    fn map(&mut self) -> Result<(), Error> {
-        let memory = Rc::clone(&self.system().memory);
-        self.map_array(memory.flash(), memory.flash().range().start, Prot::READ | Prot::EXEC)?;
-        self.map_array(memory.flash(), 0, Prot::READ | Prot::EXEC)?;
-        self.map_array(memory.ram(), memory.ram().range().start, Prot::ALL)?;
-        for window in self.system().model.windows.clone() {
-            hooks::map_registers(&mut self.uc, window.start, u64::from(window.end - window.start))?;
-        }
-        for (base, size) in REGISTERS {
-            hooks::map_registers(&mut self.uc, base, size)?;
-        }
-        self.map_hidden()
-    }
+/// Everything but the registers and the memory.
+pub(crate) struct Core<P> {
+    pub(crate) chip: P,
+    pub(crate) now: Time,
+    /// Length of a core cycle.
+    pub(crate) cycle: Time,
+    /// The run loop wants control back here.
+    pub(crate) until: Time,
+    pub(crate) nvic: Nvic,
+    pub(crate) scb: Scb,
+    pub(crate) systick: SysTick,
+    pub(crate) stats: Stats,
+    pub(crate) halt: Option<Halt>,
+    pub(crate) unmapped: Option<Unmapped>,
+    pub(crate) effects: VecDeque<Effect>,
+    /// When an exception became pending, for its latency.
+    pub(crate) pended: [Time; Exception::COUNT],
+    pub(crate) costs: HashMap<(u32, u32), Cost>,
+    pub(crate) reset_requested: bool,
+    pub(crate) without: Option<Mechanism>,
+    cyccnt: Option<Cyccnt>,
+}
 
-    fn map_array(&mut self, array: &Array, at: u32, rights: Prot) -> Result<(), Error> {
-        let size = u64::from(array.range().end - array.range().start);
-        // SAFETY: the array outlives the engine, whose data holds the memory; `size` is its length.
-        unsafe { self.uc.mem_map_ptr(u64::from(at), size, rights, array.pointer()) }?;
-        Ok(())
-    }
+/// DWT_CYCCNT: its value at some instant, and it runs from there.
+#[derive(Clone, Copy, Debug)]
+struct Cyccnt {
+    at: Time,
+    value: u32,
+}
 
-    fn map_hidden(&mut self) -> Result<(), Error> {
-        self.uc.mem_map(u64::from(HIDDEN), 4096, Prot::ALL)?;
-        self.uc.mem_write(u64::from(HIDDEN), &CLEAR_MONITOR)?;
-        Ok(())
-    }
-
-    pub(crate) fn system(&self) -> &System<P> {
-        self.uc.get_data()
-    }
-
-    pub(crate) fn system_mut(&mut self) -> &mut System<P> {
-        self.uc.get_data_mut()
-    }
-
-    /// Runs from PC until something stops it.
-    pub(crate) fn execute(&mut self) -> Cause {
-        let pc = self.uc.get(RegisterARM::PC);
-        let now = self.system().clock.now();
-        self.system_mut().stats.running(now);
-        self.system_mut().run.cause = None;
-        match self.uc.emu_start(u64::from(pc | 1), 0, 0, 0) {
-            Ok(()) => self.system_mut().run.cause.take().unwrap_or(Cause::WaitForInterrupt),
-            Err(error) => self.diagnose(error),
+impl<P: Peripherals> Core<P> {
+    pub(crate) fn new(chip: P) -> Core<P> {
+        Core {
+            chip,
+            now: Time::ZERO,
+            cycle: Time::of_cycle(16_000_000),
+            until: Time::ZERO,
+            nvic: Nvic::default(),
+            scb: Scb::default(),
+            systick: SysTick::default(),
+            stats: Stats::default(),
+            halt: None,
+            unmapped: None,
+            effects: VecDeque::new(),
+            pended: [Time::ZERO; Exception::COUNT],
+            costs: HashMap::new(),
+            reset_requested: false,
+            without: None,
+            cyccnt: None,
         }
     }
 
-    fn diagnose(&self, error: uc_error) -> Cause {
-        let address = self.system().run.missed;
-        match error {
-            uc_error::READ_PROT => Cause::FlashBusy,
-            uc_error::READ_UNMAPPED | uc_error::WRITE_UNMAPPED => Cause::Fault(Fault::DataBus { address }),
-            uc_error::FETCH_UNMAPPED => Cause::Fault(Fault::Fetch { address }),
-            uc_error::FETCH_PROT => Cause::Fault(Fault::Execute { address }),
-            _ if self.uc.get(RegisterARM::XPSR) & THUMB == 0 => Cause::Fault(Fault::InvalidState),
-            _ => Cause::Fault(Fault::Undefined),
+    /// Back to the state after a reset; the clock of virtual time and the counters go on.
+    pub(crate) fn reset(&mut self) {
+        self.nvic = Nvic::default();
+        self.scb = Scb::default();
+        self.systick = SysTick::default();
+        self.stats.unwound();
+        self.halt = None;
+        self.unmapped = None;
+        self.reset_requested = false;
+        self.cyccnt = None;
+        self.cycle = Time::of_cycle(16_000_000);
+    }
+
+    /// The exception to take now, if one may preempt.
+    pub(crate) fn to_take(&self, masks: Masks) -> Option<Exception> {
+        let nested = self.nvic.any_active();
+        self.nvic.to_take(masks).filter(|_| !(nested && self.lacks(Mechanism::Preemption)))
+    }
+
+    pub(crate) fn lacks(&self, mechanism: Mechanism) -> bool {
+        self.without == Some(mechanism)
+    }
+
+    /// The next instant at which something happens by itself.
+    pub(crate) fn deadline(&self) -> Time {
+        self.chip.deadline().min(self.systick.deadline())
+    }
+
+    /// Whether the run loop has something to do before the next block runs.
+    pub(crate) fn needs_attention(&self) -> bool {
+        self.now >= self.until
+            || self.reset_requested
+            || !self.effects.is_empty()
+            || self.now >= self.deadline()
+    }
+
+    /// Lets everything due happen, and samples the interrupt lines.
+    pub(crate) fn advance(&mut self, memory: &dyn Memory) {
+        if self.chip.deadline() <= self.now {
+            self.chip.advance(self.now, memory);
+        }
+        if self.systick.advance(self.now) {
+            self.pend(Exception::SYS_TICK);
+        }
+        self.settle();
+    }
+
+    /// Takes over what a call into the chip changed.
+    pub(crate) fn settle(&mut self) {
+        while let Some(effect) = self.chip.effect() {
+            self.effects.push_back(effect);
+        }
+        let before = self.nvic.pending_set();
+        self.nvic.sample(self.chip.lines());
+        self.stamp(self.nvic.pending_set() & !before);
+    }
+
+    pub(crate) fn pend(&mut self, exception: Exception) {
+        if !self.nvic.is_pending(exception) {
+            self.pended[usize::from(exception.0)] = self.now;
+        }
+        self.nvic.pend(exception);
+    }
+
+    /// Remembers when these exceptions became pending.
+    pub(crate) fn stamp(&mut self, mut fresh: u128) {
+        while fresh != 0 {
+            self.pended[fresh.trailing_zeros() as usize] = self.now;
+            fresh &= fresh - 1;
         }
     }
 
-    /// Clears the exclusive monitor, for which the library has no call.
-    pub(crate) fn clear_monitor(&mut self) {
-        let number = self.uc.get(RegisterARM::IPSR);
-        self.uc.set_xpsr(THUMB | number);
-        let ran = self.uc.emu_start(u64::from(HIDDEN | 1), 0, 0, 0);
-        debug_assert_eq!(ran, Ok(()));
+    pub(crate) fn spend(&mut self, instructions: u32, cycles: u32) {
+        self.now += Time(self.cycle.0 * u64::from(cycles));
+        self.stats.ran(instructions, cycles);
     }
 
-    /// Code in `changed` is not what was translated.
-    pub(crate) fn invalidate(&mut self, changed: &Range<u32>) {
-        if !changed.is_empty() && self.system_mut().costs.forget(changed) {
-            let dropped = self.uc.ctl_remove_cache(u64::from(changed.start), u64::from(changed.end));
-            debug_assert_eq!(dropped, Ok(()));
-        }
+    /// HCLK is now `hertz`; the cycle counter goes on from where it is.
+    pub(crate) fn set_clock(&mut self, hertz: u64) {
+        let count = self.cyccnt();
+        self.cycle = Time::of_cycle(hertz.max(1));
+        self.set_cyccnt(self.cyccnt_runs(), count);
     }
 
-    /// Makes loads from flash stop the CPU, or not.
-    pub(crate) fn bar_flash(&mut self, barred: bool) {
-        let flash = self.system().model.flash.clone();
-        let rights = if barred { Prot::EXEC } else { Prot::READ | Prot::EXEC };
-        let size = u64::from(flash.end - flash.start);
-        for base in [flash.start, 0] {
-            let done = self.uc.mem_protect(u64::from(base), size, rights);
-            debug_assert_eq!(done, Ok(()));
-        }
-        let flushed = self.uc.ctl_flush_tlb();
-        debug_assert_eq!(flushed, Ok(()));
+    pub(crate) fn cyccnt(&self) -> u32 {
+        self.cyccnt
+            .map_or(0, |count| count.value.wrapping_add((self.now.since(count.at).0 / self.cycle.0) as u32))
     }
 
-    /// Registers after a reset, with SP and PC from the vector table.
-    pub(crate) fn reset_registers(&mut self) {
-        let start = self.system().model.flash.start;
-        let vector = |offset| self.system().memory.word(start + offset).unwrap_or(u32::MAX);
-        let (stack, entry) = (vector(0), vector(4));
-        // The mask registers can be written in handler mode, whatever the program left in CONTROL.
-        self.uc.set_xpsr(THUMB | 3);
-        for register in
-            [RegisterARM::PRIMASK, RegisterARM::BASEPRI, RegisterARM::FAULTMASK, RegisterARM::CONTROL]
-        {
-            self.uc.set(register, 0);
-        }
-        self.uc.set_xpsr(THUMB);
-        self.uc.set(RegisterARM::CONTROL, 0);
-        self.clear_general_registers();
-        self.uc.set(RegisterARM::MSP, stack & !3);
-        self.uc.set(RegisterARM::PSP, 0);
-        self.uc.set(RegisterARM::LR, u32::MAX);
-        self.uc.set(RegisterARM::PC, entry);
-        self.system_mut().run.block_end = entry & !1;
+    pub(crate) fn cyccnt_runs(&self) -> bool {
+        self.cyccnt.is_some()
     }
 
-    fn clear_general_registers(&mut self) {
-        for number in RegisterARM::R0 as i32..=RegisterARM::R12 as i32 {
-            let cleared = self.uc.reg_write(number, 0);
-            debug_assert_eq!(cleared, Ok(()));
-        }
-        self.uc.set(RegisterARM::FPSCR, 0);
+    pub(crate) fn set_cyccnt(&mut self, runs: bool, value: u32) {
+        self.cyccnt = runs.then_some(Cyccnt { at: self.now, value });
     }
 }

@@ -1,8 +1,8 @@
-//! Exception numbers (ARMv7-M ARM, B1.5.2) and sets of them.
+//! Exceptions by number, as ARMv7-M counts them: 0 is Thread mode, 1..15 the system, 16 and up the interrupts.
 
 use std::fmt;
 
-/// An exception number: 0 is Thread mode, 1 to 15 the system, 16 and up the interrupts.
+/// An exception number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Exception(pub u8);
 
@@ -21,8 +21,6 @@ impl Exception {
     pub const USAGE_FAULT: Exception = Exception(6);
     /// Supervisor call.
     pub const SV_CALL: Exception = Exception(11);
-    /// Debug monitor.
-    pub const DEBUG_MONITOR: Exception = Exception(12);
     /// Pended service call.
     pub const PEND_SV: Exception = Exception(14);
     /// The core's own timer.
@@ -40,8 +38,8 @@ impl Exception {
         self.0.checked_sub(16)
     }
 
-    pub(crate) fn index(self) -> usize {
-        usize::from(self.0)
+    pub(crate) const fn bit(self) -> u128 {
+        1 << self.0
     }
 }
 
@@ -60,40 +58,5 @@ impl fmt::Display for Exception {
             (_, Some(line)) => write!(f, "IRQ{line}"),
             (Exception(number), None) => write!(f, "exception {number}"),
         }
-    }
-}
-
-/// A set of exceptions: bit `n` is exception `n`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Set(pub(crate) u128);
-
-impl Set {
-    /// Interrupt lines as the exceptions that they are.
-    pub(crate) fn of_lines(lines: u128) -> Set {
-        Set(lines << 16)
-    }
-
-    pub(crate) fn insert(&mut self, exception: Exception) {
-        self.0 |= 1 << exception.0;
-    }
-
-    pub(crate) fn remove(&mut self, exception: Exception) {
-        self.0 &= !(1 << exception.0);
-    }
-
-    pub(crate) fn contains(self, exception: Exception) -> bool {
-        self.0 >> exception.0 & 1 != 0
-    }
-
-    /// The members, lowest number first.
-    pub(crate) fn iter(self) -> impl Iterator<Item = Exception> {
-        let mut rest = self.0;
-        std::iter::from_fn(move || {
-            (rest != 0).then(|| {
-                let number = rest.trailing_zeros() as u8;
-                rest &= rest - 1;
-                Exception(number)
-            })
-        })
     }
 }

@@ -1,92 +1,110 @@
-//! Why an instruction could not be carried out, and the status bits that say so (ARMv7-M ARM, B1.5.14 and B3.2.15).
+//! Faults: which exception they raise, and what the status registers say.
 
+use chip::Peripherals;
+use unicorn_engine::RegisterARM;
+
+use crate::engine;
 use crate::exception::Exception;
+use crate::machine::{Incident, Machine};
+use crate::mechanism::Mechanism;
+use crate::scb::{Scb, cfsr};
 
-/// A fault of the core.
+/// A fault as it was seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// A load or store of an address where nothing answers.
-    DataBus {
-        /// The address accessed.
-        address: u32,
-    },
-    /// A peripheral, or the core's own registers, answered an access with an error. The CPU library tells no
-    /// instruction address inside such an access, so these are imprecise: taken at the end of the basic block.
-    ImpreciseBus {
-        /// The address accessed; a program cannot see it.
-        address: u32,
-    },
-    /// An instruction fetch where nothing answers.
-    Fetch {
-        /// The address fetched.
-        address: u32,
-    },
-    /// An instruction fetch from a region that never holds code.
-    Execute {
-        /// The address fetched.
-        address: u32,
-    },
-    /// The frame of an exception could not be pushed.
-    Stacking,
-    /// The frame of an exception could not be popped.
-    Unstacking,
-    /// An undefined instruction.
-    Undefined,
-    /// A branch to an address without the Thumb bit.
-    InvalidState,
-    /// A return with an illegal EXC_RETURN or frame.
-    InvalidReturn,
-    /// An FPU instruction while CPACR keeps the FPU off; noticed at the start of its basic block.
-    NoCoprocessor,
-    /// An unaligned access by an instruction that allows none.
-    Unaligned,
-    /// The vector of an exception could not be read.
-    VectorTable,
-    /// BKPT without a debugger.
-    Breakpoint,
-    /// SVC at a priority at which SVCall cannot be taken.
-    SupervisorCall,
+pub struct Fault {
+    /// The instruction; for an access to a peripheral the start of its block.
+    pub pc: u32,
+    /// The link register.
+    pub lr: u32,
+    /// The address of a data access.
+    pub address: Option<u32>,
+    /// Its bits in CFSR.
+    pub status: u32,
 }
 
 impl Fault {
-    /// The exception that handles it when it is enabled and may preempt.
-    pub(crate) fn exception(self) -> Exception {
-        match self {
-            Fault::DataBus { .. }
-            | Fault::ImpreciseBus { .. }
-            | Fault::Fetch { .. }
-            | Fault::Stacking
-            | Fault::Unstacking => Exception::BUS_FAULT,
-            Fault::Execute { .. } => Exception::MEM_MANAGE,
-            Fault::VectorTable | Fault::Breakpoint | Fault::SupervisorCall => Exception::HARD_FAULT,
-            _ => Exception::USAGE_FAULT,
+    fn new(pc: u32, status: u32) -> Fault {
+        Fault { pc, lr: 0, address: None, status }
+    }
+
+    pub(crate) fn data(pc: u32, address: u32) -> Fault {
+        Fault { address: Some(address), ..Fault::new(pc, cfsr::PRECISERR) }
+    }
+
+    pub(crate) fn fetch(pc: u32) -> Fault {
+        Fault::new(pc, cfsr::IBUSERR)
+    }
+
+    pub(crate) fn undefined(pc: u32) -> Fault {
+        Fault::new(pc, cfsr::UNDEFINSTR)
+    }
+
+    pub(crate) fn stacking(pc: u32) -> Fault {
+        Fault::new(pc, cfsr::STKERR)
+    }
+
+    pub(crate) fn unstacking(stack: u32) -> Fault {
+        Fault { address: Some(stack), ..Fault::new(0, cfsr::UNSTKERR) }
+    }
+
+    pub(crate) fn bad_return(exc_return: u32) -> Fault {
+        Fault::new(exc_return, cfsr::INVPC)
+    }
+
+    pub(crate) fn breakpoint(pc: u32) -> Fault {
+        Fault::new(pc, 0)
+    }
+}
+
+impl<P: Peripherals + 'static> Machine<P> {
+    /// A fault of the instruction at hand: its exception is taken at once, or the core locks up.
+    pub(crate) fn take_fault(&mut self, fault: Fault) {
+        let fault = Fault { lr: self.register(RegisterARM::LR), ..fault };
+        self.record(&fault);
+        let masks = engine::masks(&self.cpu);
+        let wanted = self.exception_of(&fault);
+        match self.escalated(wanted, masks) {
+            Some(exception) => self.enter(exception),
+            None => self.lock_up(fault.pc),
         }
     }
 
-    /// Its bits in CFSR, BFARVALID included.
-    pub(crate) fn cfsr(self) -> u32 {
-        match self {
-            Fault::Execute { .. } => 1,
-            Fault::Fetch { .. } => 1 << 8,
-            Fault::DataBus { .. } => 1 << 15 | 1 << 9,
-            Fault::ImpreciseBus { .. } => 1 << 10,
-            Fault::Unstacking => 1 << 11,
-            Fault::Stacking => 1 << 12,
-            Fault::Undefined => 1 << 16,
-            Fault::InvalidState => 1 << 17,
-            Fault::InvalidReturn => 1 << 18,
-            Fault::NoCoprocessor => 1 << 19,
-            Fault::Unaligned => 1 << 24,
-            Fault::VectorTable | Fault::Breakpoint | Fault::SupervisorCall => 0,
+    /// A fault while the context was saved for `exception`: whichever has the higher priority is taken, the other
+    /// stays pending (ARMv7-M, B1.5.10).
+    pub(crate) fn derived(&mut self, fault: Fault, exception: Exception) -> Exception {
+        self.record(&fault);
+        let masks = engine::masks(&self.cpu);
+        let wanted = self.exception_of(&fault);
+        self.escalated(wanted, masks).unwrap_or(exception)
+    }
+
+    fn record(&mut self, fault: &Fault) {
+        self.note(Incident::Fault(*fault));
+        let scb = &mut self.cpu.get_data_mut().scb;
+        match fault.address {
+            Some(address) if fault.status == cfsr::PRECISERR => scb.note_data_fault(address),
+            _ if fault.status == 0 => scb.note_breakpoint(),
+            _ => scb.cfsr |= fault.status,
         }
     }
 
-    /// Its bits in HFSR.
-    pub(crate) fn hfsr(self) -> u32 {
-        match self {
-            Fault::VectorTable => 1 << 1,
-            Fault::Breakpoint => 1 << 31,
-            _ => 0,
+    fn exception_of(&self, fault: &Fault) -> Exception {
+        if fault.status == 0 { Exception::HARD_FAULT } else { Scb::fault_of(fault.status) }
+    }
+
+    /// The fault's own exception when it is enabled and may preempt, else HardFault, else nothing is left.
+    fn escalated(&mut self, wanted: Exception, masks: crate::nvic::Masks) -> Option<Exception> {
+        let core = self.cpu.get_data_mut();
+        if wanted != Exception::HARD_FAULT && core.scb.enables(wanted) && core.nvic.may_preempt(wanted, masks)
+        {
+            return Some(wanted);
         }
+        if core.lacks(Mechanism::Escalation) || !core.nvic.may_preempt(Exception::HARD_FAULT, masks) {
+            return None;
+        }
+        if wanted != Exception::HARD_FAULT {
+            core.scb.note_escalation();
+        }
+        Some(Exception::HARD_FAULT)
     }
 }

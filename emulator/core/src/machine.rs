@@ -1,440 +1,414 @@
-//! The machine: power, time, and the loop that runs the core between events.
+//! The machine: a core with its memory and a chip around it, run in virtual time.
 
 use std::ops::Range;
 
 use canbus::Time;
-use chip::{BusFault, Effect, Peripherals};
-use unicorn_engine::RegisterARM;
+use chip::{BusFault, Effect, Memory, Peripherals};
+use thiserror::Error as ThisError;
+use unicorn_engine::{RegisterARM, uc_error};
 
-use crate::core::Core;
-use crate::error::Error;
-use crate::exceptions::Lockup;
+use crate::core::{Core, Halt};
+use crate::engine::{self, Cpu};
+use crate::exception::Exception;
 use crate::fault::Fault;
-use crate::incident::Incident;
 use crate::loader::{self, Image};
 use crate::mechanism::Mechanism;
-use crate::model::Model;
-use crate::registers::Registers;
 use crate::stats::Stats;
-use crate::system::Cause;
 
 /// The value of every byte of RAM after power-on: what still has it was never written.
 pub const RAM_PATTERN: u8 = 0xA5;
 
+/// The memory of a chip.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The flash array.
+    pub flash: Range<u32>,
+    /// The RAM.
+    pub ram: Range<u32>,
+    /// Where the chip answers instead of memory.
+    pub peripherals: Vec<Range<u32>>,
+}
+
+impl Model {
+    /// An STM32F4 with 128 KiB of RAM and this much flash.
+    pub fn stm32f4(flash: u32) -> Model {
+        Model {
+            flash: 0x0800_0000..0x0800_0000 + flash,
+            ram: 0x2000_0000..0x2002_0000,
+            // The peripherals of both buses, and the system memory with identification and calibration.
+            peripherals: vec![0x1FFF_0000..0x1FFF_8000, 0x4000_0000..0x4008_0000, 0x5000_0000..0x5006_1000],
+        }
+    }
+}
+
+/// What cannot be done.
+#[derive(Debug, ThisError)]
+pub enum Error {
+    /// The ELF file is not one for this chip.
+    #[error("{0}")]
+    Elf(String),
+    /// The CPU library refused.
+    #[error("the CPU library failed: {0:?}")]
+    Cpu(uc_error),
+}
+
+impl From<uc_error> for Error {
+    fn from(error: uc_error) -> Error {
+        Error::Cpu(error)
+    }
+}
+
 /// Why [`Machine::run_until`] came back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The instant is reached.
+    /// The time is reached.
     Reached,
-    /// The chip asks that the world look at the bus before the core runs on.
+    /// The chip wants the world to look at the bus.
     Poked,
-    /// A fault where none can be handled. The core stands; time passes for its peripherals, and a watchdog may
-    /// still reset it.
+    /// A fault inside of a fault: the core stands still until a reset.
     Lockup {
         /// Where it happened.
         pc: u32,
     },
-    /// The chip says that power is gone: the machine is off.
+    /// The supply is gone, as a test asked for.
     PowerCut,
 }
 
+/// A reset or a fault, with its instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    Off,
-    Running,
-    /// In WFI, or in WFE when `event` ends it.
-    Sleeping {
-        event: bool,
-    },
-    /// A load waits for flash.
-    Waiting,
-    LockedUp,
+pub enum Incident {
+    /// A fault was taken.
+    Fault(Fault),
+    /// The program asked for a reset.
+    SoftwareReset,
+    /// The chip reset itself: a watchdog.
+    ChipReset,
 }
 
-/// A Cortex-M4 with memory and the peripherals of its chip.
+/// A core, its memory, and a chip.
 pub struct Machine<P: Peripherals + 'static> {
-    core: Core<P>,
-    state: State,
+    pub(crate) cpu: Cpu<P>,
+    model: Model,
+    powered: bool,
+    sleeping: bool,
+    locked: Option<u32>,
+    stall: Time,
+    incidents: Vec<(Time, Incident)>,
 }
 
 impl<P: Peripherals + 'static> Machine<P> {
-    /// A machine that is off, with erased flash.
+    /// A machine without power, its flash erased.
     ///
     /// # Errors
-    /// When the CPU library refuses the model's memory map.
+    /// When the CPU library refuses.
     pub fn new(model: Model, peripherals: P) -> Result<Machine<P>, Error> {
-        let core = Core::new(model, peripherals)?;
-        let machine = Machine { core, state: State::Off };
-        // The whole array is a range of itself.
-        let _ = machine.core.system().memory.fill(&machine.model().flash, 0xFF);
-        Ok(machine)
+        let mut cpu = engine::new(&model, Core::new(peripherals))?;
+        cpu.mem_write(model.flash.start.into(), &vec![0xFF; model.flash.len()])?;
+        Ok(Machine {
+            cpu,
+            model,
+            powered: false,
+            sleeping: false,
+            locked: None,
+            stall: Time::ZERO,
+            incidents: vec![],
+        })
     }
 
-    /// Writes the segments of an ELF file into flash by their load addresses.
+    /// Writes the segments of an ELF file into flash, as a debug probe does.
     ///
     /// # Errors
-    /// When it is not an ELF file for ARM, or not all of it lies in flash; then flash is unchanged.
-    pub fn load_elf(&mut self, bytes: &[u8]) -> Result<Image, Error> {
-        let image = loader::parse(bytes, self.model())?;
+    /// [`Error::Elf`] for anything but a program for this chip; nothing is written then.
+    pub fn load_elf(&mut self, file: &[u8]) -> Result<Image, Error> {
+        let image = loader::parse(file, &self.model)?;
         for segment in &image.segments {
-            self.store(segment.address, &segment.bytes);
+            engine::store(&mut self.cpu, segment.address, &segment.bytes)?;
         }
         Ok(image)
     }
 
-    /// The contents of the flash array.
+    /// The flash array.
     pub fn flash(&self) -> Vec<u8> {
-        let mut bytes = vec![0; self.model().flash_size()];
-        // The array is as long as itself.
-        let _ = self.read(self.model().flash.start, &mut bytes);
-        bytes
+        self.cpu.mem_read_as_vec(self.model.flash.start.into(), self.model.flash.len()).unwrap_or_default()
     }
 
-    /// Replaces the flash array from its start; what lies behind `bytes` keeps its contents.
+    /// Replaces the flash array, from its start.
     ///
     /// # Errors
-    /// When `bytes` is longer than the array.
-    pub fn set_flash(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let start = self.model().flash.start;
-        self.write(start, bytes).map_err(|BusFault| Error::FlashSize(bytes.len()))
+    /// When `contents` is longer than the array.
+    pub fn set_flash(&mut self, contents: &[u8]) -> Result<(), Error> {
+        engine::store(&mut self.cpu, self.model.flash.start, contents)
     }
 
-    /// Switches the supply on: RAM holds [`RAM_PATTERN`], the chip and the core come out of reset at `at`, or now if that is later.
+    /// Reads memory, not registers.
+    ///
+    /// # Errors
+    /// [`BusFault`] where there is no memory.
+    pub fn read(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
+        self.cpu.mem_read(address.into(), bytes).map_err(|_| BusFault)
+    }
+
+    /// Writes memory, not registers.
+    ///
+    /// # Errors
+    /// [`BusFault`] where there is no memory.
+    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), BusFault> {
+        engine::store(&mut self.cpu, address, bytes).map_err(|_| BusFault)
+    }
+
+    /// Sets a core register, as a debugger does: 0..=12, 13 the stack pointer, 14 the link register.
+    pub fn set_register(&mut self, number: u8, value: u32) {
+        let register = RegisterARM::R0 as i32 + i32::from(number.min(12));
+        let register = match number {
+            13 => RegisterARM::SP as i32,
+            14 => RegisterARM::LR as i32,
+            _ => register,
+        };
+        let _ = self.cpu.reg_write(register, value.into());
+    }
+
+    /// Switches the supply on at an instant.
     pub fn power_on(&mut self, at: Time) {
-        let system = self.core.system_mut();
-        system.clock.wait_until(at);
-        self.fill(self.model().ram.clone(), RAM_PATTERN);
-        self.reset(true);
+        let pattern = vec![RAM_PATTERN; self.model.ram.len()];
+        let _ = self.write(self.model.ram.start, &pattern);
+        let core = self.cpu.get_data_mut();
+        core.now = core.now.max(at);
+        core.chip.reset(true, core.now);
+        self.powered = true;
+        self.restart();
     }
 
     /// Switches the supply off: RAM is lost, flash stays.
     pub fn power_off(&mut self) {
-        self.state = State::Off;
+        self.powered = false;
     }
 
-    /// Whether the machine has power.
-    pub fn is_on(&self) -> bool {
-        self.state != State::Off
-    }
-
-    /// The instant that the machine has reached.
+    /// Virtual time.
     pub fn now(&self) -> Time {
-        self.core.system().clock.now()
+        self.cpu.get_data().now
     }
 
-    /// The chip around the core.
+    /// The chip.
     pub fn peripherals(&self) -> &P {
-        &self.core.system().peripherals
+        &self.cpu.get_data().chip
     }
 
-    /// The chip around the core; changes are seen when the machine runs on.
+    /// The chip.
     pub fn peripherals_mut(&mut self) -> &mut P {
-        &mut self.core.system_mut().peripherals
+        &mut self.cpu.get_data_mut().chip
     }
 
-    /// Reads flash or RAM.
-    ///
-    /// # Errors
-    /// When not all of the range is memory.
-    pub fn read(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
-        self.core.system().memory.load(address, bytes)
-    }
-
-    /// Writes RAM, or the flash array past its controller.
-    ///
-    /// # Errors
-    /// When not all of the range is memory; then nothing is written.
-    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), BusFault> {
-        self.core.system().memory.store(address, bytes)?;
-        self.changed(address..address + bytes.len() as u32);
-        Ok(())
-    }
-
-    /// What ran, how often and how late.
+    /// What was counted.
     pub fn stats(&self) -> &Stats {
-        &self.core.system().stats
+        &self.cpu.get_data().stats
     }
 
-    /// Starts the figures of [`Machine::stats`] anew.
-    pub fn clear_stats(&mut self) {
-        let now = self.now();
-        self.core.system_mut().stats.clear(now);
-    }
-
-    /// Faults and resets since the machine was made with their instants, the first 1000.
+    /// Faults and resets since power-on of the machine, with their instants.
     pub fn incidents(&self) -> &[(Time, Incident)] {
-        self.core.system().incidents.all()
+        &self.incidents
     }
 
-    /// A hash of all exception entries with their times and return addresses: equal for equal runs.
-    pub fn trace_hash(&self) -> u64 {
-        self.stats().trace()
+    /// The memory of the chip.
+    pub fn model(&self) -> &Model {
+        &self.model
     }
 
-    /// The most bytes that a stack used since power-on: from the lowest byte of `stack` that no longer has the
-    /// pattern of power-on to its end.
-    pub fn stack_depth(&self, stack: Range<u32>) -> u32 {
-        let mut bytes = vec![RAM_PATTERN; stack.len()];
-        if self.read(stack.start, &mut bytes).is_err() {
-            return 0;
-        }
-        let untouched = bytes.iter().take_while(|&&byte| byte == RAM_PATTERN).count();
-        (bytes.len() - untouched) as u32
-    }
-
-    /// PC, for messages.
-    pub fn pc(&self) -> u32 {
-        self.core.uc.get(RegisterARM::PC)
-    }
-
-    /// Switches one mechanism off for good, for the negative control of a test.
+    /// Switches one mechanism off, for the negative control of a test.
     pub fn without(&mut self, mechanism: Mechanism) {
-        self.core.system_mut().missing.add(mechanism);
+        self.cpu.get_data_mut().without = Some(mechanism);
     }
 
     /// The next instant at which something happens here when the outside does nothing: now, unless the core sleeps.
     pub fn next_event(&self) -> Time {
-        match self.state {
-            State::Off => Time::NEVER,
-            State::Running => self.now(),
-            _ => self.core.system().next_event().max(self.now()),
+        let core = self.cpu.get_data();
+        match (self.powered, self.sleeping || self.locked.is_some()) {
+            (false, _) => Time::NEVER,
+            (true, true) => core.deadline().max(core.now),
+            (true, false) => core.now,
         }
     }
 
-    /// The memories of the chip.
-    pub fn model(&self) -> &Model {
-        &self.core.system().model
-    }
-
-    /// Runs until an instant, or until there is news. The machine stops between instructions, so it may be past
-    /// `until` by a basic block or an exception entry.
+    /// Runs to `until`, or to what stops it earlier.
     pub fn run_until(&mut self, until: Time) -> Stop {
-        self.core.system_mut().run.until = until;
+        self.cpu.get_data_mut().until = until;
         loop {
-            if let Some(stop) = self.settle() {
+            if !self.powered {
+                let core = self.cpu.get_data_mut();
+                core.now = core.now.max(until);
+                return Stop::Reached;
+            }
+            if let Some(stop) = self.attend() {
                 return stop;
             }
             if self.now() >= until {
-                return Stop::Reached;
+                return self.locked.map_or(Stop::Reached, |pc| Stop::Lockup { pc });
             }
-            if let Some(stop) = self.go_on() {
-                return stop;
-            }
+            self.step(until);
         }
     }
 
-    /// One run of the core, or one wait.
-    fn go_on(&mut self) -> Option<Stop> {
-        let stalled = self.core.system().waits_for_flash(self.pc());
-        match self.state {
-            State::Running if !stalled => {
-                let cause = self.core.execute();
-                self.handle(cause)
-            }
-            State::Off => {
-                let system = self.core.system_mut();
-                system.clock.wait_until(system.run.until);
-                None
-            }
-            _ => {
-                self.wait();
-                None
-            }
-        }
-    }
-
-    /// Lets time pass until something happens.
-    fn wait(&mut self) {
-        let system = self.core.system_mut();
-        let waited = system.clock.wait_until(system.run.due);
-        if matches!(self.state, State::Sleeping { .. }) {
-            system.stats.slept(waited);
-        }
-    }
-
-    fn handle(&mut self, cause: Cause) -> Option<Stop> {
-        let result = match cause {
-            Cause::Attention => Ok(()),
-            Cause::WaitForInterrupt => self.sleep(false),
-            Cause::WaitForEvent => self.wait_for_event(),
-            Cause::FlashBusy => self.wait_for_flash(),
-            Cause::Return(exc_return) => self.leave(exc_return),
-            Cause::Supervisor => self.core.supervisor_call(),
-            Cause::Breakpoint => self.core.raise(Fault::Breakpoint),
-            Cause::Fault(fault) => self.core.raise(fault),
-        };
-        result.err().map(|lockup| self.lock_up(lockup))
-    }
-
-    fn sleep(&mut self, event: bool) -> Result<(), Lockup> {
-        if self.core.system().works(Mechanism::Sleep) {
-            self.state = State::Sleeping { event };
-        }
-        Ok(())
-    }
-
-    /// WFE: goes on at once when an event was noted, else sleeps until one.
-    fn wait_for_event(&mut self) -> Result<(), Lockup> {
-        if std::mem::take(&mut self.core.system_mut().run.event) { Ok(()) } else { self.sleep(true) }
-    }
-
-    fn wait_for_flash(&mut self) -> Result<(), Lockup> {
-        self.state = State::Waiting;
-        Ok(())
-    }
-
-    fn leave(&mut self, exc_return: u32) -> Result<(), Lockup> {
-        if self.core.leave(exc_return)? { self.sleep(false) } else { Ok(()) }
-    }
-
-    fn lock_up(&mut self, Lockup { pc }: Lockup) -> Stop {
-        self.state = State::LockedUp;
-        Stop::Lockup { pc }
-    }
-
-    /// Does all that is due before the core may run: events, effects, resets, faults, exceptions.
-    fn settle(&mut self) -> Option<Stop> {
-        if self.state == State::Off {
-            return None;
-        }
-        let system = self.core.system_mut();
-        let now = system.clock.now();
-        system.look(now);
-        loop {
-            self.core.system_mut().catch_up();
-            if let Some(stop) = self.apply_effects() {
+    /// Everything that is due before the next block: events, effects, resets.
+    fn attend(&mut self) -> Option<Stop> {
+        self.advance_chip();
+        while let Some(effect) = self.cpu.get_data_mut().effects.pop_front() {
+            if let Some(stop) = self.carry_out(effect) {
                 return Some(stop);
             }
-            self.reset_if_asked();
-            self.end_stall();
-            match self.take_exception() {
-                Ok(true) => {}
-                Ok(false) => break,
-                Err(lockup) => return Some(self.lock_up(lockup)),
-            }
         }
-        self.core.note_masked();
-        let system = self.core.system_mut();
-        system.run.attention = false;
-        system.consider();
+        if std::mem::take(&mut self.cpu.get_data_mut().reset_requested) {
+            self.reset(Incident::SoftwareReset);
+        }
         None
     }
 
-    /// Takes one exception or fault that is due; whether there was one.
-    fn take_exception(&mut self) -> Result<bool, Lockup> {
-        self.wake();
-        if self.state != State::Running || self.core.system().waits_for_flash(self.pc()) {
-            return Ok(false);
-        }
-        if let Some(address) = self.core.system_mut().run.refused.take() {
-            self.core.raise(Fault::ImpreciseBus { address })?;
-        }
-        match self.core.takeable() {
-            Some(next) => self.core.enter(next.exception).map(|()| true),
-            None => Ok(false),
-        }
+    fn advance_chip(&mut self) {
+        let core: *mut Core<P> = self.cpu.get_data_mut();
+        // SAFETY: `View` reads guest memory only, through the library's handle; it does not touch the user data
+        // that `core` points to, and nothing else holds a reference to it meanwhile.
+        unsafe { (*core).advance(&View(&self.cpu)) };
     }
 
-    fn wake(&mut self) {
-        if let State::Sleeping { event } = self.state
-            && (self.core.wakes() || event && self.core.system().run.event)
-        {
-            self.state = State::Running;
-        }
-    }
-
-    fn reset_if_asked(&mut self) {
-        if self.core.system().scb.reset_requested {
-            self.note(Incident::SoftwareReset);
-            self.reset(false);
-        }
-    }
-
-    fn note(&mut self, incident: Incident) {
-        let system = self.core.system_mut();
-        system.incidents.add(system.clock.now(), incident);
-    }
-
-    /// The chip and the core after a reset; what the chip asked for before it is void.
-    fn reset(&mut self, power: bool) {
-        self.end_stall_now();
-        let system = self.core.system_mut();
-        let now = system.clock.now();
-        system.reset();
-        system.peripherals.reset(power, now);
-        system.look(now);
-        self.core.reset_registers();
-        self.state = State::Running;
-    }
-
-    /// Carries out what the chip asked for.
-    fn apply_effects(&mut self) -> Option<Stop> {
-        let mut stop = None;
-        while let Some(effect) = self.core.system_mut().run.effects.pop_front() {
-            match effect {
-                Effect::Store { address, bytes } => self.store(address, &bytes),
-                Effect::Fill { range, byte } => self.fill(range, byte),
-                Effect::StallFlash(until) => self.stall(until),
-                Effect::CoreClock(hertz) => self.set_clock(hertz),
-                Effect::Reset => {
-                    self.note(Incident::ChipReset);
-                    self.reset(false);
-                }
-                Effect::PowerCut => {
-                    self.power_off();
-                    self.core.system_mut().run.effects.clear();
-                    return Some(Stop::PowerCut);
-                }
-                Effect::Poke => stop = Some(Stop::Poked),
+    fn carry_out(&mut self, effect: Effect) -> Option<Stop> {
+        match engine::apply(&mut self.cpu, effect) {
+            Ok(Some(Effect::StallFlash(end))) => self.stall = self.stall.max(end),
+            Ok(Some(Effect::CoreClock(hertz))) => self.cpu.get_data_mut().set_clock(hertz),
+            Ok(Some(Effect::Reset)) => self.reset(Incident::ChipReset),
+            Ok(Some(Effect::Poke)) => return Some(Stop::Poked),
+            Ok(Some(Effect::PowerCut)) => {
+                self.power_off();
+                return Some(Stop::PowerCut);
             }
+            // The address of an effect was checked when the chip made it: outside of memory it is lost, as on a
+            // real bus.
+            Ok(_) | Err(_) => {}
         }
-        stop
+        None
     }
 
-    /// A store past the bus: DMA to nothing is lost, as on the chip.
-    fn store(&mut self, address: u32, bytes: &[u8]) {
-        let _ = self.write(address, bytes);
+    /// One step of the core: an exception, sleep, or code.
+    fn step(&mut self, until: Time) {
+        let masks = engine::masks(&self.cpu);
+        let core = self.cpu.get_data();
+        if self.locked.is_some() {
+            return self.idle(until);
+        }
+        if self.sleeping {
+            if !core.nvic.wakes(masks) && !core.lacks(Mechanism::Sleep) {
+                return self.idle(until);
+            }
+            self.sleeping = false;
+        }
+        if let Some(exception) = core.to_take(masks) {
+            return self.enter(exception);
+        }
+        if self.stalls() {
+            return self.pass_to(self.stall.min(until));
+        }
+        self.run_code();
     }
 
-    fn fill(&mut self, range: Range<u32>, byte: u8) {
-        let _ = self.core.system().memory.fill(&range, byte);
-        self.changed(range);
+    fn stalls(&self) -> bool {
+        self.now() < self.stall && self.model.flash.contains(&self.pc())
     }
 
-    /// Memory changed under the translated code.
-    fn changed(&mut self, range: Range<u32>) {
-        if self.core.system().works(Mechanism::Retranslation) {
-            self.core.invalidate(&range);
+    /// Nothing runs until the next event.
+    fn idle(&mut self, until: Time) {
+        let before = self.now();
+        let next = self.cpu.get_data().deadline().min(until);
+        self.pass_to(next);
+        let core = self.cpu.get_data_mut();
+        core.stats.asleep += core.now - before;
+    }
+
+    fn pass_to(&mut self, instant: Time) {
+        let core = self.cpu.get_data_mut();
+        core.now = core.now.max(instant);
+    }
+
+    fn run_code(&mut self) {
+        let core = self.cpu.get_data_mut();
+        core.halt = None;
+        core.unmapped = None;
+        let result = self.cpu.emu_start(u64::from(self.pc() | 1), 0, 0, 0);
+        match (result, self.cpu.get_data_mut().halt.take()) {
+            (_, Some(Halt::Attention)) => {}
+            (_, Some(Halt::ExceptionReturn)) => self.leave(),
+            (_, Some(Halt::SupervisorCall)) => self.raise(Exception::SV_CALL),
+            (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),
+            (_, Some(Halt::Undefined)) => self.take_fault(Fault::undefined(self.pc())),
+            (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
+            (Err(error), None) => self.take_fault(self.fault_of(error)),
+            (Ok(()), None) => self.sleeping = true,
         }
     }
 
-    fn set_clock(&mut self, hertz: u64) {
-        let system = self.core.system_mut();
-        let now = system.clock.now();
-        system.clock.set_frequency(hertz);
-        system.systick.set_cycle(system.clock.cycle(), now);
-    }
-
-    fn stall(&mut self, until: Time) {
-        if until > self.now() {
-            self.core.system_mut().run.stalled = Some(until);
-            self.core.bar_flash(true);
+    fn fault_of(&self, error: uc_error) -> Fault {
+        let pc = self.pc();
+        match self.cpu.get_data().unmapped {
+            Some(access) if access.fetch => Fault::fetch(pc),
+            Some(access) => Fault::data(pc, access.address),
+            None if matches!(error, uc_error::FETCH_PROT | uc_error::FETCH_UNMAPPED) => Fault::fetch(pc),
+            None => Fault::undefined(pc),
         }
     }
 
-    fn end_stall(&mut self) {
+    /// Pends an exception of the core itself.
+    fn raise(&mut self, exception: Exception) {
+        self.cpu.get_data_mut().pend(exception);
+    }
+
+    pub(crate) fn note(&mut self, incident: Incident) {
         let now = self.now();
-        if self.core.system().run.stalled.is_some_and(|end| end <= now) {
-            self.end_stall_now();
-        }
+        self.incidents.push((now, incident));
     }
 
-    fn end_stall_now(&mut self) {
-        if self.core.system_mut().run.stalled.take().is_some() {
-            self.core.bar_flash(false);
-        }
-        if self.state == State::Waiting {
-            self.state = State::Running;
-        }
+    pub(crate) fn lock_up(&mut self, pc: u32) {
+        self.locked = Some(pc);
+    }
+
+    fn reset(&mut self, incident: Incident) {
+        self.note(incident);
+        let core = self.cpu.get_data_mut();
+        core.chip.reset(false, core.now);
+        self.restart();
+    }
+
+    /// The core after any reset: stack pointer and program counter from the start of flash.
+    fn restart(&mut self) {
+        self.cpu.get_data_mut().reset();
+        self.sleeping = false;
+        self.locked = None;
+        self.stall = Time::ZERO;
+        let vectors = self.model.flash.start;
+        let (stack, entry) = (self.word(vectors).unwrap_or(0), self.word(vectors + 4).unwrap_or(0));
+        self.reset_registers(stack, entry);
+        self.cpu.get_data_mut().settle();
+    }
+
+    pub(crate) fn word(&self, address: u32) -> Option<u32> {
+        let mut bytes = [0; 4];
+        self.cpu.mem_read(address.into(), &mut bytes).ok()?;
+        Some(u32::from_le_bytes(bytes))
+    }
+
+    pub(crate) fn register(&self, register: RegisterARM) -> u32 {
+        self.cpu.reg_read(register).unwrap_or(0) as u32
+    }
+
+    pub(crate) fn set(&mut self, register: RegisterARM, value: u32) {
+        let _ = self.cpu.reg_write(register, value.into());
+    }
+
+    pub(crate) fn pc(&self) -> u32 {
+        self.register(RegisterARM::PC) & !1
+    }
+}
+
+/// Guest memory for a DMA transfer.
+struct View<'a, P: 'static>(&'a unicorn_engine::Unicorn<'static, Core<P>>);
+
+impl<P: 'static> Memory for View<'_, P> {
+    fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
+        self.0.mem_read(address.into(), bytes).map_err(|_| BusFault)
     }
 }

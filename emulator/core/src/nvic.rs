@@ -1,283 +1,228 @@
-//! The nested vectored interrupt controller, for interrupts and system exceptions alike: what is enabled, pending and
-//! active, and which exception is next (ARMv7-M ARM, B1.5.4 and B3.4).
+//! The nested vectored interrupt controller, for interrupts and system exceptions alike (ARMv7-M, B1.5 and B3.4).
 
-use canbus::Time;
+use chip::IrqLines;
 
-use crate::exception::{Exception, Set};
+use crate::exception::Exception;
 
-/// Execution priority of Thread mode with nothing masked: below every exception.
-pub(crate) const THREAD_PRIORITY: i16 = 256;
+/// Bits of priority that the STM32F4 implements, in the high bits of the byte.
+const PRIORITY_BITS: u32 = 4;
 
-/// Priority bits that the STM32F4 implements (PM0214, section 4.3): the upper four.
-const IMPLEMENTED: u8 = 0xF0;
-
-/// Exceptions of the system have no enable bit here. The configurable faults are sorted out where they are raised.
+/// Exceptions that are always enabled: Reset to SysTick.
 const ALWAYS_ENABLED: u128 = 0xFFFF;
 
-/// A pending exception that could be taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Candidate {
-    pub(crate) exception: Exception,
-    /// Its group priority: what counts for preemption.
-    pub(crate) priority: i16,
-}
-
-/// A bit register of the controller.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Bits {
-    Enabled,
-    Pending,
-    Active,
+/// The registers that mask exceptions.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Masks {
+    pub(crate) primask: bool,
+    pub(crate) faultmask: bool,
+    pub(crate) basepri: u8,
 }
 
 /// Pending, enabled and active exceptions with their priorities.
+#[derive(Clone, Debug)]
 pub(crate) struct Nvic {
-    pending: Set,
-    active: Set,
-    enabled: Set,
-    priority: [u8; Exception::COUNT],
-    /// When a pending exception became pending.
-    since: [Time; Exception::COUNT],
-    /// Which priority bits are group priority.
-    group_mask: u8,
+    pending: u128,
+    enabled: u128,
+    active: u128,
     lines: u128,
-    active_priority: i16,
+    priority: [u8; Exception::COUNT],
+    /// AIRCR.PRIGROUP: how many low bits of a priority do not preempt, less one.
+    group: u32,
+}
+
+impl Default for Nvic {
+    fn default() -> Nvic {
+        Nvic {
+            pending: 0,
+            enabled: ALWAYS_ENABLED,
+            active: 0,
+            lines: 0,
+            priority: [0; Exception::COUNT],
+            group: 0,
+        }
+    }
 }
 
 impl Nvic {
-    pub(crate) fn new() -> Nvic {
-        Nvic {
-            pending: Set::default(),
-            active: Set::default(),
-            enabled: Set(ALWAYS_ENABLED),
-            priority: [0; Exception::COUNT],
-            since: [Time::ZERO; Exception::COUNT],
-            group_mask: 0xFE,
-            lines: 0,
-            active_priority: THREAD_PRIORITY,
-        }
+    /// Takes the levels of the interrupt lines. A rising line pends; a line that stays high pends again when its
+    /// exception ends.
+    pub(crate) fn sample(&mut self, lines: IrqLines) {
+        let lines = lines.0 << 16;
+        self.pending |= lines & !self.lines;
+        self.lines = lines;
     }
 
-    pub(crate) fn pend(&mut self, exception: Exception, now: Time) {
-        if !self.pending.contains(exception) {
-            self.since[exception.index()] = now;
-            self.pending.insert(exception);
-        }
+    pub(crate) fn pend(&mut self, exception: Exception) {
+        self.pending |= exception.bit();
     }
 
-    pub(crate) fn unpend(&mut self, exception: Exception) {
-        self.pending.remove(exception);
+    /// Clears a pending state; a line that is still high sets it again at once.
+    pub(crate) fn clear(&mut self, exceptions: u128) {
+        self.pending &= !exceptions;
+        self.pending |= self.lines & exceptions & !self.active;
     }
 
     pub(crate) fn is_pending(&self, exception: Exception) -> bool {
-        self.pending.contains(exception)
-    }
-
-    pub(crate) fn any_irq_pending(&self) -> bool {
-        self.pending.0 > ALWAYS_ENABLED
+        self.pending & exception.bit() != 0
     }
 
     pub(crate) fn is_active(&self, exception: Exception) -> bool {
-        self.active.contains(exception)
+        self.active & exception.bit() != 0
     }
 
-    pub(crate) fn pending_since(&self, exception: Exception) -> Time {
-        self.since[exception.index()]
+    /// Whether any exception is active.
+    pub(crate) fn any_active(&self) -> bool {
+        self.active != 0
     }
 
-    /// Any exception active besides `exception`.
-    pub(crate) fn others_active(&self, exception: Exception) -> bool {
-        let mut others = self.active;
-        others.remove(exception);
-        others.0 != 0
+    /// Whether an interrupt (not a system exception) is pending.
+    pub(crate) fn any_irq_pending(&self) -> bool {
+        self.pending >> 16 != 0
     }
 
-    /// Samples the interrupt lines: a rising line becomes pending, and with `levels` one that is high while its
-    /// handler does not run.
-    pub(crate) fn sample(&mut self, lines: u128, levels: bool, now: Time) {
-        let rising = Set::of_lines(lines & !self.lines).0;
-        let high = if levels { Set::of_lines(lines).0 & !self.active.0 } else { 0 };
-        self.lines = lines;
-        for exception in Set((rising | high) & !self.pending.0).iter() {
-            self.pend(exception, now);
-        }
+    /// Everything pending, as a set of exception numbers.
+    pub(crate) fn pending_set(&self) -> u128 {
+        self.pending
     }
 
+    /// Makes a pending exception the active one.
     pub(crate) fn activate(&mut self, exception: Exception) {
-        self.pending.remove(exception);
-        self.active.insert(exception);
-        self.update_active_priority();
+        self.pending &= !exception.bit();
+        self.active |= exception.bit();
     }
 
-    /// The handler ends. With `levels`, a line that is still high pends again.
-    pub(crate) fn deactivate(&mut self, exception: Exception, levels: bool, now: Time) {
-        self.active.remove(exception);
-        self.update_active_priority();
-        let high = exception.line().is_some_and(|line| self.lines >> line & 1 != 0);
-        if high && levels {
-            self.pend(exception, now);
+    /// Ends an active exception.
+    pub(crate) fn deactivate(&mut self, exception: Exception) {
+        self.active &= !exception.bit();
+        self.pending |= self.lines & exception.bit();
+    }
+
+    /// The priority at which the core runs, masks left out: -1 in HardFault, 256 in Thread mode.
+    fn active_priority(&self) -> i16 {
+        bits(self.active).map(|exception| self.group_priority(exception)).min().unwrap_or(256)
+    }
+
+    /// The priority at which the core runs.
+    pub(crate) fn execution_priority(&self, masks: Masks) -> i16 {
+        let mut priority = self.active_priority();
+        if masks.basepri != 0 {
+            priority = priority.min(self.grouped(masks.basepri));
         }
+        if masks.primask {
+            priority = priority.min(0);
+        }
+        if masks.faultmask {
+            priority = priority.min(-1);
+        }
+        priority
     }
 
-    /// Group priority of an exception.
-    pub(crate) fn group_priority(&self, exception: Exception) -> i16 {
+    /// Whether anything enabled is pending, whatever the masks say: the cheap question before the exact one.
+    pub(crate) fn wants_attention(&self) -> bool {
+        self.pending & self.enabled != 0
+    }
+
+    /// The exception to take now, if one may preempt.
+    pub(crate) fn to_take(&self, masks: Masks) -> Option<Exception> {
+        let candidate = self.first()?;
+        (self.group_priority(candidate) < self.execution_priority(masks)).then_some(candidate)
+    }
+
+    /// Whether WFI ends: the same question with PRIMASK left out.
+    pub(crate) fn wakes(&self, masks: Masks) -> bool {
+        self.to_take(Masks { primask: false, ..masks }).is_some()
+    }
+
+    /// Whether a fault of this exception could be taken now instead of escalating.
+    pub(crate) fn may_preempt(&self, exception: Exception, masks: Masks) -> bool {
+        self.group_priority(exception) < self.execution_priority(masks)
+    }
+
+    /// Highest priority first, then the lowest number.
+    fn first(&self) -> Option<Exception> {
+        bits(self.pending & self.enabled).min_by_key(|exception| (self.full_priority(*exception), *exception))
+    }
+
+    fn full_priority(&self, exception: Exception) -> i16 {
         match exception {
             Exception::NMI => -2,
             Exception::HARD_FAULT => -1,
-            other => self.group(self.priority[other.index()]),
+            Exception(number) => i16::from(self.priority[usize::from(number)]),
         }
     }
 
-    /// The group part of a priority, as BASEPRI is compared.
-    pub(crate) fn group(&self, priority: u8) -> i16 {
-        i16::from(priority & self.group_mask)
-    }
-
-    /// The priority that the active exceptions give, before the mask registers.
-    pub(crate) fn active_priority(&self) -> i16 {
-        self.active_priority
-    }
-
-    /// The priority that BASEPRI gives; zero masks nothing.
-    pub(crate) fn base_priority(&self, basepri: u32) -> i16 {
-        match basepri as u8 & IMPLEMENTED {
-            0 => THREAD_PRIORITY,
-            priority => self.group(priority),
+    fn group_priority(&self, exception: Exception) -> i16 {
+        match self.full_priority(exception) {
+            fixed @ ..0 => fixed,
+            priority => self.grouped(priority as u8),
         }
     }
 
-    /// The first of the pending and enabled exceptions: by group priority, then sub-priority, then number.
-    pub(crate) fn best(&self) -> Option<Candidate> {
-        let ready = Set(self.pending.0 & self.enabled.0);
-        let exception = ready.iter().min_by_key(|&exception| {
-            (self.group_priority(exception), self.priority[exception.index()], exception)
-        })?;
-        Some(Candidate { exception, priority: self.group_priority(exception) })
+    fn grouped(&self, priority: u8) -> i16 {
+        i16::from(priority) & !((2 << self.group) - 1)
     }
 
-    fn update_active_priority(&mut self) {
-        let priorities = self.active.iter().map(|exception| self.group_priority(exception));
-        self.active_priority = priorities.min().unwrap_or(THREAD_PRIORITY);
+    pub(crate) fn group(&self) -> u32 {
+        self.group
     }
 
-    pub(crate) fn set_priority(&mut self, exception: Exception, priority: u8) {
-        self.priority[exception.index()] = priority & IMPLEMENTED;
-        self.update_active_priority();
+    pub(crate) fn set_group(&mut self, group: u32) {
+        self.group = group & 7;
     }
 
     pub(crate) fn priority(&self, exception: Exception) -> u8 {
-        self.priority[exception.index()]
+        self.priority[usize::from(exception.0)]
     }
 
-    /// AIRCR.PRIGROUP: how many low bits of a priority only order pending exceptions.
-    pub(crate) fn set_grouping(&mut self, prigroup: u32) {
-        self.group_mask = (0xFE_u32 << (prigroup & 7)) as u8;
-        self.update_active_priority();
+    pub(crate) fn set_priority(&mut self, exception: Exception, priority: u8) {
+        self.priority[usize::from(exception.0)] = priority & !(0xFF >> PRIORITY_BITS);
     }
 
-    /// A bit register for lines `32 * index` and up, `index` 0 to 3.
-    pub(crate) fn word(&self, register: Bits, index: u32) -> u32 {
-        let set = match register {
-            Bits::Enabled => self.enabled,
-            Bits::Pending => self.pending,
-            Bits::Active => self.active,
-        };
-        (set.0 >> 16 >> (32 * index)) as u32
+    pub(crate) fn enabled_word(&self, word: u32) -> u32 {
+        irq_word(self.enabled, word)
     }
 
-    pub(crate) fn enable(&mut self, index: u32, bits: u32) {
-        self.enabled.0 |= lines(index, bits).0;
+    pub(crate) fn pending_word(&self, word: u32) -> u32 {
+        irq_word(self.pending, word)
     }
 
-    pub(crate) fn disable(&mut self, index: u32, bits: u32) {
-        self.enabled.0 &= !lines(index, bits).0;
+    pub(crate) fn active_word(&self, word: u32) -> u32 {
+        irq_word(self.active, word)
     }
 
-    /// ISPR and STIR: pends lines by software.
-    pub(crate) fn set_pending(&mut self, index: u32, bits: u32, now: Time) {
-        for exception in lines(index, bits).iter() {
-            self.pend(exception, now);
-        }
+    pub(crate) fn enable(&mut self, word: u32, bits: u32) {
+        self.enabled |= irq_bits(word, bits);
     }
 
-    /// ICPR: a line that is still high pends again at the next sample.
-    pub(crate) fn clear_pending(&mut self, index: u32, bits: u32) {
-        self.pending.0 &= !lines(index, bits).0;
+    pub(crate) fn disable(&mut self, word: u32, bits: u32) {
+        self.enabled &= !irq_bits(word, bits);
+    }
+
+    pub(crate) fn set_pending(&mut self, word: u32, bits: u32) {
+        self.pending |= irq_bits(word, bits);
+    }
+
+    pub(crate) fn clear_pending(&mut self, word: u32, bits: u32) {
+        self.clear(irq_bits(word, bits));
     }
 }
 
-/// The exceptions of 32 lines.
-fn lines(index: u32, bits: u32) -> Set {
-    Set::of_lines(u128::from(bits) << (32 * index))
+/// The exceptions of a set.
+fn bits(mut set: u128) -> impl Iterator<Item = Exception> {
+    std::iter::from_fn(move || {
+        let number = set.trailing_zeros();
+        (number < 128).then(|| {
+            set &= set - 1;
+            Exception(number as u8)
+        })
+    })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// A word of 32 interrupts in a set of exceptions.
+fn irq_word(set: u128, word: u32) -> u32 {
+    (set >> 16).checked_shr(word * 32).unwrap_or(0) as u32
+}
 
-    const A: Exception = Exception::irq(3);
-    const B: Exception = Exception::irq(40);
-
-    fn nvic() -> Nvic {
-        let mut nvic = Nvic::new();
-        nvic.enable(0, 1 << 3);
-        nvic.enable(1, 1 << 8);
-        nvic
-    }
-
-    #[test]
-    fn lower_value_goes_first_then_lower_number() {
-        let mut nvic = nvic();
-        nvic.set_priority(A, 0x80);
-        nvic.set_priority(B, 0x40);
-        nvic.pend(A, Time::ZERO);
-        nvic.pend(B, Time::ZERO);
-        assert_eq!(nvic.best().map(|best| best.exception), Some(B));
-        nvic.set_priority(B, 0x80);
-        assert_eq!(nvic.best().map(|best| best.exception), Some(A));
-    }
-
-    #[test]
-    fn only_the_group_part_preempts() {
-        let mut nvic = nvic();
-        nvic.set_grouping(5); // two group bits
-        nvic.set_priority(A, 0x90);
-        nvic.set_priority(B, 0x80);
-        nvic.activate(A);
-        nvic.pend(B, Time::ZERO);
-        assert_eq!(nvic.best().map(|best| best.priority), Some(nvic.active_priority()));
-    }
-
-    #[test]
-    fn a_disabled_line_stays_pending() {
-        let mut nvic = nvic();
-        nvic.disable(0, 1 << 3);
-        nvic.pend(A, Time::ZERO);
-        assert_eq!(nvic.best(), None);
-        assert_eq!(nvic.word(Bits::Pending, 0), 1 << 3);
-    }
-
-    #[test]
-    fn a_level_pends_again_when_its_handler_ends() {
-        let mut nvic = nvic();
-        nvic.sample(1 << 3, true, Time::ZERO);
-        nvic.activate(A);
-        nvic.sample(1 << 3, true, Time(1));
-        assert!(!nvic.is_pending(A));
-        nvic.deactivate(A, true, Time(2));
-        assert!(nvic.is_pending(A));
-        assert_eq!(nvic.pending_since(A), Time(2));
-    }
-
-    #[test]
-    fn a_pulse_during_the_handler_is_not_lost() {
-        let mut nvic = nvic();
-        nvic.sample(1 << 3, true, Time::ZERO);
-        nvic.activate(A);
-        nvic.sample(0, true, Time(1));
-        nvic.sample(1 << 3, true, Time(2));
-        nvic.sample(0, true, Time(3));
-        nvic.deactivate(A, true, Time(4));
-        assert!(nvic.is_pending(A));
-    }
+fn irq_bits(word: u32, bits: u32) -> u128 {
+    u128::from(bits).checked_shl(word * 32 + 16).unwrap_or(0)
 }

@@ -1,215 +1,152 @@
-//! The private peripheral bus: addresses of the core's own registers (ARMv7-M ARM, table B3-3 and on).
+//! The private peripheral bus: every register of the core by address (ARMv7-M, B3.1).
 
-use chip::{BusFault, Peripherals};
+use chip::Peripherals;
 
+use crate::core::Core;
 use crate::exception::Exception;
-use crate::mechanism::Mechanism;
-use crate::nvic::Bits;
-use crate::system::System;
 
-/// Cortex-M4 r0p1.
+/// Where the system space begins.
+pub(crate) const BASE: u32 = 0xE000_0000;
+/// How long it is.
+pub(crate) const SIZE: u32 = 0x0010_0000;
+
+/// The debug unit of the chip lies among the registers of the core (RM0390, section 33.16).
+const DBGMCU: u32 = 0xE004_2000;
+const DBGMCU_END: u32 = 0xE004_23FF;
+
 const CPUID: u32 = 0x410F_C241;
-/// ICTR: lines in units of 32, less one; the STM32F4 has up to 97.
-const INTLINESNUM: u32 = 3;
+const AIRCR_KEY: u32 = 0x05FA;
+const SYSRESETREQ: u32 = 1 << 2;
 
-const SYSTICK: u32 = 0xE000_E010;
-const DWT: u32 = 0xE000_1000;
+/// ICSR.
+const PENDSVSET: u32 = 1 << 28;
+const PENDSVCLR: u32 = 1 << 27;
+const PENDSTSET: u32 = 1 << 26;
+const PENDSTCLR: u32 = 1 << 25;
+const ISRPENDING: u32 = 1 << 22;
 
-impl<P: Peripherals> System<P> {
-    /// A read of 1, 2 or 4 bytes; a register that is not modelled is an error, never silently zero.
-    pub(crate) fn read_control(&mut self, address: u32, size: u8) -> Result<u32, BusFault> {
-        let shift = 8 * (address & 3);
-        self.control_word(address & !3).map(|word| word >> shift & mask(size)).ok_or(BusFault)
-    }
-
-    /// A write of 1, 2 or 4 bytes; other bytes of a register of priorities keep their values.
-    pub(crate) fn write_control(&mut self, address: u32, size: u8, value: u32) -> Result<(), BusFault> {
-        let (word, shift) = (address & !3, 8 * (address & 3));
-        let lanes = mask(size) << shift;
-        let kept = if has_byte_lanes(word) { self.control_word(word).unwrap_or(0) & !lanes } else { 0 };
-        self.set_control_word(word, kept | value << shift & lanes).ok_or(BusFault)
-    }
-
-    fn control_word(&mut self, address: u32) -> Option<u32> {
-        let now = self.clock.now();
-        match address {
-            0xE000_1000..=0xE000_1FFF => self.dwt.read(address - DWT, self.clock.cycles()),
-            0xE000_E004 => Some(INTLINESNUM),
-            0xE000_E008 => Some(0),
-            0xE000_E010..=0xE000_E01C => self.systick.read(address - SYSTICK, now),
-            0xE000_E100..=0xE000_E10C | 0xE000_E180..=0xE000_E18C => {
-                Some(self.nvic.word(Bits::Enabled, index(address)))
-            }
-            0xE000_E200..=0xE000_E20C | 0xE000_E280..=0xE000_E28C => {
-                Some(self.nvic.word(Bits::Pending, index(address)))
-            }
-            0xE000_E300..=0xE000_E30C => Some(self.nvic.word(Bits::Active, index(address))),
-            0xE000_E400..=0xE000_E46C => Some(self.priorities(16 + (address & 0x7F) as u8)),
-            0xE000_ED00..=0xE000_ED8C => self.scb_word(address),
-            // MPU_TYPE: the MPU is not modelled and so not there.
-            0xE000_ED90 => Some(0),
-            // DHCSR: no debugger.
-            0xE000_EDF0 => Some(0),
-            0xE000_EDFC => Some(self.dwt.demcr()),
-            0xE000_EF34 => Some(self.scb.fpccr),
-            0xE000_EF38 => Some(self.scb.fpcar),
-            0xE000_EF3C => Some(self.scb.fpdscr),
-            0xE000_EF40 => Some(0x1011_0021),
-            0xE000_EF44 => Some(0x1100_0011),
-            _ => None,
-        }
-    }
-
-    fn set_control_word(&mut self, address: u32, value: u32) -> Option<()> {
-        let now = self.clock.now();
-        match address {
-            0xE000_1000..=0xE000_1FFF => self.dwt.write(address - DWT, value, self.clock.cycles())?,
-            0xE000_E008 => {}
-            0xE000_E010..=0xE000_E01C => self.systick.write(address - SYSTICK, value, now)?,
-            0xE000_E100..=0xE000_E10C => self.nvic.enable(index(address), value),
-            0xE000_E180..=0xE000_E18C => self.nvic.disable(index(address), value),
-            0xE000_E200..=0xE000_E20C => self.pend_lines(index(address), value),
-            0xE000_E280..=0xE000_E28C => self.nvic.clear_pending(index(address), value),
-            0xE000_E400..=0xE000_E46C => self.set_priorities(16 + (address & 0x7F) as u8, value),
-            0xE000_ED00..=0xE000_ED8C => self.set_scb_word(address, value)?,
-            0xE000_EDF0 => {}
-            0xE000_EDFC => self.dwt.set_demcr(value, self.clock.cycles()),
-            0xE000_EF00 => self.pend_lines((value & 0x1FF) >> 5, 1 << (value & 31)),
-            0xE000_EF34 => self.scb.fpccr = value,
-            0xE000_EF38 => self.scb.fpcar = value & !7,
-            0xE000_EF3C => self.scb.fpdscr = value & 0x07C0_0000,
+impl<P: Peripherals> Core<P> {
+    /// A word of the system space; `None` where there is no register.
+    pub(crate) fn ppb_read(&mut self, address: u32, ipsr: u32) -> Option<u32> {
+        Some(match address {
+            0xE000_1000 => u32::from(self.cyccnt_runs()) | 0x4000_0000,
+            0xE000_1004 => self.cyccnt(),
+            0xE000_1FB0..=0xE000_1FFF => 0,
+            0xE000_E004 => 3,
+            0xE000_E008 => 0,
+            0xE000_E010..=0xE000_E01C => self.systick.read(address - 0xE000_E010, self.now),
+            0xE000_E100..=0xE000_E11C => self.nvic.enabled_word((address - 0xE000_E100) / 4),
+            0xE000_E180..=0xE000_E19C => self.nvic.enabled_word((address - 0xE000_E180) / 4),
+            0xE000_E200..=0xE000_E21C => self.nvic.pending_word((address - 0xE000_E200) / 4),
+            0xE000_E280..=0xE000_E29C => self.nvic.pending_word((address - 0xE000_E280) / 4),
+            0xE000_E300..=0xE000_E31C => self.nvic.active_word((address - 0xE000_E300) / 4),
+            0xE000_E400..=0xE000_E4EF => self.priorities(16 + (address - 0xE000_E400)),
+            0xE000_ED00 => CPUID,
+            0xE000_ED04 => self.icsr(ipsr),
+            0xE000_ED08 => self.scb.vtor,
+            0xE000_ED0C => 0xFA05_0000 | self.nvic.group() << 8,
+            0xE000_ED10 => self.scb.scr,
+            0xE000_ED14 => self.scb.ccr,
+            0xE000_ED18..=0xE000_ED20 => self.priorities(4 + (address - 0xE000_ED18)),
+            0xE000_ED24 => self.scb.shcsr,
+            0xE000_ED28 => self.scb.cfsr,
+            0xE000_ED2C => self.scb.hfsr,
+            0xE000_ED34 => self.scb.mmfar,
+            0xE000_ED38 => self.scb.bfar,
+            0xE000_ED88 => self.scb.cpacr,
+            // MPU_TYPE: no regions.
+            0xE000_ED90 => 0,
+            0xE000_EDF0 => 0,
+            0xE000_EDFC => self.scb.demcr,
+            0xE000_EF34 => self.scb.fpccr,
+            DBGMCU..=DBGMCU_END => self.chip.read(address, 4, self.now).ok()?,
             _ => return None,
-        }
-        Some(())
+        })
     }
 
-    fn scb_word(&mut self, address: u32) -> Option<u32> {
+    /// Writes a word of the system space; `None` where there is no register.
+    pub(crate) fn ppb_write(&mut self, address: u32, value: u32) -> Option<()> {
         match address {
-            0xE000_ED00 => Some(CPUID),
-            0xE000_ED04 => Some(self.icsr()),
-            0xE000_ED08 => Some(self.scb.vtor),
-            0xE000_ED0C => Some(0xFA05_0000 | self.scb.prigroup << 8),
-            0xE000_ED10 => Some(self.scb.scr),
-            0xE000_ED14 => Some(self.scb.ccr),
-            0xE000_ED18..=0xE000_ED20 => Some(self.priorities(4 + (address - 0xE000_ED18) as u8)),
-            0xE000_ED24 => Some(self.shcsr()),
-            0xE000_ED28 => Some(self.scb.cfsr),
-            0xE000_ED2C => Some(self.scb.hfsr),
-            0xE000_ED30 => Some(0),
-            0xE000_ED34 => Some(self.scb.mmfar),
-            0xE000_ED38 => Some(self.scb.bfar),
-            0xE000_ED88 => Some(self.scb.cpacr),
-            _ => None,
-        }
-    }
-
-    fn set_scb_word(&mut self, address: u32, value: u32) -> Option<()> {
-        match address {
-            0xE000_ED04 => self.set_icsr(value),
-            0xE000_ED08 => self.scb.vtor = value & 0xFFFF_FF80,
-            0xE000_ED0C => {
-                if let Some(prigroup) = self.scb.write_aircr(value) {
-                    self.nvic.set_grouping(prigroup);
-                }
+            0xE000_1000 => self.set_cyccnt(value & 1 != 0, self.cyccnt()),
+            0xE000_1004 => self.set_cyccnt(self.cyccnt_runs(), value),
+            // The lock access register of the DWT: unlocked as a debugger would see it.
+            0xE000_1FB0 => {}
+            0xE000_E008 => {}
+            0xE000_E010..=0xE000_E01C => {
+                self.systick.write(address - 0xE000_E010, value, self.now, self.cycle)
             }
+            0xE000_E100..=0xE000_E11C => self.nvic.enable((address - 0xE000_E100) / 4, value),
+            0xE000_E180..=0xE000_E19C => self.nvic.disable((address - 0xE000_E180) / 4, value),
+            0xE000_E200..=0xE000_E21C => self.pend_irqs((address - 0xE000_E200) / 4, value),
+            0xE000_E280..=0xE000_E29C => self.nvic.clear_pending((address - 0xE000_E280) / 4, value),
+            0xE000_E400..=0xE000_E4EF => self.set_priorities(16 + (address - 0xE000_E400), value),
+            0xE000_ED04 => self.set_icsr(value),
+            0xE000_ED08 => self.scb.vtor = value & 0x3FFF_FF80,
+            0xE000_ED0C => self.set_aircr(value),
             0xE000_ED10 => self.scb.scr = value & 0x16,
-            0xE000_ED14 => self.scb.ccr = value & 0x31B,
-            0xE000_ED18..=0xE000_ED20 => self.set_priorities(4 + (address - 0xE000_ED18) as u8, value),
-            0xE000_ED24 => self.scb.set_fault_enables(value),
+            0xE000_ED14 => self.scb.ccr = value,
+            0xE000_ED18..=0xE000_ED20 => self.set_priorities(4 + (address - 0xE000_ED18), value),
+            0xE000_ED24 => self.scb.shcsr = value & 0x0007_0000,
             0xE000_ED28 => self.scb.cfsr &= !value,
             0xE000_ED2C => self.scb.hfsr &= !value,
-            0xE000_ED30 => {}
             0xE000_ED34 => self.scb.mmfar = value,
             0xE000_ED38 => self.scb.bfar = value,
-            0xE000_ED88 => self.scb.cpacr = value & 0x00F0_0000,
+            0xE000_ED88 => self.scb.cpacr = value,
+            0xE000_EDFC => self.scb.demcr = value,
+            0xE000_EF00 => self.pend_irqs((value >> 5) & 3, 1 << (value & 31)),
+            0xE000_EF34 => self.scb.fpccr = value,
+            DBGMCU..=DBGMCU_END => self.chip.write(address, 4, value, self.now).ok()?,
             _ => return None,
         }
         Some(())
     }
 
-    /// ICSR; VECTACTIVE is the handler that was entered last.
-    fn icsr(&self) -> u32 {
-        let pending = |exception, bit: u32| u32::from(self.nvic.is_pending(exception)) << bit;
-        let next = self.nvic.best().map_or(0, |best| u32::from(best.exception.0));
-        let active = self.stats.current();
-        pending(Exception::NMI, 31)
-            | pending(Exception::PEND_SV, 28)
-            | pending(Exception::SYS_TICK, 26)
-            | u32::from(self.nvic.any_irq_pending()) << 22
-            | next << 12
-            | u32::from(!self.nvic.others_active(active)) << 11
-            | u32::from(active.0)
+    fn pend_irqs(&mut self, word: u32, bits: u32) {
+        let before = self.nvic.pending_set();
+        self.nvic.set_pending(word, bits);
+        self.stamp(self.nvic.pending_set() & !before);
+    }
+
+    /// Four priority bytes from exception number `first` on.
+    fn priorities(&self, first: u32) -> u32 {
+        let byte =
+            |n: u32| if n < Exception::COUNT as u32 { self.nvic.priority(Exception(n as u8)) } else { 0 };
+        u32::from_le_bytes([byte(first), byte(first + 1), byte(first + 2), byte(first + 3)])
+    }
+
+    fn set_priorities(&mut self, first: u32, value: u32) {
+        for (number, priority) in (first..).zip(value.to_le_bytes()) {
+            if number < Exception::COUNT as u32 {
+                self.nvic.set_priority(Exception(number as u8), priority);
+            }
+        }
+    }
+
+    fn icsr(&self, ipsr: u32) -> u32 {
+        let flag = |exception, bit| if self.nvic.is_pending(exception) { bit } else { 0 };
+        let irq = if self.nvic.any_irq_pending() { ISRPENDING } else { 0 };
+        ipsr | irq | flag(Exception::PEND_SV, PENDSVSET) | flag(Exception::SYS_TICK, PENDSTSET)
     }
 
     fn set_icsr(&mut self, value: u32) {
-        let bits = [
-            (31, Exception::NMI, true),
-            (28, Exception::PEND_SV, true),
-            (27, Exception::PEND_SV, false),
-            (26, Exception::SYS_TICK, true),
-            (25, Exception::SYS_TICK, false),
-        ];
-        let now = self.clock.now();
-        for (_, exception, pend) in bits.into_iter().filter(|(bit, ..)| value >> bit & 1 != 0) {
-            if !pend {
-                self.nvic.unpend(exception);
-            } else if self.works(Mechanism::SoftwarePending) {
-                self.nvic.pend(exception, now);
+        for (bit, exception) in
+            [(PENDSVSET, Exception::PEND_SV), (PENDSTSET, Exception::SYS_TICK), (1 << 31, Exception::NMI)]
+        {
+            if value & bit != 0 {
+                self.pend(exception);
+            }
+        }
+        for (bit, exception) in [(PENDSVCLR, Exception::PEND_SV), (PENDSTCLR, Exception::SYS_TICK)] {
+            if value & bit != 0 {
+                self.nvic.clear(exception.bit());
             }
         }
     }
 
-    /// ISPR and STIR.
-    fn pend_lines(&mut self, index: u32, bits: u32) {
-        if index < 4 && self.works(Mechanism::SoftwarePending) {
-            self.nvic.set_pending(index, bits, self.clock.now());
+    fn set_aircr(&mut self, value: u32) {
+        if value >> 16 == AIRCR_KEY {
+            self.nvic.set_group(value >> 8 & 7);
+            self.reset_requested |= value & SYSRESETREQ != 0;
         }
     }
-
-    fn shcsr(&self) -> u32 {
-        let active = |exception, bit: u32| u32::from(self.nvic.is_active(exception)) << bit;
-        let pending = |exception, bit: u32| u32::from(self.nvic.is_pending(exception)) << bit;
-        self.scb.fault_enables()
-            | active(Exception::MEM_MANAGE, 0)
-            | active(Exception::BUS_FAULT, 1)
-            | active(Exception::USAGE_FAULT, 3)
-            | active(Exception::SV_CALL, 7)
-            | active(Exception::DEBUG_MONITOR, 8)
-            | active(Exception::PEND_SV, 10)
-            | active(Exception::SYS_TICK, 11)
-            | pending(Exception::USAGE_FAULT, 12)
-            | pending(Exception::MEM_MANAGE, 13)
-            | pending(Exception::BUS_FAULT, 14)
-            | pending(Exception::SV_CALL, 15)
-    }
-
-    /// Four priorities, one a byte, from exception `first`.
-    fn priorities(&self, first: u8) -> u32 {
-        let bytes = [0, 1, 2, 3].map(|lane| self.nvic.priority(Exception(first + lane)));
-        u32::from_le_bytes(bytes)
-    }
-
-    fn set_priorities(&mut self, first: u8, value: u32) {
-        for (exception, priority) in (first..).map(Exception).zip(value.to_le_bytes()) {
-            self.nvic.set_priority(exception, priority);
-        }
-    }
-}
-
-/// The number of a 32-bit register in its bank of the NVIC.
-fn index(address: u32) -> u32 {
-    address >> 2 & 3
-}
-
-fn mask(size: u8) -> u32 {
-    match size {
-        1 => 0xFF,
-        2 => 0xFFFF,
-        _ => u32::MAX,
-    }
-}
-
-/// Registers of which a byte can be written alone: the priorities.
-fn has_byte_lanes(address: u32) -> bool {
-    matches!(address, 0xE000_E400..=0xE000_E46C | 0xE000_ED18..=0xE000_ED20)
 }

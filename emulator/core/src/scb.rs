@@ -1,94 +1,91 @@
-//! The system control block: vector table, fault status, sleep and FPU access (ARMv7-M ARM, B3.2).
+//! The system control block's own registers (ARMv7-M, B3.2): vector table, fault status, sleep, configuration.
 
 use crate::exception::Exception;
-use crate::fault::Fault;
 
-/// CCR.STKALIGN reads as one: frames are aligned to eight bytes.
-const CCR_RESET: u32 = 1 << 9;
-/// FPCCR after reset: automatic and lazy state preservation.
-const FPCCR_RESET: u32 = 0xC000_0000;
-const VECTKEY: u32 = 0x05FA;
-const SYSRESETREQ: u32 = 1 << 2;
-const FAULT_ENABLES: u32 = 0x0007_0000;
+/// Fault status bits of CFSR.
+pub(crate) mod cfsr {
+    pub(crate) const IBUSERR: u32 = 1 << 8;
+    pub(crate) const PRECISERR: u32 = 1 << 9;
+    pub(crate) const UNSTKERR: u32 = 1 << 11;
+    pub(crate) const STKERR: u32 = 1 << 12;
+    pub(crate) const BFARVALID: u32 = 1 << 15;
+    pub(crate) const UNDEFINSTR: u32 = 1 << 16;
+    pub(crate) const INVPC: u32 = 1 << 18;
+}
+
+/// HFSR: a configurable fault escalated.
 const FORCED: u32 = 1 << 30;
+/// HFSR: a breakpoint without a debugger.
+const DEBUGEVT: u32 = 1 << 31;
 
-/// State of the block that is not in the NVIC.
+/// The registers.
+#[derive(Clone, Debug)]
 pub(crate) struct Scb {
     pub(crate) vtor: u32,
-    pub(crate) prigroup: u32,
     pub(crate) scr: u32,
     pub(crate) ccr: u32,
-    fault_enables: u32,
+    pub(crate) shcsr: u32,
     pub(crate) cfsr: u32,
     pub(crate) hfsr: u32,
-    pub(crate) mmfar: u32,
     pub(crate) bfar: u32,
+    pub(crate) mmfar: u32,
     pub(crate) cpacr: u32,
     pub(crate) fpccr: u32,
-    pub(crate) fpcar: u32,
-    pub(crate) fpdscr: u32,
-    pub(crate) reset_requested: bool,
+    pub(crate) demcr: u32,
+}
+
+impl Default for Scb {
+    fn default() -> Scb {
+        Scb {
+            vtor: 0,
+            scr: 0,
+            ccr: 1 << 9,
+            shcsr: 0,
+            cfsr: 0,
+            hfsr: 0,
+            bfar: 0,
+            mmfar: 0,
+            cpacr: 0,
+            fpccr: 0xC000_0000,
+            demcr: 0,
+        }
+    }
 }
 
 impl Scb {
-    pub(crate) fn new() -> Scb {
-        Scb {
-            vtor: 0,
-            prigroup: 0,
-            scr: 0,
-            ccr: CCR_RESET,
-            fault_enables: 0,
-            cfsr: 0,
-            hfsr: 0,
-            mmfar: 0,
-            bfar: 0,
-            cpacr: 0,
-            fpccr: FPCCR_RESET,
-            fpcar: 0,
-            fpdscr: 0,
-            reset_requested: false,
-        }
+    /// Notes a fault that was taken as HardFault instead.
+    pub(crate) fn note_escalation(&mut self) {
+        self.hfsr |= FORCED;
     }
 
-    /// Whether the handler of a configurable fault is enabled (SHCSR).
-    pub(crate) fn fault_enabled(&self, exception: Exception) -> bool {
-        match exception {
-            Exception::MEM_MANAGE => self.fault_enables >> 16 & 1 != 0,
-            Exception::BUS_FAULT => self.fault_enables >> 17 & 1 != 0,
-            Exception::USAGE_FAULT => self.fault_enables >> 18 & 1 != 0,
-            _ => true,
-        }
+    /// Notes a breakpoint that nobody handles.
+    pub(crate) fn note_breakpoint(&mut self) {
+        self.hfsr |= DEBUGEVT;
     }
 
-    /// SHCSR's enable bits.
-    pub(crate) fn fault_enables(&self) -> u32 {
-        self.fault_enables
+    /// Notes a precise data access to an address where nothing answers.
+    pub(crate) fn note_data_fault(&mut self, address: u32) {
+        self.cfsr |= cfsr::PRECISERR | cfsr::BFARVALID;
+        self.bfar = address;
     }
 
-    pub(crate) fn set_fault_enables(&mut self, shcsr: u32) {
-        self.fault_enables = shcsr & FAULT_ENABLES;
+    /// Whether software has enabled a configurable fault (SHCSR).
+    pub(crate) fn enables(&self, fault: Exception) -> bool {
+        let bit = match fault {
+            Exception::MEM_MANAGE => 16,
+            Exception::BUS_FAULT => 17,
+            Exception::USAGE_FAULT => 18,
+            _ => return true,
+        };
+        self.shcsr & 1 << bit != 0
     }
 
-    /// CPACR: both coprocessors of the FPU are open to privileged code.
-    pub(crate) fn fpu_enabled(&self) -> bool {
-        self.cpacr >> 20 & 1 != 0 && self.cpacr >> 22 & 1 != 0
-    }
-
-    /// AIRCR counts only with its key; the result is the new priority grouping.
-    pub(crate) fn write_aircr(&mut self, value: u32) -> Option<u32> {
-        (value >> 16 == VECTKEY).then(|| {
-            self.reset_requested |= value & SYSRESETREQ != 0;
-            self.prigroup = value >> 8 & 7;
-            self.prigroup
-        })
-    }
-
-    /// Notes why a fault happened, and that it was escalated.
-    pub(crate) fn record(&mut self, fault: Fault, escalated: bool) {
-        self.cfsr |= fault.cfsr();
-        self.hfsr |= fault.hfsr() | if escalated { FORCED } else { 0 };
-        if let Fault::DataBus { address } = fault {
-            self.bfar = address;
+    /// Which configurable fault a set of CFSR bits belongs to.
+    pub(crate) fn fault_of(status: u32) -> Exception {
+        match status {
+            0..=0xFF => Exception::MEM_MANAGE,
+            0x100..=0xFFFF => Exception::BUS_FAULT,
+            _ => Exception::USAGE_FAULT,
         }
     }
 }

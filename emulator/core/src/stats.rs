@@ -1,221 +1,143 @@
-//! What each exception handler did: how often, how much, how late.
+//! What the core counted.
 
 use canbus::Time;
 
 use crate::exception::Exception;
-use crate::trace::Trace;
 
-/// Figures of one exception, or of thread mode, since power-on or [`Stats::clear`].
-///
-/// Instructions and cycles are exclusive: what ran at this exception, not what preempted it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What ran at one exception, without what preempted it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Activity {
     /// How often it was entered.
     pub entries: u64,
-    /// Instructions of all activations.
+    /// Instructions in all.
     pub instructions: u64,
-    /// Cycles of all activations, with entry and exit.
+    /// Modelled cycles in all.
     pub cycles: u64,
-    /// Most instructions of one finished activation.
+    /// Most instructions in one activation.
     pub worst_instructions: u64,
-    /// Most cycles of one finished activation.
+    /// Most cycles in one activation.
     pub worst_cycles: u64,
-    /// Shortest span from pending to the first instruction; [`Time::NEVER`] before the first entry.
-    pub least_latency: Time,
-    /// Longest span from pending to the first instruction.
+    /// Longest time from pending to the first instruction.
     pub worst_latency: Time,
-    /// Longest span from pending to the end of the handler, with all that preempted it.
-    pub worst_response: Time,
-    /// Shortest span between the first instructions of two activations; [`Time::NEVER`] before the second.
-    pub least_interval: Time,
-    /// Longest span between the first instructions of two activations.
-    pub worst_interval: Time,
-    /// The first instruction of the first activation.
+    /// Shortest time from pending to the first instruction; zero before the first entry.
+    pub least_latency: Time,
+    /// Instant of the first entry.
     pub first_entry: Time,
-    /// The first instruction of the last activation.
+    /// Instant of the latest entry.
     pub last_entry: Time,
+    /// Shortest time between two entries; zero before the second.
+    pub shortest_interval: Time,
+    /// Longest time between two entries; zero before the second.
+    pub longest_interval: Time,
 }
 
 impl Activity {
-    const NONE: Activity = Activity {
-        entries: 0,
-        instructions: 0,
-        cycles: 0,
-        worst_instructions: 0,
-        worst_cycles: 0,
-        least_latency: Time::NEVER,
-        worst_latency: Time::ZERO,
-        worst_response: Time::ZERO,
-        least_interval: Time::NEVER,
-        worst_interval: Time::ZERO,
-        first_entry: Time::NEVER,
-        last_entry: Time::ZERO,
-    };
-
-    /// By how much the latency varies.
-    pub fn jitter(&self) -> Time {
-        if self.entries == 0 { Time::ZERO } else { self.worst_latency.since(self.least_latency) }
-    }
-
-    fn started(&mut self, pended: Time, now: Time) {
-        let latency = now.since(pended);
-        self.least_latency = self.least_latency.min(latency);
+    fn note_entry(&mut self, latency: Time, at: Time) {
+        self.least_latency = if self.entries == 0 { latency } else { self.least_latency.min(latency) };
         self.worst_latency = self.worst_latency.max(latency);
-        if self.first_entry == Time::NEVER {
-            self.first_entry = now;
-        } else {
-            let interval = now.since(self.last_entry);
-            self.least_interval = self.least_interval.min(interval);
-            self.worst_interval = self.worst_interval.max(interval);
+        let interval = at.since(self.last_entry);
+        match self.entries {
+            0 => self.first_entry = at,
+            1 => (self.shortest_interval, self.longest_interval) = (interval, interval),
+            _ => {
+                self.shortest_interval = self.shortest_interval.min(interval);
+                self.longest_interval = self.longest_interval.max(interval);
+            }
         }
-        self.last_entry = now;
+        self.last_entry = at;
+        self.entries += 1;
     }
 
-    fn ended(&mut self, run: &Activation, now: Time) {
-        self.instructions += run.instructions;
-        self.cycles += run.cycles;
-        self.worst_instructions = self.worst_instructions.max(run.instructions);
-        self.worst_cycles = self.worst_cycles.max(run.cycles);
-        self.worst_response = self.worst_response.max(now.since(run.pended));
+    /// How far the entries are from an even beat.
+    pub fn jitter(&self) -> Time {
+        self.worst_latency.since(self.least_latency)
     }
 }
 
-/// One handler that has begun and not ended.
+/// Counters since power-on.
+#[derive(Clone, Debug)]
+pub struct Stats {
+    /// Instructions executed.
+    pub instructions: u64,
+    /// Cycles awake.
+    pub cycles: u64,
+    /// Time spent in WFI.
+    pub asleep: Time,
+    /// By exception number; 0 is Thread mode.
+    pub exceptions: [Activity; Exception::COUNT],
+    /// Exceptions that followed another without unstacking.
+    pub tail_chained: u64,
+    /// A hash over every exception entry with its time and return address: equal runs have equal hashes.
+    pub trace: u64,
+    running: Vec<Running>,
+}
+
+/// One activation that has not ended.
 #[derive(Clone, Copy, Debug)]
-struct Activation {
+struct Running {
     exception: Exception,
     instructions: u64,
     cycles: u64,
-    pended: Time,
-    started: bool,
 }
 
-impl Activation {
-    fn new(exception: Exception, pended: Time) -> Activation {
-        Activation { exception, instructions: 0, cycles: 0, pended, started: false }
-    }
-}
-
-/// Figures of a machine.
-#[derive(Clone, Debug)]
-pub struct Stats {
-    /// Instructions in all.
-    pub instructions: u64,
-    /// Cycles that the core worked.
-    pub cycles: u64,
-    /// Time that the core slept.
-    pub asleep: Time,
-    pub(crate) trace: Trace,
-    activities: Vec<Activity>,
-    /// The running activation; those it preempted lie in `preempted`.
-    current: Activation,
-    preempted: Vec<Activation>,
-    since: Time,
-}
-
-impl Stats {
-    pub(crate) fn new() -> Stats {
+impl Default for Stats {
+    fn default() -> Stats {
         Stats {
             instructions: 0,
             cycles: 0,
             asleep: Time::ZERO,
-            trace: Trace::new(),
-            activities: vec![Activity::NONE; Exception::COUNT],
-            current: Activation { started: true, ..Activation::new(Exception::THREAD, Time::ZERO) },
-            preempted: Vec::new(),
-            since: Time::ZERO,
+            exceptions: [Activity::default(); Exception::COUNT],
+            tail_chained: 0,
+            trace: 0xCBF2_9CE4_8422_2325,
+            running: Vec::new(),
         }
     }
+}
 
-    /// Figures of one exception; [`Exception::THREAD`] is thread mode. Activations that have not ended are not in
-    /// `worst_*`, and what they ran so far is included in the totals.
-    pub fn of(&self, exception: Exception) -> Activity {
-        let mut activity = self.activities[exception.index()];
-        for run in self.preempted.iter().chain([&self.current]).filter(|run| run.exception == exception) {
-            activity.instructions += run.instructions;
-            activity.cycles += run.cycles;
-        }
-        activity
+impl Stats {
+    /// The activity of one exception.
+    pub fn of(&self, exception: Exception) -> &Activity {
+        &self.exceptions[usize::from(exception.0)]
     }
 
-    /// All exceptions that were entered, and thread mode.
-    pub fn iter(&self) -> impl Iterator<Item = (Exception, Activity)> + '_ {
-        let all = (0..Exception::COUNT as u8).map(|number| (Exception(number), self.of(Exception(number))));
-        all.filter(|(exception, activity)| *exception == Exception::THREAD || activity.entries != 0)
-    }
-
-    /// A hash of all exception entries with their times and return addresses: equal for equal runs.
-    pub fn trace(&self) -> u64 {
-        self.trace.hash()
-    }
-
-    /// When counting began.
-    pub fn since(&self) -> Time {
-        self.since
-    }
-
-    /// The share of the time since [`Stats::since`] that the core did not sleep, 0 to 1.
-    #[allow(clippy::cast_precision_loss)]
-    pub fn load(&self, now: Time) -> f64 {
-        let span = now.since(self.since);
-        if span == Time::ZERO { 0.0 } else { 1.0 - self.asleep.0 as f64 / span.0 as f64 }
-    }
-
-    /// Counts from zero again; running activations count from here.
-    pub(crate) fn clear(&mut self, now: Time) {
-        self.activities.fill(Activity::NONE);
-        (self.instructions, self.cycles) = (0, 0);
-        self.asleep = Time::ZERO;
-        self.since = now;
-        for run in self.preempted.iter_mut().chain([&mut self.current]) {
-            run.instructions = 0;
-            run.cycles = 0;
-        }
-    }
-
-    #[inline]
     pub(crate) fn ran(&mut self, instructions: u32, cycles: u32) {
-        let (instructions, cycles) = (u64::from(instructions), u64::from(cycles));
-        self.instructions += instructions;
-        self.cycles += cycles;
-        self.current.instructions += instructions;
-        self.current.cycles += cycles;
-    }
-
-    pub(crate) fn slept(&mut self, span: Time) {
-        self.asleep += span;
-    }
-
-    pub(crate) fn entered(&mut self, exception: Exception, pended: Time) {
-        self.activities[exception.index()].entries += 1;
-        self.preempted.push(std::mem::replace(&mut self.current, Activation::new(exception, pended)));
-    }
-
-    /// The core is about to run on: the first instruction of the current handler, if it has not begun.
-    pub(crate) fn running(&mut self, now: Time) {
-        if !self.current.started {
-            self.current.started = true;
-            self.activities[self.current.exception.index()].started(self.current.pended, now);
+        self.instructions += u64::from(instructions);
+        self.cycles += u64::from(cycles);
+        match self.running.last_mut() {
+            Some(running) => {
+                running.instructions += u64::from(instructions);
+                running.cycles += u64::from(cycles);
+            }
+            None => {
+                self.exceptions[0].instructions += u64::from(instructions);
+                self.exceptions[0].cycles += u64::from(cycles);
+            }
         }
     }
 
-    pub(crate) fn left(&mut self, now: Time) {
-        let run = self.current;
-        self.activities[run.exception.index()].ended(&run, now);
-        if let Some(below) = self.preempted.pop() {
-            self.current = below;
+    pub(crate) fn entered(&mut self, exception: Exception, latency: Time, at: Time, pc: u32) {
+        let activity = &mut self.exceptions[usize::from(exception.0)];
+        activity.note_entry(latency, at);
+        self.running.push(Running { exception, instructions: 0, cycles: 0 });
+        for word in [u64::from(exception.0), at.0, u64::from(pc)] {
+            // FNV-1a over words.
+            self.trace = (self.trace ^ word).wrapping_mul(0x0000_0100_0000_01B3);
         }
     }
 
-    /// The exception whose handler runs.
-    pub(crate) fn current(&self) -> Exception {
-        self.current.exception
+    pub(crate) fn left(&mut self) {
+        let Some(Running { exception, instructions, cycles }) = self.running.pop() else { return };
+        let activity = &mut self.exceptions[usize::from(exception.0)];
+        activity.instructions += instructions;
+        activity.cycles += cycles;
+        activity.worst_instructions = activity.worst_instructions.max(instructions);
+        activity.worst_cycles = activity.worst_cycles.max(cycles);
     }
 
     /// A reset ends every activation.
-    pub(crate) fn reset(&mut self, now: Time) {
-        while !self.preempted.is_empty() {
-            self.left(now);
+    pub(crate) fn unwound(&mut self) {
+        while !self.running.is_empty() {
+            self.left();
         }
     }
 }

