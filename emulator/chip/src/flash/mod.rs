@@ -15,6 +15,7 @@ use std::ops::Range;
 
 use canbus::Time;
 use lock::{CONTROL_KEYS, Lock, OPTION_KEYS};
+use program::Store;
 
 use crate::peripherals::{BusFault, Effect};
 use crate::register::{bit, field, flag};
@@ -80,7 +81,7 @@ pub struct Flash {
     work: Option<Work>,
     busy_until: Time,
     /// The first half of a double word: the core stores it as two words.
-    half: Option<(u32, [u8; 4], [u8; 4])>,
+    half: Option<Store>,
     operations: u64,
     cut_at: Option<u64>,
 }

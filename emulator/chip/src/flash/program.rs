@@ -9,6 +9,30 @@ use crate::peripherals::{BusFault, Effect};
 use crate::register::field;
 use crate::variant::FLASH_BASE;
 
+/// A store into the array: where, what is there and what is to be.
+#[derive(Clone, Debug)]
+pub(super) struct Store {
+    address: u32,
+    old: Vec<u8>,
+    new: Vec<u8>,
+}
+
+impl Store {
+    fn end(&self) -> u32 {
+        self.address + self.new.len() as u32
+    }
+
+    /// This store and the one that follows it as one.
+    fn join(self, next: Store) -> Store {
+        Store { old: [self.old, next.old].concat(), new: [self.new, next.new].concat(), ..self }
+    }
+
+    /// Programming only clears bits.
+    fn result(&self) -> Vec<u8> {
+        self.old.iter().zip(&self.new).map(|(old, new)| old & new).collect()
+    }
+}
+
 impl Flash {
     /// A store by the core into the array.
     pub(crate) fn program(
@@ -30,85 +54,54 @@ impl Flash {
             return Ok(());
         }
         let old = if erased { vec![0xFF; new.len()] } else { old.to_vec() };
-        let outcome = self.program_unit(address, &old, new, now, effects);
+        let outcome = self.accept(Store { address, old, new: new.to_vec() });
+        let outcome =
+            outcome.map(|unit| unit.into_iter().for_each(|unit| self.start_program(&unit, now, effects)));
         self.report(outcome);
         Ok(())
     }
 
-    fn program_unit(
-        &mut self,
-        address: u32,
-        old: &[u8],
-        new: &[u8],
-        now: Time,
-        effects: &mut VecDeque<Effect>,
-    ) -> Result<(), Refused> {
+    /// The unit to program now; `None` while half of a double word is still to come.
+    fn accept(&mut self, store: Store) -> Result<Option<Store>, Refused> {
         let modes = field(self.cr, 0, 3);
         if !self.lock.is_open() || modes != 1 << CR_PG {
             return Err(Refused::Sequence);
         }
         let width = 1 << field(self.cr, 8, 2);
-        if width == 8 && new.len() == 4 {
-            return self.program_half(address, old, new, now, effects);
-        }
-        if new.len() != width {
-            return Err(Refused::Parallelism);
-        }
-        if address % 16 + width as u32 > 16 {
+        let Some(unit) = self.gather(store, width)? else { return Ok(None) };
+        if unit.address % 16 + width > 16 {
             return Err(Refused::Alignment);
         }
-        if self.sector_at(address).is_some_and(|sector| self.is_protected(sector)) {
+        if self.sector_at(unit.address).is_some_and(|sector| self.is_protected(sector)) {
             return Err(Refused::WriteProtected);
         }
-        self.start_program(address, old, new, now, effects);
-        Ok(())
+        Ok(Some(unit))
     }
 
-    /// Keeps the first word of a double word until the second comes.
-    fn program_half(
-        &mut self,
-        address: u32,
-        old: &[u8],
-        new: &[u8],
-        now: Time,
-        effects: &mut VecDeque<Effect>,
-    ) -> Result<(), Refused> {
-        let word = |bytes: &[u8]| [0, 1, 2, 3].map(|index| bytes[index]);
-        match self.half.take() {
-            None if address.is_multiple_of(8) => {
-                self.half = Some((address, word(old), word(new)));
-                Ok(())
+    /// A unit of `width` bytes. The core stores a double word as two words: the first one is kept until the second comes.
+    fn gather(&mut self, store: Store, width: u32) -> Result<Option<Store>, Refused> {
+        let kept = self.half.take();
+        match (width, store.new.len() as u32, kept) {
+            (8, 4, None) if store.address.is_multiple_of(8) => {
+                self.half = Some(store);
+                Ok(None)
             }
-            Some((first, first_old, first_new)) if address == first + 4 => {
-                let (old, new) = ([&first_old, old].concat(), [&first_new, new].concat());
-                self.program_unit(first, &old, &new, now, effects)
-            }
+            (8, 4, Some(first)) if first.end() == store.address => Ok(Some(first.join(store))),
+            (_, length, None) if length == width => Ok(Some(store)),
             _ => Err(Refused::Parallelism),
         }
     }
 
-    fn start_program(
-        &mut self,
-        address: u32,
-        old: &[u8],
-        new: &[u8],
-        now: Time,
-        effects: &mut VecDeque<Effect>,
-    ) {
-        let cut = self.count(1);
-        // Programming only clears bits.
-        let bytes = if cut {
-            torn::programmed(old, new, u64::from(address))
-        } else {
-            old.iter().zip(new).map(|(old, new)| old & new).collect()
-        };
-        effects.push_back(Effect::Store { address, bytes });
-        if cut {
-            effects.push_back(Effect::PowerCut);
+    fn start_program(&mut self, unit: &Store, now: Time, effects: &mut VecDeque<Effect>) {
+        let address = unit.address;
+        if self.count(1) {
+            let bytes = torn::programmed(&unit.old, &unit.new, u64::from(address));
+            effects.extend([Effect::Store { address, bytes }, Effect::PowerCut]);
             return;
         }
         self.busy_until = self.free(now) + timing::PROGRAM;
         self.work = Some(Work::Programmed);
-        effects.push_back(Effect::StallFlash(self.busy_until));
+        effects
+            .extend([Effect::Store { address, bytes: unit.result() }, Effect::StallFlash(self.busy_until)]);
     }
 }
