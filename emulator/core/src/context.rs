@@ -14,6 +14,18 @@ use crate::mechanism::Mechanism;
 const INTEGER: [RegisterARM; 6] =
     [RegisterARM::R0, RegisterARM::R1, RegisterARM::R2, RegisterARM::R3, RegisterARM::R12, RegisterARM::LR];
 
+/// The integer registers that a frame leaves out.
+const CALLEE_SAVED: [RegisterARM; 8] = [
+    RegisterARM::R4,
+    RegisterARM::R5,
+    RegisterARM::R6,
+    RegisterARM::R7,
+    RegisterARM::R8,
+    RegisterARM::R9,
+    RegisterARM::R10,
+    RegisterARM::R11,
+];
+
 /// Words of a basic frame, and of one with floating-point registers.
 const BASIC: u32 = 8;
 const EXTENDED: u32 = 26;
@@ -42,6 +54,9 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
         self.set_xpsr(THUMB);
         self.set(RegisterARM::CONTROL, 0);
+        INTEGER.iter().chain(&CALLEE_SAVED).for_each(|register| self.set(*register, 0));
+        (0..32).for_each(|n| self.set_float(n, 0));
+        self.set(RegisterARM::FPSCR, 0);
         self.set(RegisterARM::SP, stack & !3);
         self.set(RegisterARM::LR, 0xFFFF_FFFF);
         self.set(RegisterARM::PC, entry & !1);
@@ -64,7 +79,6 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     /// Starts the handler of an exception whose frame is on the stack.
     fn vector(&mut self, exception: Exception, exc_return: u32, cycles: u32) {
-        let _ = engine::clear_monitor(&mut self.cpu);
         let core = self.cpu.get_data_mut();
         core.nvic.activate(exception);
         core.spend(0, cycles);
@@ -75,6 +89,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         let control = self.register(RegisterARM::CONTROL);
         self.set(RegisterARM::CONTROL, control & !FPCA);
         self.rebuild_flags(0);
+        self.clear_monitor();
         self.set(RegisterARM::LR, exc_return);
         match handler {
             Some(handler) => self.set(RegisterARM::PC, handler & !1),
@@ -161,7 +176,9 @@ impl<P: Peripherals + 'static> Machine<P> {
         let count = if floats { EXTENDED } else { BASIC };
         let words: Option<Vec<u32>> = (0..count).map(|n| self.word(top.wrapping_add(4 * n))).collect();
         let Some(words) = words else { return self.take_fault(Fault::unstacking(top)) };
-        let _ = engine::clear_monitor(&mut self.cpu);
+        let handler = self.register(RegisterARM::XPSR);
+        self.set_xpsr(handler & !IT);
+        self.clear_monitor();
         let xpsr = words[7];
         let padding = if xpsr & ALIGNED != 0 { 4 } else { 0 };
         self.set(bank, top.wrapping_add(4 * count) + padding);
@@ -184,6 +201,12 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.set(RegisterARM::CONTROL, control);
         let flags = self.register(RegisterARM::XPSR);
         self.rebuild_flags(flags);
+    }
+
+    /// Runs code of the emulator's own, so no IT block may be open: it would skip it.
+    fn clear_monitor(&mut self) {
+        // It can only fail where the library has lost its memory, and then nothing else runs either.
+        let _ = engine::clear_monitor(&mut self.cpu);
     }
 
     /// Writes all of xPSR. It holds the exception number, so this is also the switch between the modes.

@@ -1,12 +1,12 @@
 //! The state that the hooks of the CPU library share with the run loop: clock, interrupt controller, system
 //! registers, and the chip behind them.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 
 use canbus::Time;
 use chip::{Effect, Memory, Peripherals};
 
-use crate::cost::Cost;
+use crate::cost::Costs;
 use crate::exception::Exception;
 use crate::mechanism::Mechanism;
 use crate::nvic::{Masks, Nvic};
@@ -46,6 +46,8 @@ pub(crate) struct Core<P> {
     pub(crate) cycle: Time,
     /// The run loop wants control back here.
     pub(crate) until: Time,
+    /// When the chip or SysTick wants to be advanced; kept, because it is asked for before every block.
+    due: Time,
     pub(crate) nvic: Nvic,
     pub(crate) scb: Scb,
     pub(crate) systick: SysTick,
@@ -55,8 +57,10 @@ pub(crate) struct Core<P> {
     pub(crate) effects: VecDeque<Effect>,
     /// When an exception became pending, for its latency.
     pub(crate) pended: [Time; Exception::COUNT],
-    pub(crate) costs: HashMap<(u32, u32), Cost>,
+    pub(crate) costs: Costs,
     pub(crate) reset_requested: bool,
+    /// The emulator itself runs code, not the program.
+    pub(crate) clearing_monitor: bool,
     pub(crate) without: Option<Mechanism>,
     cyccnt: Option<Cyccnt>,
 }
@@ -75,6 +79,7 @@ impl<P: Peripherals> Core<P> {
             now: Time::ZERO,
             cycle: Time::of_cycle(16_000_000),
             until: Time::ZERO,
+            due: Time::ZERO,
             nvic: Nvic::default(),
             scb: Scb::default(),
             systick: SysTick::default(),
@@ -83,8 +88,9 @@ impl<P: Peripherals> Core<P> {
             unmapped: None,
             effects: VecDeque::new(),
             pended: [Time::ZERO; Exception::COUNT],
-            costs: HashMap::new(),
+            costs: Costs::default(),
             reset_requested: false,
+            clearing_monitor: false,
             without: None,
             cyccnt: None,
         }
@@ -120,10 +126,7 @@ impl<P: Peripherals> Core<P> {
 
     /// Whether the run loop has something to do before the next block runs.
     pub(crate) fn needs_attention(&self) -> bool {
-        self.now >= self.until
-            || self.reset_requested
-            || !self.effects.is_empty()
-            || self.now >= self.deadline()
+        self.now >= self.until.min(self.due) || self.reset_requested || !self.effects.is_empty()
     }
 
     /// Lets everything due happen, and samples the interrupt lines.
@@ -145,6 +148,7 @@ impl<P: Peripherals> Core<P> {
         let before = self.nvic.pending_set();
         self.nvic.sample(self.chip.lines());
         self.stamp(self.nvic.pending_set() & !before);
+        self.due = self.deadline();
     }
 
     pub(crate) fn pend(&mut self, exception: Exception) {

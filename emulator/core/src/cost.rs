@@ -10,8 +10,49 @@ pub(crate) struct Cost {
     pub(crate) cycles: u32,
 }
 
+/// The costs of blocks that ran before, one place for each address modulo the size of the table.
+#[derive(Clone, Debug)]
+pub(crate) struct Costs(Vec<Known>);
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Known {
+    address: u32,
+    size: u32,
+    cost: Cost,
+}
+
+impl Default for Costs {
+    fn default() -> Costs {
+        Costs(vec![Known::default(); 1 << 14])
+    }
+}
+
+impl Costs {
+    /// The cost of a block, when it is known.
+    pub(crate) fn get(&self, address: u32, size: u32) -> Option<Cost> {
+        let known = self.0[place(address)];
+        (known.address == address && known.size == size).then_some(known.cost)
+    }
+
+    /// Computes the cost of a block and remembers it.
+    pub(crate) fn learn(&mut self, address: u32, code: &[u8]) -> Cost {
+        let cost = of_block(code);
+        self.0[place(address)] = Known { address, size: code.len() as u32, cost };
+        cost
+    }
+
+    /// Code has changed.
+    pub(crate) fn forget(&mut self) {
+        self.0.fill(Known::default());
+    }
+}
+
+fn place(address: u32) -> usize {
+    (address >> 1) as usize % (1 << 14)
+}
+
 /// Adds up the Thumb instructions in `code`.
-pub(crate) fn of_block(code: &[u8]) -> Cost {
+fn of_block(code: &[u8]) -> Cost {
     let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
     let mut cost = Cost::default();
     while let Some(first) = halves.next() {
@@ -24,6 +65,11 @@ pub(crate) fn of_block(code: &[u8]) -> Cost {
     cost
 }
 
+/// A load takes two cycles, a store one.
+fn memory(load: bool) -> u32 {
+    1 + u32::from(load)
+}
+
 /// Cycles of a 16-bit instruction.
 fn narrow(op: u16) -> u32 {
     match op >> 12 {
@@ -31,20 +77,8 @@ fn narrow(op: u16) -> u32 {
         0b0100 if op >> 11 == 0b01001 => 2,
         0b0100 if op >> 8 == 0b0100_0111 => 3,
         // Register offset: the upper half of the range loads.
-        0b0101 => {
-            if op >> 9 & 7 >= 3 {
-                2
-            } else {
-                1
-            }
-        }
-        0b0110..=0b1001 => {
-            if op & 1 << 11 != 0 {
-                2
-            } else {
-                1
-            }
-        }
+        0b0101 => memory(op >> 9 & 7 >= 3),
+        0b0110..=0b1001 => memory(op & 1 << 11 != 0),
         0b1011 => miscellaneous(op),
         // LDM and STM.
         0b1100 => 1 + (op & 0xFF).count_ones(),
@@ -80,13 +114,7 @@ fn wide(first: u16, second: u16) -> u32 {
         (0b01 | 0b11, 0b10 | 0b11) if second >> 9 & 7 == 0b101 => floating(first, second),
         // Branch with link, long branches.
         (0b10, _) if second >> 15 == 1 => 3,
-        (0b11, 0b00) if first & 0x0100 == 0 || first >> 8 == 0xF9 => {
-            if load {
-                2
-            } else {
-                1
-            }
-        }
+        (0b11, 0b00) if first & 0x0100 == 0 || first >> 8 == 0xF9 => memory(load),
         // SDIV and UDIV.
         (0b11, 0b01) if first & 0xFFD0 == 0xFB90 => 7,
         _ => 1,

@@ -4,7 +4,7 @@ use chip::{Effect, Peripherals};
 use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, Unicorn};
 
 use crate::core::{Core, Halt, Unmapped};
-use crate::cost;
+use crate::cost::Cost;
 use crate::machine::{Error, Model};
 use crate::mechanism::Mechanism;
 use crate::nvic::Masks;
@@ -50,26 +50,31 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
 /// The clock: charges a block before it runs, or stops before it when something is due.
 fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
     if address & !0xFFF == HIDDEN {
-        return;
+        return guard_hidden(cpu);
     }
     let core = cpu.get_data();
-    if core.halt.is_some() || core.needs_attention() || core.nvic.wants_attention() && preempts(cpu) {
+    if core.halt.is_some() || core.needs_attention() || core.nvic.could_preempt() && preempts(cpu) {
         cpu.get_data_mut().halt.get_or_insert(Halt::Attention);
         let _ = cpu.emu_stop();
         return;
     }
-    let key = (address as u32, size);
-    let cost = match cpu.get_data().costs.get(&key) {
-        Some(cost) => *cost,
-        None => {
-            let mut code = vec![0; size as usize];
-            let _ = cpu.mem_read(address, &mut code);
-            let cost = cost::of_block(&code);
-            cpu.get_data_mut().costs.insert(key, cost);
-            cost
-        }
-    };
+    let cost = core.costs.get(address as u32, size).unwrap_or_else(|| learn(cpu, address, size));
     cpu.get_data_mut().spend(cost.instructions, cost.cycles);
+}
+
+/// The page of our own is not there for the program.
+fn guard_hidden<P>(cpu: &mut Unicorn<Core<P>>) {
+    if !cpu.get_data().clearing_monitor {
+        cpu.get_data_mut().halt = Some(Halt::Undefined);
+        let _ = cpu.emu_stop();
+    }
+}
+
+fn learn<P>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) -> Cost {
+    let mut code = vec![0; size as usize];
+    // The block is about to run, so it can be read.
+    let _ = cpu.mem_read(address, &mut code);
+    cpu.get_data_mut().costs.learn(address as u32, &code)
 }
 
 fn preempts<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> bool {
@@ -82,7 +87,11 @@ pub(crate) fn masks<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> Masks {
     Masks {
         primask: read(RegisterARM::PRIMASK) & 1 != 0,
         faultmask: read(RegisterARM::FAULTMASK) & 1 != 0,
-        basepri: if cpu.get_data().lacks(Mechanism::Basepri) { 0 } else { read(RegisterARM::BASEPRI) as u8 },
+        basepri: if cpu.get_data().lacks(Mechanism::Basepri) {
+            0
+        } else {
+            read(RegisterARM::BASEPRI) as u8 & 0xF0
+        },
     }
 }
 
@@ -210,7 +219,10 @@ fn merged<P: Peripherals>(core: &mut Core<P>, address: u32, size: usize, value: 
 /// Clears the exclusive monitor, as exception entry and return do (ARMv7-M, A3.4).
 pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Error> {
     if !cpu.get_data().lacks(Mechanism::ExclusiveMonitor) {
-        cpu.emu_start(HIDDEN | 1, 0, 0, 0)?;
+        cpu.get_data_mut().clearing_monitor = true;
+        let result = cpu.emu_start(HIDDEN | 1, 0, 0, 0);
+        cpu.get_data_mut().clearing_monitor = false;
+        result?;
     }
     Ok(())
 }
@@ -221,10 +233,10 @@ pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]
     if !cpu.get_data().lacks(Mechanism::Retranslation) {
         let end = u64::from(address) + bytes.len() as u64;
         cpu.ctl_remove_cache(address.into(), end)?;
-        let touched = |start: u32, size: u32| {
-            u64::from(start) < end && u64::from(start) + u64::from(size) > address.into()
-        };
-        cpu.get_data_mut().costs.retain(|(start, size), _| !touched(*start, *size));
+        let flash = address < 0x2000_0000;
+        if flash {
+            cpu.get_data_mut().costs.forget();
+        }
     }
     Ok(())
 }

@@ -117,9 +117,9 @@ impl Nvic {
         priority
     }
 
-    /// Whether anything enabled is pending, whatever the masks say: the cheap question before the exact one.
-    pub(crate) fn wants_attention(&self) -> bool {
-        self.pending & self.enabled != 0
+    /// Whether an exception may preempt if no register masks it: the cheap question before the exact one.
+    pub(crate) fn could_preempt(&self) -> bool {
+        self.pending & self.enabled != 0 && self.to_take(Masks::default()).is_some()
     }
 
     /// The exception to take now, if one may preempt.

@@ -73,7 +73,8 @@ impl Bench {
         let file = std::fs::read(&path)
             .unwrap_or_else(|error| panic!("{}: {error}; run `cargo xtask images` first", path.display()));
         let elf = object::File::parse(file.as_slice()).unwrap();
-        let verdict = elf.symbols().find(|symbol| symbol.name() == Ok("VERDICT")).expect("a verdict").address();
+        let verdict =
+            elf.symbols().find(|symbol| symbol.name() == Ok("VERDICT")).expect("a verdict").address();
         let mut machine = Machine::new(Model::stm32f4(512 * 1024), Bare::default()).unwrap();
         machine.load_elf(&file).unwrap();
         machine.power_on(Time::ZERO);
