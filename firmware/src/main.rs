@@ -89,7 +89,7 @@ mod app {
             parameters: None,
             watchdog: board.watchdog,
         };
-        let local = Local {
+        let mut local = Local {
             receiver_process,
             receiver_services,
             sampling: board.sampling,
@@ -100,6 +100,7 @@ mod app {
             process: Process { frames: process_frames, alarm: process_alarm },
             services: Services::new(board.can, timing, service_frames, lost, services_alarm, board.led),
         };
+        local.sampling.start();
         (shared, local)
     }
 

@@ -96,7 +96,7 @@ impl Board {
     }
 
     /// The flash array.
-    pub(crate) fn flash(&self) -> Vec<u8> {
+    pub fn flash(&self) -> Vec<u8> {
         self.machine.flash()
     }
 

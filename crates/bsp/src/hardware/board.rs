@@ -40,7 +40,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts everything but the bus. The watchdog comes first: a crystal that does not start ends in a reset too.
+    /// Starts everything but the bus and the sampling. The watchdog comes first: a crystal that does not start ends in a reset too.
     #[must_use]
     pub fn start(device: Peripherals) -> Board {
         let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
@@ -59,7 +59,7 @@ impl Board {
             pressure: gpioa.pa0.into_analog(),
             supply: gpioa.pa1.into_analog(),
         };
-        let sampling = Sampling::start(front_end, &mut rcc);
+        let sampling = Sampling::new(front_end, &mut rcc);
         let led = Led::new(gpioa.pa5);
         Board { reset_cause, watchdog, time, alarms, can, transmitter, sampling, led }
     }

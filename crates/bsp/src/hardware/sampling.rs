@@ -53,11 +53,12 @@ impl Sums {
     pub const COUNT: u16 = SCANS as u16;
 }
 
-/// The running front end.
+/// The front end.
 pub struct Sampling {
     dma: DMA2,
+    timer: TIM3,
     lost: Losses,
-    _parts: (ADC1, TIM3, PA0<Analog>, PA1<Analog>),
+    _parts: (ADC1, PA0<Analog>, PA1<Analog>),
 }
 
 /// What the front end is made of.
@@ -72,12 +73,18 @@ pub(crate) struct Parts {
 
 impl Sampling {
     /// Configures everything, in the order of the flow of data from its end: a trigger finds all of it ready.
-    pub(crate) fn start(parts: Parts, rcc: &mut Rcc) -> Sampling {
+    pub(crate) fn new(parts: Parts, rcc: &mut Rcc) -> Sampling {
         start_dma(&parts.dma, &parts.adc, rcc);
         start_adc(&parts.adc, &parts.common, rcc);
-        start_timer(&parts.timer, rcc);
+        prepare_timer(&parts.timer, rcc);
         let Parts { adc, dma, timer, pressure, supply, .. } = parts;
-        Sampling { dma, lost: Losses::new(), _parts: (adc, timer, pressure, supply) }
+        Sampling { dma, timer, lost: Losses::new(), _parts: (adc, pressure, supply) }
+    }
+
+    /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this
+    /// is the last thing that an initialisation does.
+    pub fn start(&mut self) {
+        self.timer.cr1().write(|w| w.cen().set_bit());
     }
 
     /// The sums of the millisecond that has just ended. `None` when there is none, as after an interrupt of an error.
@@ -158,12 +165,11 @@ fn start_adc(adc: &ADC1, common: &ADC_COMMON, rcc: &mut Rcc) {
 }
 
 /// TIM3: its update event is the trigger.
-fn start_timer(timer: &TIM3, rcc: &mut Rcc) {
+fn prepare_timer(timer: &TIM3, rcc: &mut Rcc) {
     TIM3::enable(rcc);
     TIM3::reset(rcc);
     timer.arr().write(|w| w.arr().set(PERIOD - 1));
     timer.cr2().write(|w| w.mms().update());
-    timer.cr1().write(|w| w.cen().set_bit());
 }
 
 /// Value of the SMPR register that begins with channel `first`: `code` for each of the ten channels that is used.
