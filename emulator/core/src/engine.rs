@@ -17,7 +17,10 @@ const HIDDEN: u64 = 0x1F00_0000;
 /// `clrex; wfi`
 const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
 
-const NOT_IMPLEMENTED_HINTS: [u16; 3] = [0xBF10, 0xBF20, 0xBF40];
+/// YIELD and WFE.
+const HINTS: [u16; 2] = [0xBF10, 0xBF20];
+/// The upper byte of UDF.
+const UDF: u16 = 0xDE;
 
 /// Makes a CPU with the memory of `model`.
 pub(crate) fn new<P: Peripherals + 'static>(model: &Model, core: Core<P>) -> Result<Cpu<P>, Error> {
@@ -106,14 +109,16 @@ fn on_interrupt<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, number: u32) {
     let _ = cpu.emu_stop();
 }
 
-/// WFE, SEV and YIELD reach us as invalid instructions. They are hints: going on is always allowed.
+/// WFE and YIELD reach us as invalid instructions, with the program counter already behind them. They are hints:
+/// going on is always allowed.
 fn on_invalid<P>(cpu: &mut Unicorn<Core<P>>) -> bool {
     let pc = cpu.pc_read().unwrap_or(0) & !1;
-    let mut op = [0; 2];
-    if cpu.mem_read(pc, &mut op).is_err() || !NOT_IMPLEMENTED_HINTS.contains(&u16::from_le_bytes(op)) {
-        return false;
-    }
-    cpu.set_pc((pc + 2) | 1).is_ok()
+    let op = |address: u64| {
+        let mut op = [0; 2];
+        cpu.mem_read(address, &mut op).map_or(0, |()| u16::from_le_bytes(op))
+    };
+    let undefined = op(pc) >> 8 == UDF;
+    HINTS.contains(&op(pc.wrapping_sub(2))) && !undefined
 }
 
 fn on_unmapped<P>(cpu: &mut Unicorn<Core<P>>, kind: MemType, address: u64, _: usize, _: i64) -> bool {

@@ -76,6 +76,11 @@ fn a_stack_overflow_reaches_the_fault_handler() {
 }
 
 #[test]
+fn hints_do_nothing() {
+    assert_eq!(Bench::new("hints").run(), Verdict::Passed);
+}
+
+#[test]
 fn a_reset_keeps_ram_and_clears_the_core() {
     let mut bench = Bench::new("restart");
     assert_eq!(bench.run(), Verdict::Passed);

@@ -48,7 +48,8 @@ fn main() -> ! {
     }
     let thread = holds(0x3F80_0000, Interrupt::TIM2 as u32);
     let clean = unsafe { CLEAN };
-    let mixed = [thread, clean[0], clean[1], clean[2]].iter().fold(0, |bits, clean| bits * 2 + u32::from(!*clean));
+    let mixed =
+        [thread, clean[0], clean[1], clean[2]].iter().fold(0, |bits, clean| bits * 2 + u32::from(!*clean));
     finish(expect(mixed == 0, mixed))
 }
 
