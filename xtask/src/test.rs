@@ -22,7 +22,7 @@ fn run_all(steps: &mut Steps) -> Result<()> {
     steps.run("images", || images::build().map(|_| ()))?;
     steps.run("lint images", lint_images)?;
     steps.run("other chips", other_chips)?;
-    steps.run("test host", || run(&mut host("test")))?;
+    steps.run("test host", || run(with_images(&mut host("test"))))?;
     steps.run("test python", test_python)
 }
 
@@ -64,9 +64,13 @@ fn other_chips() -> Result<()> {
 fn test_python() -> Result<()> {
     let sim = sim::build()?;
     let python = python::ensure()?;
-    run(Command::new(python)
+    run(with_images(&mut Command::new(python))
         .args(["-m", "pytest", "-q", "host-tests/python"])
         .current_dir(root())
-        .env("SIM_COMMAND", sim)
-        .env("NODE_IMAGES", images::dir()))
+        .env("SIM_COMMAND", sim))
+}
+
+/// Tells tests where the ELF files are.
+fn with_images(command: &mut Command) -> &mut Command {
+    command.env("NODE_IMAGES", images::dir()).env("MECHANICS_IMAGES", images::dir())
 }
