@@ -5,8 +5,8 @@ use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterA
 
 use crate::core::{Core, Halt, Unmapped};
 use crate::cost::Cost;
-use crate::machine::{Error, Model};
 use crate::mechanism::Mechanism;
+use crate::model::{Error, Model};
 use crate::nvic::Masks;
 use crate::ppb;
 

@@ -5,7 +5,8 @@ use unicorn_engine::RegisterARM;
 
 use crate::engine;
 use crate::exception::Exception;
-use crate::machine::{Incident, Machine};
+use crate::incident::Incident;
+use crate::machine::Machine;
 use crate::mechanism::Mechanism;
 use crate::scb::{Scb, cfsr};
 

@@ -1,4 +1,30 @@
 //! An emulated Cortex-M4 with its NVIC that runs ELF files in virtual time.
+//!
+//! The CPU library carries out instructions; everything of the architecture around them is here: exceptions, the
+//! interrupt controller, the system control space, and time. Time passes block by block, at the cost that `cost`
+//! models, and stands still for nobody: a sleeping core jumps to the next event. The same input gives the same run,
+//! bit for bit; [`Stats::trace`] tells two runs apart.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `machine`, `model`, `incident` | the machine as its user sees it, and its run loop |
+//! | `engine` | the CPU library: memory map, hooks, registers |
+//! | `core` | what hooks and run loop share |
+//! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
+//! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
+//! | `cost`, `stats` | cycles of a block; what was counted |
+//! | `loader` | ELF files |
+//!
+//! # Simplifications
+//!
+//! * Interrupts are taken between blocks of code, not between instructions: up to a few dozen cycles late.
+//! * Floating-point registers are stacked at exception entry, never lazily; a higher interrupt that arrives within the
+//!   twelve cycles of an entry nests instead of going first.
+//! * A refused access to a peripheral is a precise bus fault with the right address, but with the program counter of
+//!   its block. Accesses to unmapped memory have the exact one.
+//! * While flash is busy only code fetches from it wait, not loads by a program in RAM.
+//! * WFE is a hint that never sleeps; there is no MPU, no bit-band alias of RAM and no alias of flash at address 0.
+//! * The floating-point unit works whatever CPACR says.
 
 mod context;
 mod core;
@@ -6,9 +32,11 @@ mod cost;
 mod engine;
 mod exception;
 mod fault;
+mod incident;
 mod loader;
 mod machine;
 mod mechanism;
+mod model;
 mod nvic;
 mod ppb;
 mod scb;
@@ -17,7 +45,9 @@ mod systick;
 
 pub use exception::Exception;
 pub use fault::Fault;
+pub use incident::Incident;
 pub use loader::{Image, Segment};
-pub use machine::{Error, Incident, Machine, Model, RAM_PATTERN, Stop};
+pub use machine::{Machine, RAM_PATTERN, Stop};
 pub use mechanism::Mechanism;
+pub use model::{Error, Model};
 pub use stats::{Activity, Stats};

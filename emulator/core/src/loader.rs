@@ -3,7 +3,7 @@
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionKind, elf};
 
-use crate::machine::{Error, Model};
+use crate::model::{Error, Model};
 
 /// A program, ready to be written into flash.
 #[derive(Clone, Debug)]

@@ -1,62 +1,21 @@
 //! The machine: a core with its memory and a chip around it, run in virtual time.
 
-use std::ops::Range;
-
 use canbus::Time;
 use chip::{BusFault, Effect, Memory, Peripherals};
-use thiserror::Error as ThisError;
 use unicorn_engine::{RegisterARM, uc_error};
 
 use crate::core::{Core, Halt};
 use crate::engine::{self, Cpu};
 use crate::exception::Exception;
 use crate::fault::Fault;
+use crate::incident::Incident;
 use crate::loader::{self, Image};
 use crate::mechanism::Mechanism;
+use crate::model::{Error, Model};
 use crate::stats::Stats;
 
 /// The value of every byte of RAM after power-on: what still has it was never written.
 pub const RAM_PATTERN: u8 = 0xA5;
-
-/// The memory of a chip.
-#[derive(Clone, Debug)]
-pub struct Model {
-    /// The flash array.
-    pub flash: Range<u32>,
-    /// The RAM.
-    pub ram: Range<u32>,
-    /// Where the chip answers instead of memory.
-    pub peripherals: Vec<Range<u32>>,
-}
-
-impl Model {
-    /// An STM32F4 with 128 KiB of RAM and this much flash.
-    pub fn stm32f4(flash: u32) -> Model {
-        Model {
-            flash: 0x0800_0000..0x0800_0000 + flash,
-            ram: 0x2000_0000..0x2002_0000,
-            // The peripherals of both buses, and the system memory with identification and calibration.
-            peripherals: vec![0x1FFF_0000..0x1FFF_8000, 0x4000_0000..0x4008_0000, 0x5000_0000..0x5006_1000],
-        }
-    }
-}
-
-/// What cannot be done.
-#[derive(Debug, ThisError)]
-pub enum Error {
-    /// The ELF file is not one for this chip.
-    #[error("{0}")]
-    Elf(String),
-    /// The CPU library refused.
-    #[error("the CPU library failed: {0:?}")]
-    Cpu(uc_error),
-}
-
-impl From<uc_error> for Error {
-    fn from(error: uc_error) -> Error {
-        Error::Cpu(error)
-    }
-}
 
 /// Why [`Machine::run_until`] came back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,17 +31,6 @@ pub enum Stop {
     },
     /// The supply is gone, as a test asked for.
     PowerCut,
-}
-
-/// A reset or a fault, with its instant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Incident {
-    /// A fault was taken.
-    Fault(Fault),
-    /// The program asked for a reset.
-    SoftwareReset,
-    /// The chip reset itself: a watchdog.
-    ChipReset,
 }
 
 /// A core, its memory, and a chip.
