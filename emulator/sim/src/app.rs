@@ -47,10 +47,10 @@ pub fn run(options: Options) -> Result<Summary> {
 
 impl App {
     fn open(options: Options) -> Result<App> {
-        let mut world = setup::world(&options)?;
         let mut gateway = Gateway::new(setup::bits_per_second(options.bitrate));
         let socketcand = gateway.listen(options.socketcand, Protocol::Socketcand)?;
         let slcan = options.slcan.map(|address| gateway.listen(address, Protocol::Slcan)).transpose()?;
+        let mut world = setup::world(&options)?;
         if let Some(interface) = &options.socketcan {
             gateway.attach_interface(interface, &mut world)?;
         }

@@ -82,7 +82,8 @@ pub(crate) fn resets(machine: &Machine<Stm32f4>) -> Vec<String> {
 fn describe(incident: &Incident) -> String {
     match incident {
         Incident::Fault(fault) => {
-            let access = fault.address.map(|address| format!(", access to {address:#010x}")).unwrap_or_default();
+            let access =
+                fault.address.map(|address| format!(", access to {address:#010x}")).unwrap_or_default();
             format!("fault at {:#010x}, CFSR {:#x}{access}", fault.pc, fault.status)
         }
         Incident::SoftwareReset => "reset by software".to_owned(),

@@ -10,26 +10,27 @@ use crate::gateway::BUS_NAME;
 pub(crate) fn greeting(options: &Options, socketcand: SocketAddr, slcan: Option<SocketAddr>) -> Vec<String> {
     let nodes: Vec<String> =
         options.nodes.iter().map(|node| format!("{} ({})", node.id, node.personality)).collect();
+    let first = options.nodes.first().map_or(1, |node| node.id);
+    let (host, port) = (socketcand.ip(), socketcand.port());
     let mut lines = vec![
         format!(
             "node {} at {} kbit/s; socketcand on {socketcand}, bus {BUS_NAME}",
             nodes.join(", "),
             options.bitrate
         ),
-        format!("python: {}", python(socketcand)),
-        format!("        node = network.add_node({}, canopen.ObjectDictionary())", options.nodes[0].id),
+        "python: import canopen; network = canopen.Network()".to_owned(),
+        format!(
+            "        network.connect(interface='socketcand', host='{host}', port={port}, channel='{BUS_NAME}')"
+        ),
+        format!("        node = network.add_node({first}, canopen.ObjectDictionary())"),
         "        node.sdo.upload(0x1000, 0).hex(); node.nmt.state = 'OPERATIONAL'".to_owned(),
     ];
-    match &options.socketcan {
-        Some(interface) => {
-            lines.push(format!("can-utils: candump -ta {interface}; cansend {interface} 000#0100"))
+    lines.push(match &options.socketcan {
+        Some(name) => format!("can-utils: candump -ta {name}; cansend {name} 000#01{first:02X}"),
+        None => {
+            format!("can-utils: socketcandcl -i {BUS_NAME},vcan0 -s {host} -p {port} & candump -ta vcan0")
         }
-        None => lines.push(format!(
-            "can-utils: socketcandcl -v -i vcan0 -s {} -p {}; or start with --socketcan vcan0",
-            socketcand.ip(),
-            socketcand.port()
-        )),
-    }
+    });
     lines.extend(slcan.map(|slcan| {
         format!(
             "slcan on {slcan}: can.Bus(interface='slcan', channel='socket://{slcan}', sleep_after_open=0)"
@@ -37,13 +38,4 @@ pub(crate) fn greeting(options: &Options, socketcand: SocketAddr, slcan: Option<
     }));
     lines.push(console::HELP.to_owned());
     lines
-}
-
-fn python(socketcand: SocketAddr) -> String {
-    format!(
-        "import canopen; network = canopen.Network(); network.connect(interface='socketcand', host='{}', port={}, \
-         channel='{BUS_NAME}')",
-        socketcand.ip(),
-        socketcand.port()
-    )
 }

@@ -115,7 +115,7 @@ impl Summary {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (span, host) = (self.virtual_seconds, self.host_seconds);
-        writeln!(f, "{span:.3} s of virtual time in {host:.3} s ({:.1} x real time)", self.ratio())?;
+        writeln!(f, "{span:.3} s of virtual time in {host:.3} s ({:.2} x real time)", self.ratio())?;
         write!(f, "{}", self.bus)?;
         self.nodes.iter().try_for_each(|node| write!(f, "{node}"))
     }

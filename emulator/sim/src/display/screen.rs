@@ -151,7 +151,7 @@ impl View {
             "node",
             "is",
             "NMT state",
-            "sends",
+            "TPDO 1",
             "pressure Pa",
             "temp. K",
             "position rev",

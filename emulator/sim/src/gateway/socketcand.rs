@@ -1,11 +1,9 @@
 //! The socketcand protocol: frames as text between angle brackets over TCP.
 //!
-//! Follows doc/protocol.md of <https://github.com/linux-can/socketcand>, its raw mode and the part of its
-//! broadcast-manager mode that needs no timers. What cannot be carried is left out as socketcand does:
-//! remote frames in both directions, and error frames.
+//! Follows doc/protocol.md and socketcandcl.c of <https://github.com/linux-can/socketcand>: raw mode, and the part
+//! of the broadcast-manager mode that needs no timers. Error frames are not reported.
 
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
 
 use canbus::{ExtendedId, Frame, Id, StandardId, Time};
 
@@ -26,7 +24,7 @@ pub(super) enum Request {
     BcmMode,
     /// `< echo >`: answered with itself.
     Echo,
-    /// `< send ID DLC BYTES >`
+    /// `< send ID DLC BYTES >`, `< sendrtr ID DLC >`
     Send(Frame),
     /// `< subscribe SECONDS MICROSECONDS ID >`
     Subscribe(Id),
@@ -66,10 +64,13 @@ pub(super) fn parse(text: &str) -> Result<Request, Refused> {
         ("bcmmode", []) => Ok(Request::BcmMode),
         ("echo", []) => Ok(Request::Echo),
         ("send", [id, dlc, bytes @ ..]) => parse_frame(id, dlc, bytes).map(Request::Send).ok_or(bad),
+        ("sendrtr", [id, dlc]) => parse_remote(id, dlc).map(Request::Send).ok_or(bad),
         // An interval other than zero asks for throttling, which only the kernel's broadcast manager offers.
         ("subscribe", ["0", "0", id]) => parse_id(id).map(Request::Subscribe).ok_or(bad),
         ("unsubscribe", [id]) => parse_id(id).map(Request::Unsubscribe).ok_or(bad),
-        ("open" | "rawmode" | "bcmmode" | "echo" | "send" | "subscribe" | "unsubscribe", _) => Err(bad),
+        ("open" | "rawmode" | "bcmmode" | "echo" | "send" | "sendrtr" | "subscribe" | "unsubscribe", _) => {
+            Err(bad)
+        }
         _ => Err(Refused::UnknownCommand),
     }
 }
@@ -91,24 +92,28 @@ fn parse_frame(id: &str, dlc: &str, bytes: &[&str]) -> Option<Frame> {
     (hex(dlc)? as usize == bytes.len()).then(|| Frame::data(id, &bytes))?
 }
 
+fn parse_remote(id: &str, dlc: &str) -> Option<Frame> {
+    Frame::remote(parse_id(id)?, u8::try_from(hex(dlc)?).ok()?)
+}
+
 /// Unlike `from_str_radix` this takes no sign.
 fn hex(text: &str) -> Option<u32> {
     let plain = text.bytes().all(|byte| byte.is_ascii_hexdigit());
     if plain { u32::from_str_radix(text, 16).ok() } else { None }
 }
 
-/// `< frame 123 1.000000 DEADBEEF >`; two spaces before the bracket when the frame is empty. In raw mode the
-/// bytes are contiguous, in broadcast-manager mode they are apart.
+/// `< frame 123 1.000000 DEADBEEF >`, with two spaces before the bracket when the frame is empty, or
+/// `< rtr 123 1.000000 8 >`. In raw mode the bytes are contiguous, in broadcast-manager mode they are apart.
 fn format_frame(frame: &Frame, at: Time, separator: &str) -> String {
-    let bytes: Vec<String> = frame.bytes().iter().map(|byte| format!("{byte:02X}")).collect();
-    let mut text = String::from("< frame ");
-    // Writing to a string cannot fail.
-    let _ = match frame.id() {
-        Id::Standard(id) => write!(text, "{:03X}", id.as_raw()),
-        Id::Extended(id) => write!(text, "{:08X}", id.as_raw()),
+    let id = match frame.id() {
+        Id::Standard(id) => format!("{:03X}", id.as_raw()),
+        Id::Extended(id) => format!("{:08X}", id.as_raw()),
     };
-    let _ = write!(text, " {at} {} >", bytes.join(separator));
-    text
+    if frame.is_remote() {
+        return format!("< rtr {id} {at} {} >", frame.dlc());
+    }
+    let bytes: Vec<String> = frame.bytes().iter().map(|byte| format!("{byte:02X}")).collect();
+    format!("< frame {id} {at} {} >", bytes.join(separator))
 }
 
 /// How frames of the bus are reported to the client.
@@ -203,7 +208,6 @@ impl Session for Socketcand {
 
     fn on_frame(&mut self, frame: &Frame, at: Time) -> Option<String> {
         match &self.mode {
-            _ if frame.is_remote() => None,
             Mode::Raw => Some(format_frame(frame, at, "")),
             Mode::Broadcast(ids) if ids.contains(&key(frame.id())) => Some(format_frame(frame, at, " ")),
             Mode::Broadcast(_) | Mode::Closed => None,
@@ -259,6 +263,9 @@ mod tests {
         assert_eq!(text.as_deref(), Some("< frame 080 1.000000  >"));
         let extended = Frame::data(ExtendedId::new(0x123).unwrap(), &[1]).unwrap();
         assert_eq!(session.on_frame(&extended, at).as_deref(), Some("< frame 00000123 1.000000 01 >"));
+        let remote = Frame::remote(StandardId::new(0x701).unwrap(), 1).unwrap();
+        assert_eq!(session.on_frame(&remote, at).as_deref(), Some("< rtr 701 1.000000 1 >"));
+        assert_eq!(talk(&mut session, "< sendrtr 701 1 >"), [Action::Send(remote)]);
     }
 
     #[test]
@@ -274,8 +281,14 @@ mod tests {
         refused("< >", "not a message");
         refused("hello >", "not a message");
         let mut session = raw();
-        let bad =
-            ["< send 123 8  >", "< send 800 0 >", "< send 1234 0 >", "< send 123 1 100 >", "< send 1 1 +1 >"];
+        let bad = [
+            "< send 123 8  >",
+            "< send 800 0 >",
+            "< send 1234 0 >",
+            "< send 123 1 100 >",
+            "< send 1 1 +1 >",
+            "< sendrtr 1 9 >",
+        ];
         for text in bad {
             assert_eq!(talk(&mut session, text), [Action::segment("< error bad arguments >")], "{text}");
         }
