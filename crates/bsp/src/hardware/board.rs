@@ -33,14 +33,15 @@ pub struct Board {
     pub can: Controller,
     /// Its transmit mailboxes.
     pub transmitter: Transmitter,
-    /// The front end, running.
+    /// The front end, ready to start.
     pub sampling: Sampling,
     /// The status LED.
     pub led: Led,
 }
 
 impl Board {
-    /// Starts everything but the bus and the sampling. The watchdog comes first: a crystal that does not start ends in a reset too.
+    /// Starts everything but the bus and the sampling. The watchdog comes first: a crystal that does not start ends in a
+    /// reset too.
     #[must_use]
     pub fn start(device: Peripherals) -> Board {
         let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);

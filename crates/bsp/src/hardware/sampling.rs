@@ -74,15 +74,15 @@ pub(crate) struct Parts {
 impl Sampling {
     /// Configures everything, in the order of the flow of data from its end: a trigger finds all of it ready.
     pub(crate) fn new(parts: Parts, rcc: &mut Rcc) -> Sampling {
-        start_dma(&parts.dma, &parts.adc, rcc);
-        start_adc(&parts.adc, &parts.common, rcc);
+        prepare_dma(&parts.dma, &parts.adc, rcc);
+        prepare_adc(&parts.adc, &parts.common, rcc);
         prepare_timer(&parts.timer, rcc);
         let Parts { adc, dma, timer, pressure, supply, .. } = parts;
         Sampling { dma, timer, lost: Losses::new(), _parts: (adc, pressure, supply) }
     }
 
-    /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this
-    /// is the last thing that an initialisation does.
+    /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this is
+    /// the last thing that an initialisation does.
     pub fn start(&mut self) {
         self.timer.cr1().write(|w| w.cen().set_bit());
     }
@@ -124,7 +124,7 @@ fn sum(half: &[AtomicU16; HALF]) -> Sums {
 }
 
 /// DMA2 stream 0, channel 0: ADC1 to the buffer, round and round, an interrupt at each half (RM0390, 9.3).
-fn start_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
+fn prepare_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
     DMA2::enable(rcc);
     DMA2::reset(rcc);
     let stream = dma.st(0);
@@ -144,7 +144,7 @@ fn start_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
 }
 
 /// ADC1: scan on each trigger of TIM3, a DMA request for each conversion for ever (RM0390, 13.8.1).
-fn start_adc(adc: &ADC1, common: &ADC_COMMON, rcc: &mut Rcc) {
+fn prepare_adc(adc: &ADC1, common: &ADC_COMMON, rcc: &mut Rcc) {
     ADC1::enable(rcc);
     ADC1::reset(rcc);
     common.ccr().write(|w| w.adcpre().div4().tsvrefe().set_bit());
