@@ -49,7 +49,7 @@ pub struct Options {
     pub speed: Speed,
 
     /// Stop after this much virtual time.
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub duration: Option<Time>,
 
     /// Keep the boards' flash in this directory between runs, one file a node.
