@@ -130,5 +130,5 @@ def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
     summary = simulator.quit()
     node = summary["nodes"][0]
     assert node["boot_ups"] == 1 and node["heartbeats"] > 0 and node["tpdos"] > 10 and node["sdo_frames"] > 0
-    assert node["unmodelled"] == [] and node["resets"] == []
+    assert node["unmodelled"] == [] and node["incidents"] == []
     assert summary["bus"]["errors"] == 0

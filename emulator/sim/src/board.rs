@@ -34,6 +34,8 @@ pub struct Board {
     firmware: emulator::Image,
     bootloader_flash: u32,
     log: Log,
+    /// Where the core stands still until a watchdog resets it.
+    locked_up: Option<u32>,
 }
 
 impl Board {
@@ -50,7 +52,16 @@ impl Board {
         let bootloader_flash = bootloader.map_or(0, |bootloader| bootloader.flash_size);
         let firmware = load(&mut machine, &images.firmware)?;
         machine.power_on(Time::ZERO);
-        Ok(Board { id, personality, machine, images, firmware, bootloader_flash, log: Log::default() })
+        Ok(Board {
+            id,
+            personality,
+            machine,
+            images,
+            firmware,
+            bootloader_flash,
+            log: Log::default(),
+            locked_up: None,
+        })
     }
 
     /// The node-ID it was given on the command line.
@@ -64,15 +75,10 @@ impl Board {
     }
 
     /// Runs to `limit`, or to the moment at which it requests a frame; returns the time reached.
-    ///
-    /// # Errors
-    /// When the core has locked up: it would stand still for ever.
-    pub(crate) fn run_until(&mut self, limit: Time) -> Result<Time> {
-        match self.machine.run_until(limit) {
-            Stop::Reached | Stop::PowerCut => Ok(limit),
-            Stop::Poked => Ok(limit.min(self.machine.now())),
-            Stop::Lockup { pc } => anyhow::bail!("node {}: the core has locked up at {pc:#010x}", self.id),
-        }
+    pub(crate) fn run_until(&mut self, limit: Time) -> Time {
+        let stop = self.machine.run_until(limit);
+        self.locked_up = if let Stop::Lockup { pc } = stop { Some(pc) } else { None };
+        if stop == Stop::Poked { limit.min(self.machine.now()) } else { limit }
     }
 
     /// Its CAN controller.
@@ -114,6 +120,7 @@ impl Board {
     }
 
     pub(crate) fn summary(&self, heard: Heard) -> NodeSummary {
+        let locked_up = self.locked_up.map(|pc| format!("the core has locked up at {pc:#010x}"));
         NodeSummary {
             id: self.id,
             personality: self.personality,
@@ -127,7 +134,7 @@ impl Board {
                 &self.firmware,
                 self.bootloader_flash,
             ),
-            resets: figures::resets(&self.machine),
+            incidents: figures::incidents(&self.machine).chain(locked_up).collect(),
             unmodelled: figures::unmodelled(&self.machine),
         }
     }

@@ -71,12 +71,12 @@ fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
 }
 
 /// Faults and resets after power-on; of a board that resets in circles only the first of them.
-pub(crate) fn resets(machine: &Machine<Stm32f4>) -> Vec<String> {
+pub(crate) fn incidents(machine: &Machine<Stm32f4>) -> impl Iterator<Item = String> {
     const SHOWN: usize = 10;
     let incidents = machine.incidents();
     let shown = incidents.iter().take(SHOWN).map(|(at, incident)| format!("{at} s: {}", describe(incident)));
     let rest = incidents.len().checked_sub(SHOWN + 1).map(|rest| format!("and {} more", rest + 1));
-    shown.chain(rest).collect()
+    shown.chain(rest)
 }
 
 fn describe(incident: &Incident) -> String {

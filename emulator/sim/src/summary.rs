@@ -53,8 +53,8 @@ pub struct NodeSummary {
     pub cpu: Cpu,
     /// What the image takes.
     pub memory: Memory,
-    /// Resets after power-on, each with its time and cause.
-    pub resets: Vec<String>,
+    /// Faults and resets after power-on, each with its time.
+    pub incidents: Vec<String>,
     /// Accesses to registers that the chip model does not have.
     pub unmodelled: Vec<String>,
 }
@@ -157,7 +157,7 @@ impl fmt::Display for NodeSummary {
             "  memory: flash {} B (bootloader {} B), RAM {} B, deepest stack {} B",
             memory.flash, memory.bootloader_flash, memory.ram, memory.stack
         )?;
-        self.resets.iter().try_for_each(|reset| writeln!(f, "  reset: {reset}"))?;
+        self.incidents.iter().try_for_each(|incident| writeln!(f, "  {incident}"))?;
         self.unmodelled.iter().try_for_each(|access| writeln!(f, "  unmodelled register: {access}"))
     }
 }

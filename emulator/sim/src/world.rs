@@ -1,7 +1,7 @@
 //! The simulation: boards, the bus and everything else that is wired to it, in one virtual time.
 //!
 //! The loop is the one that the documentation of [`canbus`] describes. With one board it is exact; with several,
-//! a board may be ahead of a start of frame by [`QUANTUM_BITS`], too little to miss anything of the frame.
+//! a board may be ahead of a start of frame by less than the shortest frame, too little to miss anything of it.
 
 use canbus::{Babbler, Bus, Controller, Event, Frame, HostNode, Stamped, StandardId, Time};
 
@@ -113,8 +113,8 @@ impl World {
         }
     }
 
-    /// Lets everything up to `end` happen. An error is a fault of the emulator, not of the firmware.
-    pub fn run_until(&mut self, end: Time) -> anyhow::Result<()> {
+    /// Lets everything up to `end` happen.
+    pub fn run_until(&mut self, end: Time) {
         loop {
             let next = self.step_bus().min(self.start_nodes());
             if self.now >= end {
@@ -124,13 +124,12 @@ impl World {
                 if self.boards.len() > 1 { self.now + self.bit * QUANTUM_BITS } else { Time::NEVER };
             let mut limit = end.min(next).min(quantum);
             for board in &mut self.boards {
-                limit = limit.min(board.run_until(limit)?);
+                limit = limit.min(board.run_until(limit));
             }
             self.now = limit;
         }
         while self.host.receive().is_some() {}
         self.boards.iter_mut().for_each(|board| board.read_log(&mut self.records.log));
-        Ok(())
     }
 
     /// Lets the bus catch up with the boards; returns when something will next happen on it.

@@ -30,7 +30,7 @@ impl Bench {
 
     fn step(&mut self) {
         self.gateway.poll(&mut self.world);
-        self.world.run_until(self.world.now() + Time::from_millis(1)).unwrap();
+        self.world.run_until(self.world.now() + Time::from_millis(1));
         self.gateway.deliver(&mut self.world);
         std::thread::yield_now();
     }
