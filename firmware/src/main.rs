@@ -30,6 +30,8 @@ const SERVICES: Interrupt = Interrupt::CAN1_SCE;
 /// Pended by whoever has put a frame into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
 
+defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
+
 #[rtic::app(device = bsp::pac, peripherals = true)]
 mod app {
     use bsp::can::Transmitter;

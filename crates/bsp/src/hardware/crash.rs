@@ -3,6 +3,7 @@
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use super::memory;
 use crate::crash_record::{Crash, Fault, Place, Sealed, WORDS};
 
 /// At one address in both images (memory.x, RETAINED), and never initialised. `used`, so that the compiler does not
@@ -31,19 +32,25 @@ pub(crate) fn restart(crash: &Crash) -> ! {
 /// Says in the log what happened.
 pub fn log(crash: &Crash) {
     match crash {
-        Crash::Fault(Fault { pc, lr, sp, cfsr, hfsr, address }) => defmt::error!(
-            "the last run ended in a fault at {=u32:#010x} (lr {=u32:#010x}, sp {=u32:#010x}, CFSR {=u32:#010x}, HFSR {=u32:#010x}, address {=u32:#010x})",
-            pc,
-            lr,
-            sp,
-            cfsr,
-            hfsr,
-            address
-        ),
+        Crash::Fault(fault) => log_fault(fault),
         Crash::Panic(place) => {
             defmt::error!("the last run ended in a panic at {=str}:{=u32}", place.file(), place.line());
         }
     }
+}
+
+fn log_fault(fault: &Fault) {
+    let Fault { pc, lr, sp, cfsr, hfsr, address } = fault;
+    if *sp < memory::stack().start {
+        defmt::error!("the last run ended in a stack overflow: sp {=u32:#010x}", sp);
+    }
+    defmt::error!(
+        "the last run ended in a fault at {=u32:#010x}, lr {=u32:#010x}, sp {=u32:#010x}",
+        pc,
+        lr,
+        sp
+    );
+    defmt::error!("CFSR {=u32:#010x}, HFSR {=u32:#010x}, address {=u32:#010x}", cfsr, hfsr, address);
 }
 
 #[panic_handler]

@@ -22,5 +22,3 @@ pub use watchdog::Watchdog;
 
 // The logger of every image.
 use defmt_rtt as _;
-
-defmt::timestamp!("{=u64:us}", Clock::now().0);
