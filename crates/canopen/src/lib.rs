@@ -24,7 +24,7 @@ mod time;
 mod transmit;
 
 pub use can_id::{CanId, CobId};
-pub use device::{Action, Application, Device};
+pub use device::{Action, Application, Device, Part};
 pub use frame::Frame;
 pub use node_id::NodeId;
 pub use time::{Duration, Instant};

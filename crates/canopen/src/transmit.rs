@@ -6,7 +6,7 @@ use crate::{Duration, Frame};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct QueueFull;
 
-/// A transmit queue. It never blocks.
+/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others.
 pub trait Transmit {
     /// Queues one frame.
     ///

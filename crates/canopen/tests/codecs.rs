@@ -3,7 +3,9 @@
 use canopen::emcy::Message;
 use canopen::nmt::Command;
 use canopen::pdo::{MappedObject, Transmission};
-use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response, Segment};
+use canopen::sdo::{
+    BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Request, Response, Segment,
+};
 use canopen::{CobId, NodeId};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -33,6 +35,29 @@ fn initiate() -> impl Strategy<Value = Initiate> {
     ]
 }
 
+fn block_size() -> impl Strategy<Value = BlockSize> {
+    (1..=127_u8).prop_map(|size| BlockSize::new(size).unwrap())
+}
+
+fn block_end() -> impl Strategy<Value = BlockEnd> {
+    (0..=7_u8, any::<u16>()).prop_map(|(unused, crc)| BlockEnd { unused, crc })
+}
+
+fn block_request() -> impl Strategy<Value = Request> {
+    prop_oneof![
+        (multiplexer(), any::<bool>(), any::<Option<u32>>())
+            .prop_map(|(at, crc, size)| Request::BlockDownload { at, crc, size }),
+        block_end().prop_map(Request::BlockDownloadEnd),
+        (multiplexer(), any::<bool>(), any::<u8>(), any::<u8>()).prop_map(
+            |(at, crc, block_size, threshold)| Request::BlockUpload { at, crc, block_size, threshold }
+        ),
+        Just(Request::BlockUploadStart),
+        any::<(u8, u8)>()
+            .prop_map(|(sequence, block_size)| Request::BlockAcknowledge { sequence, block_size }),
+        Just(Request::BlockUploadEnded),
+    ]
+}
+
 fn request() -> impl Strategy<Value = Request> {
     prop_oneof![
         (multiplexer(), initiate()).prop_map(|(at, initiate)| Request::Download(at, initiate)),
@@ -40,6 +65,7 @@ fn request() -> impl Strategy<Value = Request> {
         multiplexer().prop_map(Request::Upload),
         any::<bool>().prop_map(|toggle| Request::UploadSegment { toggle }),
         (multiplexer(), any::<u32>()).prop_map(|(at, code)| Request::Abort(at, code)),
+        block_request(),
     ]
 }
 
@@ -51,6 +77,11 @@ fn response() -> impl Strategy<Value = Response> {
         (multiplexer(), any::<u32>()).prop_map(|(at, size)| Response::UploadSegmented(at, size)),
         segment().prop_map(Response::UploadedSegment),
         (multiplexer(), any::<u32>()).prop_map(|(at, code)| Response::Abort(at, code)),
+        (multiplexer(), block_size()).prop_map(|(at, size)| Response::BlockDownload(at, size)),
+        (any::<u8>(), block_size()).prop_map(|(last, size)| Response::BlockAcknowledge(last, size)),
+        Just(Response::BlockDownloaded),
+        (multiplexer(), any::<u32>()).prop_map(|(at, size)| Response::BlockUpload(at, size)),
+        block_end().prop_map(Response::BlockUploadEnd),
     ]
 }
 
@@ -75,6 +106,10 @@ proptest! {
         }
         if let Some(response) = Response::parse(frame) {
             prop_assert_eq!(Response::parse(response.encode()), Some(response));
+        }
+        match BlockSegment::parse(frame) {
+            Some(segment) => prop_assert_eq!(segment.encode(), frame),
+            None => prop_assert_eq!(frame[0] & 0x7F, 0),
         }
         prop_assert_eq!(Message::parse(frame).encode(), frame);
     }

@@ -14,4 +14,32 @@ pub trait Application {
     /// # Errors
     /// The reason to refuse it; nothing is stored then.
     fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort>;
+
+    /// The content of the domain with the rule of this number.
+    ///
+    /// # Errors
+    /// The reason why it cannot be read.
+    fn read_domain(&self, _number: u8) -> Result<&[u8], Abort> {
+        Err(Abort::Access)
+    }
+
+    /// A download to a domain: its parts come in order, from [`Part::Begin`] to [`Part::End`]. A download that is given
+    /// up has no end.
+    ///
+    /// # Errors
+    /// The reason to refuse the part and with it the download.
+    fn write_domain(&mut self, _number: u8, _part: Part<'_>) -> Result<(), Abort> {
+        Err(Abort::Access)
+    }
+}
+
+/// A part of a download to a domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part<'a> {
+    /// It begins; so many bytes will come, where the client says so.
+    Begin(Option<usize>),
+    /// Bytes and the place of the first of them.
+    Data(usize, &'a [u8]),
+    /// It is complete, with so many bytes.
+    End(usize),
 }

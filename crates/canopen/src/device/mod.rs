@@ -10,7 +10,7 @@ mod services;
 mod state;
 mod tpdos;
 
-pub use application::Application;
+pub use application::{Application, Part};
 pub use state::Action;
 
 use crate::dictionary::Dictionary;
@@ -28,6 +28,8 @@ pub struct Device<A, const N: usize> {
     server: Server,
     /// A response that found the queue full, and when to try again.
     response: Option<(Response, Instant)>,
+    /// When to go on with a block that found the queue full.
+    block_due: Instant,
     core: Core<A, N>,
 }
 
@@ -69,7 +71,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             services_due: Instant::NEVER,
             pending: state::Pending::new(),
         };
-        Device { server: Server::new(), response: None, core }
+        Device { server: Server::new(), response: None, block_due: Instant::NEVER, core }
     }
 
     /// The NMT state.

@@ -1,9 +1,9 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
-use super::{Application, Core, STALE};
+use super::{Application, Core, Part, STALE};
 use crate::dictionary::{Entry, Field, Group, Rule, Type};
 use crate::nmt::State;
-use crate::sdo::{Abort, Multiplexer, Objects};
+use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Duration, Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
@@ -14,6 +14,7 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         }
         match entry.rule {
             Rule::ErrorCount => Ok(core::slice::from_ref(self.emcy.history().count())),
+            Rule::Application(number) if entry.kind == Type::Domain => self.application.read_domain(number),
             Rule::ErrorEntry => {
                 self.emcy.history().error(at.sub).map(|error| &error[..]).ok_or(Abort::NoData)
             }
@@ -21,15 +22,16 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         }
     }
 
-    fn writable(&self, at: Multiplexer) -> Result<usize, Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
-        if entry.access.is_writable() { Ok(entry.field.size.into()) } else { Err(Abort::ReadOnly) }
+    fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
+        let entry = self.writable_entry(at)?;
+        let is_stream = entry.kind == Type::Domain;
+        Ok(if is_stream { Writable::Stream } else { Writable::Value(entry.field.size.into()) })
     }
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
-        if !entry.access.is_writable() {
-            return Err(Abort::ReadOnly);
+        let entry = self.writable_entry(at)?;
+        if entry.kind == Type::Domain {
+            return self.write_domain(entry, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
@@ -41,9 +43,32 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         self.follow(entry, value, now);
         Ok(())
     }
+
+    fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        self.stream_entry(entry, part)
+    }
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
+    fn writable_entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        if entry.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
+    }
+
+    fn stream_entry(&mut self, entry: &Entry, part: Part<'_>) -> Result<(), Abort> {
+        match entry.rule {
+            Rule::Application(number) => self.application.write_domain(number, part),
+            _ => Err(Abort::Access),
+        }
+    }
+
+    fn write_domain(&mut self, entry: &Entry, bytes: &[u8]) -> Result<(), Abort> {
+        self.stream_entry(entry, Part::Begin(Some(bytes.len())))?;
+        self.stream_entry(entry, Part::Data(0, bytes))?;
+        self.stream_entry(entry, Part::End(bytes.len()))
+    }
+
     pub(super) fn is_initialising(&self) -> bool {
         self.state == State::Initialising
     }

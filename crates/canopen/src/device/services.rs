@@ -9,6 +9,8 @@ use crate::{CanId, Frame, Instant, Transmit};
 const SDO_RESPONSE: u16 = 0x580;
 const SDO_REQUEST: u16 = 0x600;
 const ERROR_CONTROL: u16 = 0x700;
+/// Frames for which a block upload leaves room in the queue: all PDOs of a SYNC, a heartbeat, an EMCY.
+const RESERVED_ROOM: usize = 10;
 
 impl<A: Application, const N: usize> Device<A, N> {
     /// A frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
@@ -24,6 +26,20 @@ impl<A: Application, const N: usize> Device<A, N> {
         let response = self.server.answer(request, &mut self.core, now);
         self.core.services_due = self.core.services_due.min(self.server.deadline());
         self.respond(response, now, out);
+        self.send_block(now, out);
+    }
+
+    /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
+    fn send_block(&mut self, now: Instant, out: &mut impl Transmit) {
+        let id = self.core.node_id.service(SDO_RESPONSE);
+        let abort = self.server.send_block(&mut self.core, now, |data| {
+            out.room() > RESERVED_ROOM && out.send(Frame::data_frame(id, 8, data)).is_ok()
+        });
+        if abort.is_some() {
+            self.respond(abort, now, out);
+        }
+        self.block_due = if self.server.is_sending() { now + RETRY } else { Instant::NEVER };
+        self.core.services_due = self.core.services_due.min(self.block_due);
     }
 
     /// Sends a response. One that still waits is obsolete: its client has gone on.
@@ -62,8 +78,11 @@ impl<A: Application, const N: usize> Device<A, N> {
             Some((response, due)) if now >= due => self.respond(Some(response), now, out),
             _ => (),
         }
-        if let Some(abort) = self.server.expire(now) {
-            self.respond(Some(abort), now, out);
+        if let Some(response) = self.server.expire(now) {
+            self.respond(Some(response), now, out);
+        }
+        if now >= self.block_due {
+            self.send_block(now, out);
         }
     }
 
@@ -74,7 +93,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             return heartbeat;
         }
         let response = self.response.map_or(Instant::NEVER, |(_, due)| due);
-        heartbeat.min(core.emcy.due()).min(self.server.deadline()).min(response)
+        heartbeat.min(core.emcy.due()).min(self.server.deadline()).min(response).min(self.block_due)
     }
 
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).

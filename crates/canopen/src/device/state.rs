@@ -45,8 +45,7 @@ impl Pending {
 impl<A: Application, const N: usize> Device<A, N> {
     /// Initialises what the last reset covers (at first everything), boots up, and starts by itself if 1F80h says so.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.server.reset();
-        self.response = None;
+        self.forget_transfer();
         self.core.enter(State::Initialising);
         self.core.load();
         self.core.configure(now);
@@ -89,9 +88,13 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// A transfer does not survive a state without SDO.
     pub(super) fn silence_services(&mut self) {
         if !self.core.state.has_services() {
-            self.server.reset();
-            self.response = None;
+            self.forget_transfer();
         }
+    }
+
+    fn forget_transfer(&mut self) {
+        self.server.reset();
+        (self.response, self.block_due) = (None, Instant::NEVER);
     }
 
     /// Sets a fault. It is signalled once, until it is cleared.

@@ -104,7 +104,7 @@ const fn default_byte(value: DefaultValue, i: usize) -> u8 {
         DefaultValue::Real(value) => value.to_le_bytes()[i],
         DefaultValue::NodeId(base) => base.to_le_bytes()[i],
         DefaultValue::Text(text) if i < text.len() => text.as_bytes()[i],
-        DefaultValue::Text(_) => 0,
+        DefaultValue::Text(_) | DefaultValue::None => 0,
     }
 }
 
@@ -144,10 +144,14 @@ const fn check_row(row: &Object) {
             assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
         }
         (DefaultValue::NodeId(_), Type::Unsigned32) => (),
+        (DefaultValue::None, Type::Domain) => {
+            assert!(matches!(row.rule, Rule::Application(_)), "a domain belongs to the application");
+        }
         _ => panic!("the default is of another type"),
     }
     let mappable = !matches!(row.mapping, Mapping::No);
-    assert!(!mappable || row.kind.size() <= 8, "a mapped object is longer than a PDO");
+    let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
+    assert!(!mappable || fits, "a mapped object has no place in a PDO");
     assert!(!mappable || !row.rule.is_computed(), "a mapped object has no place in the image");
     let saved = !matches!(row.group, Group::Volatile);
     assert!(!saved || matches!(row.access, Access::ReadWrite), "only a parameter can be saved");

@@ -52,7 +52,7 @@ impl Entry {
     /// Checks a value to be written, in its first four bytes.
     pub(crate) fn check_value(&self, word: u32) -> Result<(), Abort> {
         match self.kind {
-            Type::VisibleString(_) => Ok(()),
+            Type::VisibleString(_) | Type::Domain => Ok(()),
             Type::Real32 => check_real(f32::from_bits(word)),
             _ => self.check_limits(self.kind.integer(word)),
         }

@@ -62,6 +62,8 @@ pub enum DefaultValue {
     Text(&'static str),
     /// This plus the node-ID.
     NodeId(u32),
+    /// Of DOMAIN: the application's.
+    None,
 }
 
 /// What an entry does beyond holding a value.
@@ -138,6 +140,7 @@ impl Object {
         let default = match kind {
             Type::Real32 => DefaultValue::Real(0.0),
             Type::VisibleString(_) => DefaultValue::Text(""),
+            Type::Domain => DefaultValue::None,
             _ => DefaultValue::Integer(0),
         };
         let (mapping, group, rule) = (Mapping::No, Group::Volatile, Rule::Plain);

@@ -19,6 +19,8 @@ pub enum Type {
     Real32,
     /// `VISIBLE_STRING` of at most this many characters.
     VisibleString(u8),
+    /// DOMAIN: data of any length that the application keeps.
+    Domain,
 }
 
 impl Type {
@@ -30,6 +32,7 @@ impl Type {
             Type::Integer16 | Type::Unsigned16 => 2,
             Type::Integer32 | Type::Unsigned32 | Type::Real32 => 4,
             Type::VisibleString(capacity) => capacity,
+            Type::Domain => 0,
         }
     }
 
@@ -45,6 +48,7 @@ impl Type {
             Type::Unsigned32 => 0x07,
             Type::Real32 => 0x08,
             Type::VisibleString(_) => 0x09,
+            Type::Domain => 0x0F,
         }
     }
 
@@ -58,7 +62,7 @@ impl Type {
             Type::Unsigned8 => Some((0, u8::MAX as i64)),
             Type::Unsigned16 => Some((0, u16::MAX as i64)),
             Type::Unsigned32 => Some((0, u32::MAX as i64)),
-            Type::Real32 | Type::VisibleString(_) => None,
+            Type::Real32 | Type::VisibleString(_) | Type::Domain => None,
         }
     }
 

@@ -10,6 +10,12 @@ pub enum Abort {
     TimeOut = 0x0504_0000,
     /// The command specifier is unknown or not valid now.
     Command = 0x0504_0001,
+    /// The block size is not 1 to 127.
+    BlockSize = 0x0504_0002,
+    /// A sequence number that cannot be.
+    Sequence = 0x0504_0003,
+    /// The CRC does not match.
+    Crc = 0x0504_0004,
     /// The access is not possible on this object, or not now.
     Access = 0x0601_0000,
     /// An attempt to read a write-only object.
@@ -36,6 +42,8 @@ pub enum Abort {
     ValueTooHigh = 0x0609_0031,
     /// The value is below the lower limit.
     ValueTooLow = 0x0609_0032,
+    /// Something that has no code of its own.
+    General = 0x0800_0000,
     /// The data cannot be stored.
     NotStored = 0x0800_0020,
     /// The data cannot be stored in the present state of the device.

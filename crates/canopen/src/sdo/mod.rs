@@ -1,16 +1,24 @@
 //! SDO: access to the dictionary (CiA 301, 7.2.4). The messages, and the server that answers them.
 
 mod abort;
+mod block;
+mod block_download;
+mod block_upload;
 mod bytes;
+mod crc;
+mod objects;
 mod request;
 mod response;
+mod segmented;
 mod server;
 
 pub use abort::Abort;
+pub use block::{BlockEnd, BlockSegment, BlockSize};
 pub use bytes::Bytes;
+pub(crate) use objects::{Objects, Writable};
 pub use request::{Initiate, Request};
 pub use response::Response;
-pub(crate) use server::{Objects, Server};
+pub(crate) use server::Server;
 
 /// What a transfer is about: index and sub-index, bytes 1 to 3 of the initiating frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

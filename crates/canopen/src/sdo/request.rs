@@ -1,6 +1,6 @@
 //! What a client asks. Eight bytes are one of these or no request at all.
 
-use super::{Bytes, Multiplexer, Segment, tail};
+use super::{BlockEnd, Bytes, Multiplexer, Segment, tail};
 
 /// A request of an SDO client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +18,39 @@ pub enum Request {
     },
     /// The client gives up.
     Abort(Multiplexer, u32),
+    /// Write in blocks: the first frame.
+    BlockDownload {
+        /// What to write.
+        at: Multiplexer,
+        /// The end will carry a CRC.
+        crc: bool,
+        /// Bytes in all, where the client says so.
+        size: Option<u32>,
+    },
+    /// Write in blocks: the end. (Its segments are a [`BlockSegment`](super::BlockSegment) each.)
+    BlockDownloadEnd(BlockEnd),
+    /// Read in blocks: the first frame.
+    BlockUpload {
+        /// What to read.
+        at: Multiplexer,
+        /// The client can check a CRC.
+        crc: bool,
+        /// Segments in a block; refused if not 1 to 127.
+        block_size: u8,
+        /// Up to this many bytes the server may switch to another transfer; 0 for never.
+        threshold: u8,
+    },
+    /// Read in blocks: send the first block.
+    BlockUploadStart,
+    /// Read in blocks: a block has arrived up to this segment, send the next.
+    BlockAcknowledge {
+        /// Last segment in sequence, 0 for none.
+        sequence: u8,
+        /// Segments in the next block; refused if not 1 to 127.
+        block_size: u8,
+    },
+    /// Read in blocks: all has arrived.
+    BlockUploadEnded,
 }
 
 /// How a download begins.
@@ -42,7 +75,27 @@ impl Request {
             2 => Some(Request::Upload(multiplexer)),
             3 => Some(Request::UploadSegment { toggle: frame[0] & 0x10 != 0 }),
             4 => Some(Request::Abort(multiplexer, u32::from_le_bytes(tail(frame)))),
+            5 => Some(Request::parse_block_upload(frame)),
+            6 if frame[0] & 1 != 0 => Some(Request::BlockDownloadEnd(BlockEnd::parse(frame))),
+            6 => {
+                let size = (frame[0] & 2 != 0).then(|| u32::from_le_bytes(tail(frame)));
+                Some(Request::BlockDownload { at: multiplexer, crc: frame[0] & 4 != 0, size })
+            }
             _ => None,
+        }
+    }
+
+    fn parse_block_upload(frame: [u8; 8]) -> Request {
+        match frame[0] & 3 {
+            0 => Request::BlockUpload {
+                at: Multiplexer::parse(frame),
+                crc: frame[0] & 4 != 0,
+                block_size: frame[4],
+                threshold: frame[5],
+            },
+            1 => Request::BlockUploadEnded,
+            2 => Request::BlockAcknowledge { sequence: frame[1], block_size: frame[2] },
+            _ => Request::BlockUploadStart,
         }
     }
 
@@ -55,6 +108,17 @@ impl Request {
             Request::Upload(multiplexer) => multiplexer.frame(0x40, [0; 4]),
             Request::UploadSegment { toggle } => [0x60 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0],
             Request::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),
+            Request::BlockDownload { at, crc, size } => {
+                let command = 0xC0 | u8::from(crc) << 2 | u8::from(size.is_some()) << 1;
+                at.frame(command, size.unwrap_or(0).to_le_bytes())
+            }
+            Request::BlockDownloadEnd(end) => end.encode(0xC1),
+            Request::BlockUpload { at, crc, block_size, threshold } => {
+                at.frame(0xA0 | u8::from(crc) << 2, [block_size, threshold, 0, 0])
+            }
+            Request::BlockUploadStart => [0xA3, 0, 0, 0, 0, 0, 0, 0],
+            Request::BlockAcknowledge { sequence, block_size } => [0xA2, sequence, block_size, 0, 0, 0, 0, 0],
+            Request::BlockUploadEnded => [0xA1, 0, 0, 0, 0, 0, 0, 0],
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What the server answers.
 
-use super::{Bytes, Multiplexer, Segment, tail};
+use super::{BlockEnd, BlockSize, Bytes, Multiplexer, Segment, tail};
 
 /// A response of an SDO server. An abort carries the bare code, as a client may meet any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +20,16 @@ pub enum Response {
     UploadedSegment(Segment),
     /// Refused or given up.
     Abort(Multiplexer, u32),
+    /// Write in blocks: ready for the first. The server checks the CRC at the end.
+    BlockDownload(Multiplexer, BlockSize),
+    /// Write in blocks: a block has arrived up to this segment (0 for none), send the next in this size.
+    BlockAcknowledge(u8, BlockSize),
+    /// Write in blocks: written.
+    BlockDownloaded,
+    /// Read in blocks: ready to send this many bytes; the end will carry a CRC.
+    BlockUpload(Multiplexer, u32),
+    /// Read in blocks: that was all. (Its segments are a [`BlockSegment`](super::BlockSegment) each.)
+    BlockUploadEnd(BlockEnd),
 }
 
 impl Response {
@@ -33,6 +43,20 @@ impl Response {
             2 => Response::parse_upload(multiplexer, frame),
             3 => Some(Response::Downloaded(multiplexer)),
             4 => Some(Response::Abort(multiplexer, u32::from_le_bytes(tail(frame)))),
+            5 => Response::parse_block_download(multiplexer, frame),
+            6 if frame[0] & 1 != 0 => Some(Response::BlockUploadEnd(BlockEnd::parse(frame))),
+            6 if frame[0] & 6 == 6 => {
+                Some(Response::BlockUpload(multiplexer, u32::from_le_bytes(tail(frame))))
+            }
+            _ => None,
+        }
+    }
+
+    fn parse_block_download(multiplexer: Multiplexer, frame: [u8; 8]) -> Option<Response> {
+        match frame[0] & 0x07 {
+            0b100 => Some(Response::BlockDownload(multiplexer, BlockSize::new(frame[4])?)),
+            0b010 => Some(Response::BlockAcknowledge(frame[1], BlockSize::new(frame[2])?)),
+            0b001 => Some(Response::BlockDownloaded),
             _ => None,
         }
     }
@@ -57,6 +81,11 @@ impl Response {
             Response::UploadSegmented(multiplexer, size) => multiplexer.frame(0x41, size.to_le_bytes()),
             Response::UploadedSegment(segment) => segment.encode(0x00),
             Response::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),
+            Response::BlockDownload(multiplexer, size) => multiplexer.frame(0xA4, [size.get(), 0, 0, 0]),
+            Response::BlockAcknowledge(sequence, size) => [0xA2, sequence, size.get(), 0, 0, 0, 0, 0],
+            Response::BlockDownloaded => [0xA1, 0, 0, 0, 0, 0, 0, 0],
+            Response::BlockUpload(multiplexer, size) => multiplexer.frame(0xC6, size.to_le_bytes()),
+            Response::BlockUploadEnd(end) => end.encode(0xC1),
         }
     }
 }

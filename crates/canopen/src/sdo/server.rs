@@ -1,22 +1,17 @@
 //! The server: one transfer at a time, request in, response out.
 
-use super::{Abort, Bytes, Initiate, Multiplexer, Request, Response, Segment};
+use super::block_download::Receiver;
+use super::block_upload::Sender;
+use super::objects::{BUFFER, Sink, Source};
+use super::segmented::{Download, Upload};
+use super::{Abort, BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Objects, Request};
+use super::{Response, Segment, Writable};
 use crate::{Duration, Instant};
 
-/// How long the client of a segmented transfer may be silent. CiA 301 leaves the time to the device.
+/// How long the client of a transfer may be silent. CiA 301 leaves the time to the device.
 const TIME_OUT: Duration = Duration::from_millis(1000);
-/// The longest value that travels in segments: a `VISIBLE_STRING` of 50 characters is the longest in the dictionary.
-const BUFFER: usize = 64;
-
-/// What the server serves: the dictionary with its values and rules.
-pub(crate) trait Objects {
-    /// The value of an entry, one byte or more.
-    fn read(&mut self, multiplexer: Multiplexer) -> Result<&[u8], Abort>;
-    /// How many bytes a write to the entry takes at most, once it is clear that it may be written at all.
-    fn writable(&self, multiplexer: Multiplexer) -> Result<usize, Abort>;
-    /// Replaces the value of an entry and does what follows from it.
-    fn write(&mut self, multiplexer: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
-}
+/// How long a client may pause within a block before it is told what has arrived: its last segment was lost.
+const BLOCK_PAUSE: Duration = Duration::from_millis(300);
 
 /// The state of the one SDO channel (1200h).
 #[derive(Debug)]
@@ -25,183 +20,288 @@ pub(crate) struct Server {
     multiplexer: Multiplexer,
     /// The value under way: a snapshot for an upload, what has come so far of a download.
     buffer: [u8; BUFFER],
-    /// Bytes of the value: in all for an upload, so far for a download.
-    len: usize,
-    deadline: Instant,
+    /// When the transfer is given up.
+    expiry: Instant,
+    /// When a block is answered without its end.
+    pause: Instant,
+    /// The last request, and its answer.
+    previous: ([u8; 8], Option<Response>),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 enum Transfer {
     Idle,
-    /// `sent` bytes are with the client, the next request carries `toggle`.
-    Upload {
-        sent: usize,
-        toggle: bool,
-    },
-    /// At most `limit` bytes, exactly `announced` where the client said so.
-    Download {
-        limit: usize,
-        announced: Option<usize>,
-        toggle: bool,
-    },
+    Upload(Upload),
+    Download(Download),
+    BlockUpload(Sender),
+    BlockDownload(Receiver),
 }
+
+/// A response, or nothing to say yet.
+type Answer = Result<Option<Response>, Abort>;
 
 impl Server {
     pub(crate) const fn new() -> Server {
-        let multiplexer = Multiplexer { index: 0, sub: 0 };
-        let transfer = Transfer::Idle;
-        Server { transfer, multiplexer, buffer: [0; BUFFER], len: 0, deadline: Instant::NEVER }
+        Server {
+            transfer: Transfer::Idle,
+            multiplexer: Multiplexer { index: 0, sub: 0 },
+            buffer: [0; BUFFER],
+            expiry: Instant::NEVER,
+            pause: Instant::NEVER,
+            previous: ([0; 8], None),
+        }
     }
 
-    /// When the transfer under way times out.
+    /// When [`expire`](Server::expire) has something to do.
     pub(crate) fn deadline(&self) -> Instant {
-        self.deadline
+        self.expiry.min(self.pause)
     }
 
     /// Forgets the transfer under way, without a word to the client: the NMT state no longer allows any.
     pub(crate) fn reset(&mut self) {
         self.transfer = Transfer::Idle;
-        self.deadline = Instant::NEVER;
+        self.previous = ([0; 8], None);
+        (self.expiry, self.pause) = (Instant::NEVER, Instant::NEVER);
     }
 
-    /// Answers a request. There is no answer to an abort.
+    /// Answers a request.
     pub(crate) fn answer(
         &mut self,
         frame: [u8; 8],
         objects: &mut impl Objects,
         now: Instant,
     ) -> Option<Response> {
-        let response = match Request::parse(frame) {
-            Some(Request::Upload(multiplexer)) => self.upload(multiplexer, objects),
-            Some(Request::Download(multiplexer, initiate)) => {
-                self.download(multiplexer, initiate, objects, now)
-            }
-            Some(Request::UploadSegment { toggle }) => self.upload_segment(toggle),
-            Some(Request::DownloadSegment(segment)) => self.download_segment(&segment, objects, now),
-            Some(Request::Abort(..)) => {
-                self.reset();
-                return None;
-            }
-            None => Err(Abort::Command),
+        if let Some(response) = self.repeated(frame) {
+            return Some(response);
+        }
+        let answer = match self.block_segment(frame) {
+            Some(segment) => self.take_block_segment(segment, objects),
+            None => self.dispatch(frame, objects, now),
         };
-        Some(self.settle(response, now))
+        let response = self.settle(answer, now);
+        self.previous = (frame, response);
+        response
     }
 
-    /// Gives up the transfer under way when its time is over.
+    /// The answer to a frame that came twice, be it that the bus repeated it or that the client missed the answer.
+    /// Segments and the end of a block download change from one to the next; only they can be known as repeated.
+    fn repeated(&self, frame: [u8; 8]) -> Option<Response> {
+        let (previous, response) = self.previous;
+        let changes = matches!(frame[0] >> 5, 0 | 3) || frame[0] & 0xE1 == 0xC1;
+        response.filter(|_| changes && frame == previous && !self.wants_block_segments())
+    }
+
+    fn dispatch(&mut self, frame: [u8; 8], objects: &mut impl Objects, now: Instant) -> Answer {
+        match Request::parse(frame).ok_or(Abort::Command)? {
+            Request::Upload(at) => self.upload(at, objects),
+            Request::Download(at, initiate) => self.download(at, initiate, objects, now),
+            Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
+            Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
+            Request::Abort(..) => {
+                self.transfer = Transfer::Idle;
+                Ok(None)
+            }
+            Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
+            Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
+            Request::BlockUpload { at, block_size, threshold, .. } => {
+                self.block_upload(at, block_size, threshold, objects)
+            }
+            Request::BlockUploadStart => self.sender()?.start().map(|()| None),
+            Request::BlockAcknowledge { sequence, block_size } => {
+                let is_repeated = frame == self.previous.0;
+                let end = self.sender()?.acknowledge(sequence, block_size, is_repeated)?;
+                Ok(end.map(Response::BlockUploadEnd))
+            }
+            Request::BlockUploadEnded => {
+                self.sender()?.ended()?;
+                self.transfer = Transfer::Idle;
+                Ok(None)
+            }
+        }
+    }
+
+    /// Does what the time demands: answers a block that has lost its end, or gives up the transfer.
     pub(crate) fn expire(&mut self, now: Instant) -> Option<Response> {
-        (now >= self.deadline).then(|| self.settle(Err(Abort::TimeOut), now))
+        if now >= self.expiry {
+            return self.settle(Err(Abort::TimeOut), now);
+        }
+        match &mut self.transfer {
+            Transfer::BlockDownload(receiver) if now >= self.pause => {
+                self.pause = Instant::NEVER;
+                Some(Response::BlockAcknowledge(receiver.acknowledge(), BlockSize::MAX))
+            }
+            _ => None,
+        }
     }
 
     /// An error ends the transfer; the one place where it becomes an abort message.
-    fn settle(&mut self, response: Result<Response, Abort>, now: Instant) -> Response {
-        if response.is_err() {
+    fn settle(&mut self, answer: Answer, now: Instant) -> Option<Response> {
+        if answer.is_err() {
             self.transfer = Transfer::Idle;
         }
-        self.deadline = if self.transfer == Transfer::Idle { Instant::NEVER } else { now + TIME_OUT };
-        response.unwrap_or_else(|abort| Response::Abort(self.multiplexer, abort.code()))
+        self.expiry = if self.is_idle() { Instant::NEVER } else { now + TIME_OUT };
+        self.pause = match &self.transfer {
+            Transfer::BlockDownload(receiver) if receiver.is_within_block() => now + BLOCK_PAUSE,
+            _ => Instant::NEVER,
+        };
+        answer.unwrap_or_else(|abort| Some(Response::Abort(self.multiplexer, abort.code())))
+    }
+
+    fn is_idle(&self) -> bool {
+        matches!(self.transfer, Transfer::Idle)
     }
 
     /// A new transfer; one that was under way is forgotten, as its client has started over.
-    fn begin(&mut self, multiplexer: Multiplexer) {
+    fn begin(&mut self, at: Multiplexer) {
         self.transfer = Transfer::Idle;
-        self.multiplexer = multiplexer;
+        self.multiplexer = at;
     }
 
-    fn upload(&mut self, multiplexer: Multiplexer, objects: &mut impl Objects) -> Result<Response, Abort> {
-        self.begin(multiplexer);
-        let value = objects.read(multiplexer)?;
-        if value.len() <= 4 {
-            return Ok(Response::Uploaded(multiplexer, Bytes::from_slice(value)));
+    fn upload(&mut self, at: Multiplexer, objects: &mut impl Objects) -> Answer {
+        self.begin(at);
+        let source = Source::open(at, &mut self.buffer, objects)?;
+        if let Some(bytes) = source.short(&self.buffer) {
+            return Ok(Some(Response::Uploaded(at, bytes)));
         }
-        self.buffer.get_mut(..value.len()).ok_or(Abort::Length)?.copy_from_slice(value);
-        self.len = value.len();
-        self.transfer = Transfer::Upload { sent: 0, toggle: false };
-        Ok(Response::UploadSegmented(multiplexer, u32::try_from(self.len).unwrap_or(u32::MAX)))
+        self.transfer = Transfer::Upload(Upload::new(source));
+        Ok(Some(Response::UploadSegmented(at, source.size())))
     }
 
-    fn upload_segment(&mut self, requested: bool) -> Result<Response, Abort> {
-        let Transfer::Upload { sent, toggle } = self.transfer else { return Err(Abort::Command) };
-        if requested != toggle {
-            return Err(Abort::Toggle);
+    fn upload_segment(&mut self, toggle: bool, objects: &mut impl Objects) -> Answer {
+        let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
+        let segment = upload.next(toggle, &self.buffer, objects)?;
+        if segment.last {
+            self.transfer = Transfer::Idle;
         }
-        let rest = self.buffer.get(sent..self.len).unwrap_or(&[]);
-        let data = Bytes::from_slice(rest);
-        let last = rest.len() <= 7;
-        self.transfer =
-            if last { Transfer::Idle } else { Transfer::Upload { sent: sent + 7, toggle: !toggle } };
-        Ok(Response::UploadedSegment(Segment { toggle, last, data }))
+        Ok(Some(Response::UploadedSegment(segment)))
     }
 
     fn download(
         &mut self,
-        multiplexer: Multiplexer,
+        at: Multiplexer,
         initiate: Initiate,
         objects: &mut impl Objects,
         now: Instant,
-    ) -> Result<Response, Abort> {
-        self.begin(multiplexer);
+    ) -> Answer {
+        self.begin(at);
         match initiate {
-            Initiate::Expedited(bytes) => objects.write(multiplexer, bytes.as_slice(), now)?,
+            Initiate::Expedited(bytes) => objects.write(at, bytes.as_slice(), now)?,
             Initiate::Unsized(data) => {
-                let size = objects.writable(multiplexer)?.min(data.len());
-                objects.write(multiplexer, data.get(..size).unwrap_or(&data), now)?;
+                let value = unsized_value(data, at, objects)?;
+                objects.write(at, value.as_slice(), now)?;
             }
-            Initiate::Segmented(size) => self.expect_segments(size, objects.writable(multiplexer)?)?,
+            Initiate::Segmented(size) => {
+                self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
+            }
         }
-        Ok(Response::Downloaded(multiplexer))
+        Ok(Some(Response::Downloaded(at)))
     }
 
-    fn expect_segments(&mut self, size: Option<u32>, limit: usize) -> Result<(), Abort> {
-        let announced = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
-        if announced.is_some_and(|size| size > limit) {
-            return Err(Abort::TooLong);
-        }
-        self.len = 0;
-        self.transfer = Transfer::Download { limit: limit.min(BUFFER), announced, toggle: false };
-        Ok(())
-    }
-
-    fn download_segment(
-        &mut self,
-        segment: &Segment,
-        objects: &mut impl Objects,
-        now: Instant,
-    ) -> Result<Response, Abort> {
-        let Transfer::Download { limit, announced, toggle } = self.transfer else {
-            return Err(Abort::Command);
-        };
-        if segment.toggle != toggle {
-            return Err(Abort::Toggle);
-        }
-        self.append(segment.data.as_slice(), announced.unwrap_or(limit).min(limit))?;
-        self.transfer = Transfer::Download { limit, announced, toggle: !toggle };
+    fn download_segment(&mut self, segment: &Segment, objects: &mut impl Objects, now: Instant) -> Answer {
+        let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
+        download.take(segment, &mut self.buffer, objects, now)?;
         if segment.last {
             self.transfer = Transfer::Idle;
-            self.complete(announced, objects, now)?;
         }
-        Ok(Response::DownloadedSegment { toggle })
+        Ok(Some(Response::DownloadedSegment { toggle: segment.toggle }))
     }
 
-    fn append(&mut self, bytes: &[u8], limit: usize) -> Result<(), Abort> {
-        let end = self.len + bytes.len();
-        let room = self.buffer.get_mut(self.len..end.min(limit)).unwrap_or(&mut []);
-        if room.len() < bytes.len() {
-            return Err(Abort::TooLong);
-        }
-        room.copy_from_slice(bytes);
-        self.len = end;
-        Ok(())
+    fn block_download(
+        &mut self,
+        at: Multiplexer,
+        crc: bool,
+        size: Option<u32>,
+        objects: &mut impl Objects,
+    ) -> Answer {
+        self.begin(at);
+        let sink = Sink::open(at, size, objects)?;
+        self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
+        Ok(Some(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
-    fn complete(
-        &self,
-        announced: Option<usize>,
+    fn wants_block_segments(&self) -> bool {
+        matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.wants_segments())
+    }
+
+    /// Within a block a frame is a segment, unless its first byte is that of an abort. Afterwards it still is one
+    /// when it is the last one again.
+    fn block_segment(&self, frame: [u8; 8]) -> Option<BlockSegment> {
+        let Transfer::BlockDownload(receiver) = &self.transfer else { return None };
+        let segment = BlockSegment::parse(frame)?;
+        (receiver.wants_segments() || frame == self.previous.0).then_some(segment)
+    }
+
+    fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut impl Objects) -> Answer {
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
+        let is_end = receiver.take(segment, &mut self.buffer, objects)?;
+        Ok(is_end.then(|| Response::BlockAcknowledge(receiver.acknowledge(), BlockSize::MAX)))
+    }
+
+    fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
+        match core::mem::replace(&mut self.transfer, Transfer::Idle) {
+            Transfer::BlockDownload(receiver) => {
+                receiver.end(end, &mut self.buffer, objects, now)?;
+                Ok(Some(Response::BlockDownloaded))
+            }
+            _ => Err(Abort::Command),
+        }
+    }
+
+    /// A value of no more than `threshold` bytes goes by the simpler transfers.
+    fn block_upload(
+        &mut self,
+        at: Multiplexer,
+        block_size: u8,
+        threshold: u8,
+        objects: &mut impl Objects,
+    ) -> Answer {
+        self.begin(at);
+        let source = Source::open(at, &mut self.buffer, objects)?;
+        if source.len() <= usize::from(threshold) {
+            return self.upload(at, objects);
+        }
+        let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
+        self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
+        Ok(Some(Response::BlockUpload(at, source.size())))
+    }
+
+    fn sender(&mut self) -> Result<&mut Sender, Abort> {
+        match &mut self.transfer {
+            Transfer::BlockUpload(sender) => Ok(sender),
+            _ => Err(Abort::Command),
+        }
+    }
+
+    /// Whether segments of a block wait to be sent.
+    pub(crate) fn is_sending(&self) -> bool {
+        matches!(&self.transfer, Transfer::BlockUpload(sender) if sender.is_sending())
+    }
+
+    /// Sends segments of a block as long as `send` takes them.
+    pub(crate) fn send_block(
+        &mut self,
         objects: &mut impl Objects,
         now: Instant,
-    ) -> Result<(), Abort> {
-        if announced.is_some_and(|size| size != self.len) {
-            return Err(Abort::TooShort);
+        mut send: impl FnMut([u8; 8]) -> bool,
+    ) -> Option<Response> {
+        while let Transfer::BlockUpload(sender) = &mut self.transfer
+            && sender.is_sending()
+        {
+            match sender.segment(&self.buffer, objects) {
+                Err(abort) => return self.settle(Err(abort), now),
+                Ok(segment) if send(segment.encode()) => sender.sent(&segment),
+                Ok(_) => return None,
+            }
+            self.expiry = now + TIME_OUT;
         }
-        objects.write(self.multiplexer, self.buffer.get(..self.len).unwrap_or(&[]), now)
+        None
+    }
+}
+
+/// The value of an expedited download that leaves its size to the type.
+fn unsized_value(data: [u8; 4], at: Multiplexer, objects: &impl Objects) -> Result<Bytes<4>, Abort> {
+    match objects.writable(at)? {
+        Writable::Value(size) => Ok(Bytes::from_slice(data.get(..size).unwrap_or(&data))),
+        Writable::Stream => Ok(Bytes::new(data, 4)),
     }
 }

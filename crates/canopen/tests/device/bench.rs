@@ -4,7 +4,7 @@ use canopen::dictionary::{
     self, Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Rule, Type,
 };
 use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response, Segment};
-use canopen::{Application, Device, Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Transmit};
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
@@ -49,6 +49,7 @@ const ROWS: &[Object] = &[
     Object::new(0x6101, 0, "", Type::Real32, Access::ReadWrite).saved(Group::Application),
     Object::new(0x6102, 0, "", Type::Unsigned32, Access::WriteOnly).rule(Rule::Application(7)),
     Object::new(0x6103, 0, "", Type::VisibleString(20), Access::ReadWrite).saved(Group::Application),
+    Object::new(0x6104, 0, "", Type::Domain, Access::ReadWrite).rule(Rule::Application(8)),
 ];
 
 const SIZE: usize = dictionary::image_size(ROWS);
@@ -64,9 +65,13 @@ pub(crate) fn rows() -> impl Iterator<Item = (&'static Object, &'static Entry)> 
     ROWS.iter().zip(DICTIONARY.entries())
 }
 
-/// Takes 4711 and nothing else at its rule 7. Its 1F80h is as if it came from a store.
+/// Takes 4711 and nothing else at its rule 7, and keeps a domain of up to 5000 bytes at rule 8.
+#[derive(Default)]
 pub(crate) struct Numbers {
+    /// 1F80h, as if it came from a store.
     pub(crate) start_up: u8,
+    pub(crate) domain: Vec<u8>,
+    pub(crate) downloads: usize,
 }
 
 impl Application for Numbers {
@@ -77,6 +82,27 @@ impl Application for Numbers {
     fn write(&mut self, number: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
         assert_eq!(number, 7);
         if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+
+    fn read_domain(&self, number: u8) -> Result<&[u8], Abort> {
+        assert_eq!(number, 8);
+        Ok(&self.domain)
+    }
+
+    fn write_domain(&mut self, number: u8, part: Part<'_>) -> Result<(), Abort> {
+        assert_eq!(number, 8);
+        match part {
+            Part::Begin(_) => self.domain.clear(),
+            Part::Data(offset, bytes) => {
+                assert_eq!(offset, self.domain.len());
+                self.domain.extend_from_slice(bytes);
+            }
+            Part::End(len) => {
+                assert_eq!(len, self.domain.len());
+                self.downloads += 1;
+            }
+        }
+        if self.domain.len() > 5000 { Err(Abort::NotStored) } else { Ok(()) }
     }
 }
 
@@ -125,7 +151,7 @@ impl Bench {
     }
 
     pub(crate) fn unstarted() -> Bench {
-        let device = Device::new(&DICTIONARY, NodeId::new(ID).unwrap(), Numbers { start_up: 0 });
+        let device = Device::new(&DICTIONARY, NodeId::new(ID).unwrap(), Numbers::default());
         Bench { device, out: Queue { frames: vec![], room: usize::MAX }, now: Instant(1_000_000) }
     }
 

@@ -1,6 +1,7 @@
 //! The whole device, on a bench: a small dictionary, frames in and frames out.
 
 mod bench;
+mod block;
 mod emcy;
 mod heartbeat;
 mod mapping;

@@ -188,3 +188,32 @@ fn a_request_has_eight_bytes() {
     bench.receive(Frame::remote(0x605, 8).unwrap());
     assert_eq!(bench.sent(), []);
 }
+
+#[test]
+fn a_repeated_segment_is_answered_again_and_counts_once() {
+    let mut bench = Bench::booted();
+    let at = Multiplexer { index: 0x1008, sub: 0 };
+    bench.ask(Request::Upload(at));
+    let first = bench.ask(Request::UploadSegment { toggle: false });
+    assert_eq!(bench.ask(Request::UploadSegment { toggle: false }), first);
+    assert!(matches!(
+        bench.ask(Request::UploadSegment { toggle: true }),
+        Some(Response::UploadedSegment(segment)) if segment.data.as_slice() == &NAME[7..14]
+    ));
+    begin_download(&mut bench, Some(9));
+    for (toggle, last, part) in [(false, false, "seven b"), (true, true, "yt")] {
+        for _ in 0..2 {
+            let response = bench.ask(segment(toggle, last, part.as_bytes()));
+            assert_eq!(response, Some(Response::DownloadedSegment { toggle }));
+        }
+    }
+    assert_eq!(bench.read(0x6103, 0), Ok(b"seven byt".to_vec()));
+}
+
+#[test]
+fn another_segment_with_the_same_toggle_bit_is_no_repetition() {
+    let mut bench = Bench::booted();
+    begin_download(&mut bench, None);
+    bench.ask(segment(false, false, b"1234567"));
+    assert_eq!(bench.ask(segment(false, false, b"1234568")), abort(TEXT, 0x0503_0000));
+}

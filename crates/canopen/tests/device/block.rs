@@ -1,0 +1,310 @@
+//! SDO block transfers: whole data, lost and repeated frames, and all that can be wrong.
+
+use crate::bench::{Bench, ID, repeatable};
+use canopen::sdo::{BlockEnd, BlockSegment, BlockSize, Multiplexer, Request, Response};
+use canopen::{Duration, Frame};
+use proptest::prelude::*;
+
+const DOMAIN: Multiplexer = Multiplexer { index: 0x6104, sub: 0 };
+const TEXT: Multiplexer = Multiplexer { index: 0x6103, sub: 0 };
+const RESPONSE: u16 = 0x580 + ID as u16;
+
+/// CRC-16/XMODEM bit by bit, as CiA 301 defines it.
+fn crc(data: &[u8]) -> u16 {
+    data.iter().fold(0, |crc: u16, byte| {
+        (0..8)
+            .fold(crc ^ u16::from(*byte) << 8, |crc, _| crc << 1 ^ if crc & 0x8000 != 0 { 0x1021 } else { 0 })
+    })
+}
+
+fn data(len: usize) -> Vec<u8> {
+    (0..len).map(|i| (i * 7 + i / 251) as u8).collect()
+}
+
+fn end(data: &[u8]) -> BlockEnd {
+    let tail = data.chunks(7).next_back().map_or(0, <[u8]>::len);
+    BlockEnd { unused: 7 - tail as u8, crc: crc(data) }
+}
+
+fn segment(data: &[u8], number: usize, sequence: u8) -> BlockSegment {
+    let mut bytes = [0; 7];
+    let chunk = data.chunks(7).nth(number).unwrap_or(&[]);
+    bytes[..chunk.len()].copy_from_slice(chunk);
+    let last = (number + 1) * 7 >= data.len();
+    BlockSegment { last, sequence: BlockSize::new(sequence).unwrap(), data: bytes }
+}
+
+/// What happens to a frame on its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fate {
+    Arrives,
+    IsLost,
+    ArrivesTwice,
+}
+
+struct Client {
+    bench: Bench,
+    fates: Box<dyn Iterator<Item = Fate>>,
+}
+
+impl Client {
+    fn new() -> Client {
+        Client { bench: Bench::booted(), fates: Box::new(std::iter::repeat(Fate::Arrives)) }
+    }
+
+    /// Sends a segment, by its fate, and gives the answer if there is one.
+    fn send_segment(&mut self, segment: BlockSegment) -> Option<Response> {
+        let frame = Frame::new(0x600 + u16::from(ID), &segment.encode()).unwrap();
+        match self.fates.next().unwrap() {
+            Fate::Arrives => self.bench.receive(frame),
+            Fate::ArrivesTwice => (0..2).for_each(|_| self.bench.receive(frame)),
+            Fate::IsLost => (),
+        }
+        self.response()
+    }
+
+    fn response(&mut self) -> Option<Response> {
+        let frames: Vec<_> = self.bench.take().into_iter().filter(|frame| frame.id() == RESPONSE).collect();
+        assert!(frames.len() <= 1, "{frames:?}");
+        frames.first().map(|frame| Response::parse(frame.data().try_into().unwrap()).unwrap())
+    }
+
+    /// A block download that sends again what was not acknowledged.
+    fn download(&mut self, at: Multiplexer, data: &[u8]) -> Response {
+        let request = Request::BlockDownload { at, crc: true, size: Some(data.len() as u32) };
+        let Some(Response::BlockDownload(_, size)) = self.bench.ask(request) else { panic!() };
+        let segments = data.len().div_ceil(7).max(1);
+        let mut done = 0;
+        let mut blocks = 0;
+        while done < segments {
+            blocks += 1;
+            assert!(blocks < 200, "no progress");
+            let mut answer = None;
+            for sequence in (1..=size.get()).take(segments - done) {
+                answer =
+                    self.send_segment(segment(data, done + usize::from(sequence) - 1, sequence)).or(answer);
+            }
+            match answer.or_else(|| self.wait()) {
+                Some(Response::BlockAcknowledge(sequence, _)) => done += usize::from(sequence),
+                // Nothing of the block has arrived: the server does not know of it.
+                None => (),
+                other => return other.unwrap(),
+            }
+        }
+        self.bench.ask(Request::BlockDownloadEnd(end(data))).unwrap()
+    }
+
+    fn wait(&mut self) -> Option<Response> {
+        self.bench.run(Duration::from_millis(310));
+        self.response()
+    }
+
+    /// A block upload that asks again for what is missing; the data and the end of the transfer.
+    fn upload(&mut self, at: Multiplexer, block_size: u8) -> (Vec<u8>, BlockEnd) {
+        let request = Request::BlockUpload { at, crc: true, block_size, threshold: 0 };
+        let Some(Response::BlockUpload(_, size)) = self.bench.ask(request) else { panic!() };
+        let mut data = vec![];
+        self.request(Request::BlockUploadStart);
+        for _ in 0..3000 {
+            let frames = self.block();
+            if let [frame] = &frames[..]
+                && let Some(Response::BlockUploadEnd(end)) = Response::parse(*frame)
+                && data.len() >= size as usize
+            {
+                data.truncate(data.len() - usize::from(end.unused));
+                self.request(Request::BlockUploadEnded);
+                return (data, end);
+            }
+            let mut sequence = 0;
+            for segment in frames.into_iter().map(|frame| BlockSegment::parse(frame).unwrap()) {
+                if self.fates.next() != Some(Fate::IsLost) && segment.sequence.get() == sequence + 1 {
+                    data.extend_from_slice(&segment.data);
+                    sequence += 1;
+                }
+            }
+            self.request(Request::BlockAcknowledge { sequence, block_size });
+        }
+        panic!("no progress");
+    }
+
+    fn request(&mut self, request: Request) {
+        self.bench.receive(Frame::new(0x600 + u16::from(ID), &request.encode()).unwrap());
+    }
+
+    /// All that the server sends until it waits.
+    fn block(&mut self) -> Vec<[u8; 8]> {
+        self.bench.run(Duration::from_millis(200));
+        let frames = self.bench.take().into_iter().filter(|frame| frame.id() == RESPONSE);
+        frames.map(|frame| frame.data().try_into().unwrap()).collect()
+    }
+}
+
+fn lossy(percent: u32) -> impl Strategy<Value = Vec<Fate>> {
+    let fate = prop_oneof![
+        100 - 2 * percent => Just(Fate::Arrives),
+        percent => Just(Fate::IsLost),
+        percent => Just(Fate::ArrivesTwice),
+    ];
+    // Not a multiple of any block's length, so that they do not meet the same segment again and again.
+    prop::collection::vec(fate, 307)
+}
+
+#[test]
+fn data_of_any_length_arrives_both_ways() {
+    for len in [1, 4, 6, 7, 8, 14, 888, 889, 890, 1778, 4096] {
+        let mut client = Client::new();
+        assert_eq!(client.download(DOMAIN, &data(len)), Response::BlockDownloaded, "{len}");
+        assert_eq!(client.bench.device.application().domain, data(len));
+        assert_eq!(client.upload(DOMAIN, 127), (data(len), end(&data(len))));
+    }
+}
+
+#[test]
+fn small_blocks_and_their_change() {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(200);
+    for block_size in [1, 2, 100] {
+        assert_eq!(client.upload(DOMAIN, block_size).0, data(200));
+    }
+}
+
+#[test]
+fn a_value_of_the_image_goes_in_blocks_too() {
+    let mut client = Client::new();
+    assert_eq!(client.download(TEXT, b"seven bytes and 2"), Response::BlockDownloaded);
+    assert_eq!(client.bench.read(0x6103, 0), Ok(b"seven bytes and 2".to_vec()));
+    assert_eq!(client.upload(TEXT, 127).0, b"seven bytes and 2");
+    let short = Multiplexer { index: 0x6100, sub: 0 };
+    assert_eq!(client.download(short, &[4, 0]), Response::BlockDownloaded);
+    assert_eq!(client.upload(short, 127).0, [4, 0]);
+    assert_eq!(client.download(short, &[6, 0]), Response::Abort(short, 0x0609_0031));
+}
+
+#[test]
+fn a_short_value_may_switch_to_another_transfer() {
+    let mut bench = Bench::booted();
+    let at = Multiplexer { index: 0x6100, sub: 0 };
+    let request = |at, threshold| Request::BlockUpload { at, crc: true, block_size: 10, threshold };
+    assert!(matches!(bench.ask(request(at, 4)), Some(Response::Uploaded(..))));
+    assert!(matches!(bench.ask(request(at, 1)), Some(Response::BlockUpload(_, 2))));
+    let name = Multiplexer { index: 0x1008, sub: 0 };
+    assert!(matches!(bench.ask(request(name, 26)), Some(Response::UploadSegmented(_, 26))));
+}
+
+#[test]
+fn faults_have_their_abort_codes() {
+    let abort = |code| Some(Response::Abort(DOMAIN, code));
+    let upload = |block_size| Request::BlockUpload { at: DOMAIN, crc: true, block_size, threshold: 0 };
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(20);
+    for block_size in [0, 128, 255] {
+        assert_eq!(client.bench.ask(upload(block_size)), abort(0x0504_0002));
+    }
+    for request in [Request::BlockUploadStart, Request::BlockUploadEnded, Request::BlockDownloadEnd(end(&[]))]
+    {
+        assert_eq!(client.bench.ask(request), abort(0x0504_0001));
+    }
+    client.bench.ask(upload(2));
+    client.request(Request::BlockUploadStart);
+    assert_eq!(client.block().len(), 2);
+    let beyond = Request::BlockAcknowledge { sequence: 3, block_size: 2 };
+    assert_eq!(client.bench.ask(beyond), abort(0x0504_0003));
+    client.bench.ask(upload(2));
+    client.request(Request::BlockUploadStart);
+    client.block();
+    let zero = Request::BlockAcknowledge { sequence: 2, block_size: 0 };
+    assert_eq!(client.bench.ask(zero), abort(0x0504_0002));
+}
+
+#[test]
+fn a_download_must_match_its_crc_and_its_size() {
+    let abort = |code| Some(Response::Abort(DOMAIN, code));
+    let begin = |crc, size| Request::BlockDownload { at: DOMAIN, crc, size };
+    let wrong = BlockEnd { unused: 0, crc: 0 };
+    for (request, last, expected) in [
+        (begin(true, Some(7)), wrong, abort(0x0504_0004)),
+        (begin(false, Some(7)), wrong, Some(Response::BlockDownloaded)),
+        (begin(false, None), wrong, Some(Response::BlockDownloaded)),
+        (begin(true, Some(8)), end(&data(7)), abort(0x0607_0013)),
+        (begin(true, Some(6)), end(&data(7)), abort(0x0607_0012)),
+    ] {
+        let mut client = Client::new();
+        client.bench.ask(request);
+        let answer = client.send_segment(segment(&data(7), 0, 1));
+        assert!(matches!(answer, Some(Response::BlockAcknowledge(1, _))));
+        assert_eq!(client.bench.ask(Request::BlockDownloadEnd(last)), expected);
+        let downloads = usize::from(expected == Some(Response::BlockDownloaded));
+        assert_eq!(client.bench.device.application().downloads, downloads);
+    }
+}
+
+#[test]
+fn too_much_is_refused_when_it_comes() {
+    let mut client = Client::new();
+    assert_eq!(client.download(DOMAIN, &data(5001)), Response::Abort(DOMAIN, 0x0800_0020));
+    let size = Some(21);
+    let request = Request::BlockDownload { at: TEXT, crc: true, size };
+    assert_eq!(client.bench.ask(request), Some(Response::Abort(TEXT, 0x0607_0012)));
+}
+
+#[test]
+fn a_client_that_gives_up_or_falls_silent_ends_the_transfer() {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(2000);
+    for silence in [false, true] {
+        let upload = Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 };
+        client.bench.ask(upload);
+        client.request(Request::BlockUploadStart);
+        client.block();
+        if silence {
+            client.bench.run(Duration::from_millis(1000));
+            assert_eq!(client.response(), Some(Response::Abort(DOMAIN, 0x0504_0000)));
+        } else {
+            client.request(Request::Abort(DOMAIN, 0x0800_0000));
+            assert_eq!(client.block(), [[0; 8]; 0]);
+        }
+        assert!(matches!(client.bench.ask(Request::BlockUploadEnded), Some(Response::Abort(..))));
+    }
+}
+
+#[test]
+fn a_request_right_after_a_block_upload_is_answered() {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(100);
+    client.upload(DOMAIN, 127);
+    assert_eq!(client.bench.read(0x1001, 0), Ok(vec![0]));
+}
+
+#[test]
+fn a_block_leaves_room_in_the_queue() {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(700);
+    client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 });
+    client.bench.out.room = 30;
+    client.request(Request::BlockUploadStart);
+    client.bench.run(Duration::from_millis(50));
+    assert_eq!(client.bench.out.room, 10);
+    client.bench.out.room = 1000;
+    assert_eq!(client.block().len(), 100);
+}
+
+proptest! {
+    #![proptest_config(repeatable())]
+
+    #[test]
+    fn a_download_survives_lost_and_repeated_segments(fates in lossy(10), len in 1..2000_usize) {
+        let mut client = Client::new();
+        client.fates = Box::new(fates.into_iter().cycle());
+        prop_assert_eq!(client.download(DOMAIN, &data(len)), Response::BlockDownloaded);
+        prop_assert_eq!(&client.bench.device.application().domain, &data(len));
+        prop_assert_eq!(client.bench.device.application().downloads, 1);
+    }
+
+    #[test]
+    fn an_upload_survives_lost_segments(fates in lossy(10), len in 1..2000_usize, block_size in 1..=127_u8) {
+        let mut client = Client::new();
+        client.bench.device.application_mut().domain = data(len);
+        client.fates = Box::new(fates.into_iter().cycle());
+        prop_assert_eq!(client.upload(DOMAIN, block_size), (data(len), end(&data(len))));
+    }
+}
