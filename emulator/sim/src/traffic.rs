@@ -64,7 +64,7 @@ pub struct Heard {
     pub sdo_frames: u64,
     /// EMCY messages that tell of an error.
     pub emcys: u64,
-    /// Frames that the node has sent, by the count of all of the above that are its own.
+    /// Messages of the node in all: EMCY, TPDO, SDO response, heartbeat, whatever they hold.
     pub sent: u64,
     /// The error code of the last EMCY.
     pub last_emcy: Option<u16>,

@@ -22,7 +22,7 @@ enum Kind {
 }
 
 impl Display {
-    /// Shows `greeting` first. `heading` names what runs.
+    /// Shows `greeting` first: lines that tell what runs and what to type.
     pub fn open(greeting: &[String]) -> io::Result<Display> {
         let interactive = io::stdout().is_terminal() && io::stdin().is_terminal();
         let kind = if interactive {
