@@ -130,6 +130,10 @@ mod app {
            shared = [snapshot, parameters, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(sums) = cx.local.sampling.take() else { return };
+        match cx.local.sampling.lost() {
+            0 => {}
+            lost => defmt::error!("{=u32} milliseconds were not collected in time", lost),
+        }
         if let Some(parameters) = cx.shared.parameters.lock(Option::take) {
             cx.local.measurement.apply(&parameters);
         }
