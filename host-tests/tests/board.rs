@@ -150,6 +150,26 @@ fn sampling_keeps_its_pace_on_a_full_bus() {
     assert_eq!(tpdos, SYNCS, "every SYNC is answered");
 }
 
+/// One frame in twenty is destroyed by a bit error: the controllers repeat it, and every request is answered once.
+#[test]
+fn a_disturbed_bus_loses_nothing() {
+    const REQUESTS: usize = 200;
+    let mut world = world("--bitrate 1000");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    world.bus().faults.noise(1, 0.05);
+    let mut responses = 0;
+    for _ in 0..REQUESTS {
+        master.send(&mut world, SDO_REQUEST, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+        world.run_until(world.now() + Time::from_millis(5));
+        responses += master.heard(&mut world, SDO_RESPONSE).len();
+    }
+    let summary = world.summary(1.0, 0);
+    assert_eq!(responses, REQUESTS);
+    assert!(summary.bus.errors > 10, "{summary}");
+    assert_eq!((summary.nodes[0].heard.emcys, summary.nodes[0].receiving.lost), (0, 0), "{summary}");
+}
+
 /// What a node costs. Instructions are exact; the ratio depends on the host and is only printed.
 #[test]
 fn a_node_is_cheap() {

@@ -69,11 +69,6 @@ impl Board {
         self.id
     }
 
-    /// The machine inside, for a test that looks closer or breaks something.
-    pub fn machine(&mut self) -> &mut Machine<Stm32f4> {
-        &mut self.machine
-    }
-
     /// Runs to `limit`, or to the moment at which it requests a frame; returns the time reached.
     pub(crate) fn run_until(&mut self, limit: Time) -> Time {
         let stop = self.machine.run_until(limit);

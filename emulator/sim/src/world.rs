@@ -76,11 +76,6 @@ impl World {
         &self.boards
     }
 
-    /// The boards, for a test that looks closer or breaks something.
-    pub fn boards_mut(&mut self) -> &mut [Board] {
-        &mut self.boards
-    }
-
     /// The bus, for bit errors.
     pub fn bus(&mut self) -> &mut Bus {
         &mut self.bus
