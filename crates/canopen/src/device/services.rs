@@ -26,7 +26,9 @@ impl<A: Application, const N: usize> Device<A, N> {
         let response = self.server.answer(request, &mut self.core, now);
         self.core.services_due = self.core.services_due.min(self.server.deadline());
         self.respond(response, now, out);
-        self.send_block(now, out);
+        if self.server.is_sending() {
+            self.send_block(now, out);
+        }
     }
 
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.

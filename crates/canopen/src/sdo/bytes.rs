@@ -20,6 +20,9 @@ impl<const N: usize> Bytes<N> {
     /// The first bytes of a slice, at most `N`.
     #[must_use]
     pub fn from_slice(bytes: &[u8]) -> Bytes<N> {
+        if let Some(full) = bytes.first_chunk() {
+            return Bytes { len: Self::CAPACITY, data: *full };
+        }
         let mut data = [0; N];
         let mut len = 0;
         for (to, from) in data.iter_mut().zip(bytes) {

@@ -57,11 +57,6 @@ impl Source {
         u32::try_from(self.len).unwrap_or(u32::MAX)
     }
 
-    /// All of it, if it fits an expedited transfer.
-    pub(super) fn short(&self, buffer: &[u8; BUFFER]) -> Option<Bytes<4>> {
-        (self.len <= 4).then(|| Bytes::from_slice(buffer.get(..self.len).unwrap_or(&[])))
-    }
-
     /// The next up to seven bytes. Fails when the domain has become shorter.
     pub(super) fn piece(
         &self,

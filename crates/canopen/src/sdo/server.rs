@@ -24,7 +24,7 @@ pub(crate) struct Server {
     expiry: Instant,
     /// When a block is answered without its end.
     pause: Instant,
-    /// The last request, and its answer.
+    /// The last request of this transfer that could be one of a series, and its answer.
     previous: ([u8; 8], Option<Response>),
 }
 
@@ -71,6 +71,10 @@ impl Server {
         objects: &mut impl Objects,
         now: Instant,
     ) -> Option<Response> {
+        if matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
+            let answer = self.dispatch(frame, objects, now);
+            return self.settle(answer, now);
+        }
         if let Some(response) = self.repeated(frame) {
             return Some(response);
         }
@@ -155,14 +159,16 @@ impl Server {
     fn begin(&mut self, at: Multiplexer) {
         self.transfer = Transfer::Idle;
         self.multiplexer = at;
+        self.previous.1 = None;
     }
 
     fn upload(&mut self, at: Multiplexer, objects: &mut impl Objects) -> Answer {
         self.begin(at);
-        let source = Source::open(at, &mut self.buffer, objects)?;
-        if let Some(bytes) = source.short(&self.buffer) {
-            return Ok(Some(Response::Uploaded(at, bytes)));
+        let value = objects.read(at)?;
+        if value.len() <= 4 {
+            return Ok(Some(Response::Uploaded(at, Bytes::from_slice(value))));
         }
+        let source = Source::open(at, &mut self.buffer, objects)?;
         self.transfer = Transfer::Upload(Upload::new(source));
         Ok(Some(Response::UploadSegmented(at, source.size())))
     }
