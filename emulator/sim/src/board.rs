@@ -82,6 +82,8 @@ impl Board {
     }
 
     pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
+        // It may have run on by a few instructions, and for its chip time only goes forwards.
+        let now = now.max(self.machine.now());
         stimulus.act_on(self.machine.peripherals_mut().plant_mut(now), now);
     }
 
