@@ -52,6 +52,6 @@ fn bits(fault: Fault) -> (u32, u32) {
         Fault::CommunicationData => (0, 1 << 4),
         Fault::ApplicationData => (0, 1 << 5),
         Fault::UnexpectedReset => (0, 1 << 6),
-        Fault::Overrun | Fault::ErrorPassive | Fault::BusOffRecovered => (0, 0),
+        _ => (0, 0),
     }
 }

@@ -9,6 +9,7 @@ mod process;
 mod services;
 mod state;
 mod tpdos;
+mod watches;
 
 pub use application::{Application, Part};
 pub use state::Action;
@@ -42,6 +43,7 @@ struct Core<A, const N: usize> {
     image: [u8; N],
     application: A,
     heartbeat: heartbeat::Producer,
+    watches: heartbeat::Consumer,
     sync: sync::Consumer,
     emcy: emcy::Producer,
     tpdos: [Tpdo; TPDOS],
@@ -64,6 +66,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             image: [0; N],
             application,
             heartbeat: heartbeat::Producer::new(),
+            watches: heartbeat::Consumer::new(),
             sync: sync::Consumer::new(),
             emcy: emcy::Producer::new(),
             tpdos: [const { Tpdo::new() }; TPDOS],

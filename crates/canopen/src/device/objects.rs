@@ -93,6 +93,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::SyncCobId => sync::check_cob_id(value),
             Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
+            Rule::HeartbeatWatch => self.admit_watch(entry, value),
             Rule::TpdoCobId => self.admit_tpdo_cob_id(entry, value),
             Rule::TpdoType => self.admit_tpdo_type(entry, value),
             Rule::TpdoInhibit if self.tpdo_is_valid(entry) => Err(Abort::InvalidValue),
@@ -113,12 +114,14 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::SyncCobId => self.sync.configure(value),
             Rule::EmcyCobId => self.emcy.configure(value),
             Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
+            Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::TpdoCobId | Rule::TpdoType | Rule::TpdoInhibit | Rule::TpdoEventTimer => {
                 self.configure_tpdo(super::tpdos::number(entry));
             }
             _ => (),
         }
-        self.pending.identifiers |= matches!(entry.rule, Rule::SyncCobId | Rule::TpdoCobId);
+        self.pending.identifiers |=
+            matches!(entry.rule, Rule::SyncCobId | Rule::TpdoCobId | Rule::HeartbeatWatch);
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 }

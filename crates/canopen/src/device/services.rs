@@ -15,7 +15,10 @@ const RESERVED_ROOM: usize = 10;
 impl<A: Application, const N: usize> Device<A, N> {
     /// A frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        if frame.id() == self.core.node_id.service(SDO_REQUEST).get() && self.core.state.has_services() {
+        if frame.id() & 0x780 == ERROR_CONTROL {
+            self.core.on_heartbeat(frame, now);
+        } else if frame.id() == self.core.node_id.service(SDO_REQUEST).get() && self.core.state.has_services()
+        {
             self.on_sdo(frame, now, out);
         }
     }
@@ -59,6 +62,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         if now >= self.core.services_due {
             self.poll_heartbeat(now, out);
+            self.poll_watches(now);
             if self.core.state.has_services() {
                 self.core.emcy.poll(now, out);
                 self.poll_sdo(now, out);
@@ -90,7 +94,10 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     fn next_service(&self) -> Instant {
         let core = &self.core;
-        let heartbeat = if core.is_initialising() { Instant::NEVER } else { core.heartbeat.due() };
+        if core.is_initialising() {
+            return Instant::NEVER;
+        }
+        let heartbeat = core.heartbeat.due().min(core.watches.due());
         if !core.state.has_services() {
             return heartbeat;
         }
@@ -100,6 +107,6 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).
     pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
-        core::iter::once(self.core.node_id.service(SDO_REQUEST))
+        core::iter::once(self.core.node_id.service(SDO_REQUEST)).chain(self.core.watches.ids())
     }
 }

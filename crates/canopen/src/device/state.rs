@@ -159,6 +159,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn configure(&mut self, now: Instant) {
         self.sync.configure(self.number(0x1005, 0));
         self.emcy.configure(self.number_or(0x1014, 0, NO_EMCY));
+        self.configure_watches(now);
         self.emcy.restart(now);
         self.update_error_register();
         let period = Duration::from_millis(self.number(0x1017, 0).into());
@@ -166,14 +167,14 @@ impl<A: Application, const N: usize> Core<A, N> {
         (0..self.tpdos.len()).for_each(|number| self.configure_tpdo(number));
     }
 
-    fn raise(&mut self, fault: Fault, now: Instant) {
+    pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
         if self.emcy.raise(fault, now) {
             self.update_error_register();
             self.services_due = STALE;
         }
     }
 
-    fn clear(&mut self, fault: Fault, now: Instant) {
+    pub(super) fn clear(&mut self, fault: Fault, now: Instant) {
         self.emcy.clear(fault, now);
         self.update_error_register();
         self.services_due = STALE;

@@ -79,6 +79,8 @@ pub enum Rule {
     SyncCobId,
     /// 1014h, COB-ID of EMCY.
     EmcyCobId,
+    /// 1016h:1 and up, a node whose heartbeat is watched.
+    HeartbeatWatch,
     /// 1017h, heartbeat producer time.
     HeartbeatTime,
     /// 1F80h, NMT start-up.

@@ -1,8 +1,7 @@
 //! Everything that the node can signal as a fault.
 
-/// A fault. The discriminant is its bit in a set of faults, the order has no other meaning.
+/// A fault. Each is set and cleared on its own, also those that exist several times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
 pub enum Fault {
     /// The clock of the sensor.
     SensorClock,
@@ -36,10 +35,16 @@ pub enum Fault {
     ErrorPassive,
     /// The CAN controller was off the bus and is back.
     BusOffRecovered,
+    /// The heartbeat of a node is missing: entry of 1016h, from 0.
+    Heartbeat(u8),
 }
 
+/// The first bit of communication faults in a set of faults.
+const COMMUNICATION: u8 = 32;
+
 impl Fault {
-    pub(crate) const ALL: [Fault; 16] = [
+    /// Those that exist once.
+    const SINGLE: [Fault; 16] = [
         Fault::SensorClock,
         Fault::SensorBoot,
         Fault::SensorBreak,
@@ -58,40 +63,82 @@ impl Fault {
         Fault::BusOffRecovered,
     ];
 
-    /// Emergency error code: CiA 301, table 26, and the manufacturer's codes of the device classes 50xxh, 61xxh, 63xxh and 80xxh.
+    fn all() -> impl Iterator<Item = Fault> {
+        Fault::SINGLE.into_iter().chain((0..4).map(Fault::Heartbeat))
+    }
+
+    /// Its bit in a set of faults, and its emergency error code: CiA 301, table 26, and the codes of the classes 50xxh,
+    /// 61xxh, 63xxh and 80xxh that are the manufacturer's.
+    const fn definition(self) -> (u8, u16) {
+        match self {
+            Fault::ModuleInitialisation => (0, 0x5001),
+            Fault::HardwareIdentification => (1, 0x5002),
+            Fault::ParameterStore => (2, 0x5003),
+            Fault::SensorClock => (3, 0x5004),
+            Fault::SensorBoot => (4, 0x5005),
+            Fault::SensorBreak => (5, 0x5006),
+            Fault::SensorMemory => (6, 0x5007),
+            Fault::UnexpectedReset => (7, 0x6101),
+            Fault::BootData => (8, 0x6301),
+            Fault::CommunicationData => (9, 0x6302),
+            Fault::ApplicationData => (10, 0x6303),
+            Fault::TemperatureRail => (11, 0x8001),
+            Fault::PressureRail => (12, 0x8002),
+            Fault::Overrun => (COMMUNICATION, 0x8110),
+            Fault::ErrorPassive => (COMMUNICATION + 1, 0x8120),
+            Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),
+            Fault::Heartbeat(number) => (COMMUNICATION + 8 + (number & 3), 0x8130),
+        }
+    }
+
+    /// Emergency error code.
     #[must_use]
     pub const fn code(self) -> u16 {
-        match self {
-            Fault::ModuleInitialisation => 0x5001,
-            Fault::HardwareIdentification => 0x5002,
-            Fault::ParameterStore => 0x5003,
-            Fault::SensorClock => 0x5004,
-            Fault::SensorBoot => 0x5005,
-            Fault::SensorBreak => 0x5006,
-            Fault::SensorMemory => 0x5007,
-            Fault::UnexpectedReset => 0x6101,
-            Fault::BootData => 0x6301,
-            Fault::CommunicationData => 0x6302,
-            Fault::ApplicationData => 0x6303,
-            Fault::TemperatureRail => 0x8001,
-            Fault::PressureRail => 0x8002,
-            Fault::Overrun => 0x8110,
-            Fault::ErrorPassive => 0x8120,
-            Fault::BusOffRecovered => 0x8140,
-        }
+        self.definition().1
     }
 
-    /// Its bits of the error register (1001h): the generic bit always, the communication bit for 81xxh and 82xxh.
+    /// Manufacturer-specific error field: which one, from 1, of those that exist several times.
     #[must_use]
-    pub const fn register(self) -> u8 {
-        match self.code() >> 8 {
-            0x81 | 0x82 => 0x11,
-            _ => 0x01,
+    pub const fn detail(self) -> [u8; 5] {
+        match self {
+            Fault::Heartbeat(number) => [number.saturating_add(1), 0, 0, 0, 0],
+            _ => [0; 5],
         }
     }
+}
 
-    pub(crate) const fn bit(self) -> u32 {
-        1 << self as u8
+/// A set of faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FaultSet(u64);
+
+impl FaultSet {
+    pub(crate) const EMPTY: FaultSet = FaultSet(0);
+
+    /// Whether it is new.
+    pub(crate) fn insert(&mut self, fault: Fault) -> bool {
+        let before = self.0;
+        self.0 |= 1 << fault.definition().0;
+        self.0 != before
+    }
+
+    /// Whether it was there.
+    pub(crate) fn remove(&mut self, fault: Fault) -> bool {
+        let before = self.0;
+        self.0 &= !(1 << fault.definition().0);
+        self.0 != before
+    }
+
+    pub(crate) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    pub(crate) fn iter(self) -> impl Iterator<Item = Fault> {
+        Fault::all().filter(move |fault| self.0 & 1 << fault.definition().0 != 0)
+    }
+
+    /// The error register (1001h): the generic bit for any fault, the communication bit for those of communication.
+    pub(crate) fn register(self) -> u8 {
+        u8::from(self.0 != 0) | u8::from(self.0 >> COMMUNICATION != 0) << 4
     }
 }
 
@@ -100,9 +147,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_has_its_own_bit_and_code() {
-        for (i, a) in Fault::ALL.iter().enumerate() {
-            assert!(Fault::ALL.iter().skip(i + 1).all(|b| a.code() != b.code() && a.bit() != b.bit()));
+    fn every_fault_has_its_own_bit() {
+        let mut set = FaultSet::default();
+        assert!(Fault::all().all(|fault| set.insert(fault)));
+        assert!(set.iter().eq(Fault::all()));
+        assert!(Fault::all().all(|fault| set.remove(fault)));
+        assert!(set.is_empty());
+    }
+
+    #[test]
+    fn the_register_tells_communication_from_the_rest() {
+        let mut set = FaultSet::default();
+        assert_eq!(set.register(), 0);
+        set.insert(Fault::SensorBreak);
+        assert_eq!(set.register(), 0x01);
+        for fault in Fault::all().filter(|fault| fault.code() >= 0x8100) {
+            let mut set = FaultSet::default();
+            set.insert(fault);
+            assert_eq!(set.register(), 0x11, "{fault:?}");
         }
     }
 }

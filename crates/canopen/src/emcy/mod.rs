@@ -6,5 +6,6 @@ mod message;
 mod producer;
 
 pub use fault::Fault;
+use fault::FaultSet;
 pub use message::Message;
 pub(crate) use producer::{Producer, check_cob_id};

@@ -1,7 +1,7 @@
 //! The EMCY producer: keeps the set of faults, sends what changes.
 
 use super::history::History;
-use super::{Fault, Message};
+use super::{Fault, FaultSet, Message};
 use crate::sdo::Abort;
 use crate::transmit::RETRY;
 use crate::{CobId, Frame, Instant, Transmit};
@@ -15,7 +15,7 @@ const WAITING: usize = 8;
 pub(crate) struct Producer {
     /// 1014h; `None` while bit 31 says that there is no EMCY.
     id: Option<CobId>,
-    active: u32,
+    active: FaultSet,
     history: History,
     waiting: Deque<Message, WAITING>,
     due: Instant,
@@ -23,7 +23,13 @@ pub(crate) struct Producer {
 
 impl Producer {
     pub(crate) const fn new() -> Producer {
-        Producer { id: None, active: 0, history: History::new(), waiting: Deque::new(), due: Instant::NEVER }
+        Producer {
+            id: None,
+            active: FaultSet::EMPTY,
+            history: History::new(),
+            waiting: Deque::new(),
+            due: Instant::NEVER,
+        }
     }
 
     /// Takes the COB-ID of 1014h. Bit 31 set means that EMCY does not exist.
@@ -37,35 +43,30 @@ impl Producer {
         self.waiting.clear();
         self.due = Instant::NEVER;
         let active = core::mem::take(&mut self.active);
-        for fault in Fault::ALL.into_iter().filter(|fault| active & fault.bit() != 0) {
+        for fault in active.iter() {
             self.raise(fault, now);
         }
     }
 
     /// Whether it is a new fault.
     pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
-        if self.active & fault.bit() != 0 {
-            return false;
+        let is_new = self.active.insert(fault);
+        if is_new {
+            self.history.push(fault.code());
+            self.report(fault.code(), fault.detail(), now);
         }
-        self.active |= fault.bit();
-        self.history.push(fault.code());
-        self.report(fault.code(), now);
-        true
+        is_new
     }
 
     /// Code 0000h is sent when the last fault is gone.
     pub(crate) fn clear(&mut self, fault: Fault, now: Instant) {
-        if self.active & fault.bit() == 0 {
-            return;
-        }
-        self.active &= !fault.bit();
-        if self.active == 0 {
-            self.report(0, now);
+        if self.active.remove(fault) && self.active.is_empty() {
+            self.report(0, [0; 5], now);
         }
     }
 
-    fn report(&mut self, code: u16, now: Instant) {
-        let message = Message { code, register: self.register(), detail: [0; 5] };
+    fn report(&mut self, code: u16, detail: [u8; 5], now: Instant) {
+        let message = Message { code, register: self.register(), detail };
         // A full queue keeps the older messages: they tell how the trouble began.
         let _ = self.waiting.push_back(message);
         self.due = self.due.min(now);
@@ -73,8 +74,7 @@ impl Producer {
 
     /// The error register, object 1001h.
     pub(crate) fn register(&self) -> u8 {
-        let is_active = |fault: &Fault| self.active & fault.bit() != 0;
-        Fault::ALL.into_iter().filter(is_active).fold(0, |register, fault| register | fault.register())
+        self.active.register()
     }
 
     pub(crate) fn history(&self) -> &History {

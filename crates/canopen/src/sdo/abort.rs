@@ -28,6 +28,8 @@ pub enum Abort {
     NotMappable = 0x0604_0041,
     /// The mapped objects are longer than a PDO.
     PdoLength = 0x0604_0042,
+    /// The value contradicts that of another parameter.
+    Parameter = 0x0604_0043,
     /// The length of the data does not match the type.
     Length = 0x0607_0010,
     /// The data is longer than the type.

@@ -26,6 +26,11 @@ const ROWS: &[Object] = &[
     Object::new(0x1008, 0, "", Type::VisibleString(32), Access::Const)
         .default(DefaultValue::Text("a name of twenty-six chars")),
     parameter(0x1014, 0, Type::Unsigned32).default(DefaultValue::NodeId(0x80)).rule(Rule::EmcyCobId),
+    Object::highest(0x1016, 4, ""),
+    parameter(0x1016, 1, Type::Unsigned32).rule(Rule::HeartbeatWatch),
+    parameter(0x1016, 2, Type::Unsigned32).rule(Rule::HeartbeatWatch),
+    parameter(0x1016, 3, Type::Unsigned32).rule(Rule::HeartbeatWatch),
+    parameter(0x1016, 4, Type::Unsigned32).rule(Rule::HeartbeatWatch),
     parameter(0x1017, 0, Type::Unsigned16).value(1000).rule(Rule::HeartbeatTime),
     Object::highest(0x1029, 2, ""),
     parameter(0x1029, 1, Type::Unsigned8).limits(0, 254),

@@ -1,7 +1,8 @@
-//! Heartbeat producer, 1017h.
+//! Heartbeat producer, 1017h, and consumer, 1016h.
 
 use crate::bench::Bench;
-use canopen::{Duration, Instant};
+use canopen::nmt::State;
+use canopen::{Duration, Frame, Instant};
 
 #[test]
 fn heartbeats_keep_their_grid() {
@@ -56,4 +57,75 @@ fn an_idle_poll_gives_the_cached_deadline() {
     let due = bench.poll();
     assert_eq!(due, Instant(2_000_000));
     assert_eq!(bench.poll(), due);
+}
+
+/// A heartbeat of another node.
+fn beat(bench: &mut Bench, node: u16) {
+    bench.receive(Frame::new(0x700 + node, &[5]).unwrap());
+}
+
+fn emergencies(bench: &mut Bench) -> Vec<(u8, u8, u8)> {
+    let messages = bench.sent().into_iter().filter(|(id, _)| *id == 0x085);
+    messages.map(|(_, data)| (data[0], data[1], data[3])).collect()
+}
+
+#[test]
+fn a_node_is_watched_from_its_first_heartbeat_on() {
+    let mut bench = Bench::operational();
+    bench.write32(0x1016, 1, 0x0009_0064).unwrap();
+    bench.run(Duration::from_millis(500));
+    assert_eq!((emergencies(&mut bench), bench.device.state()), (vec![], State::Operational));
+    beat(&mut bench, 9);
+    bench.run(Duration(99_999));
+    assert_eq!(emergencies(&mut bench), []);
+    bench.run(Duration(1));
+    assert_eq!(emergencies(&mut bench), [(0x30, 0x81, 1)]);
+    assert_eq!(bench.device.state(), State::PreOperational);
+    bench.run(Duration::from_millis(500));
+    beat(&mut bench, 9);
+    assert_eq!(emergencies(&mut bench), [(0, 0, 0)]);
+}
+
+#[test]
+fn each_node_is_watched_on_its_own() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1016, 1, 0x0009_0064).unwrap();
+    bench.write32(0x1016, 4, 0x000A_0064).unwrap();
+    beat(&mut bench, 9);
+    beat(&mut bench, 10);
+    bench.run(Duration::from_millis(100));
+    assert_eq!(emergencies(&mut bench), [(0x30, 0x81, 1), (0x30, 0x81, 4)]);
+    beat(&mut bench, 10);
+    assert_eq!(emergencies(&mut bench), []);
+    beat(&mut bench, 9);
+    assert_eq!(emergencies(&mut bench), [(0, 0, 0)]);
+}
+
+#[test]
+fn what_is_no_heartbeat_does_not_count() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1016, 1, 0x0009_0064).unwrap();
+    bench.receive(Frame::new(0x709, &[5, 0]).unwrap());
+    bench.receive(Frame::remote(0x709, 1).unwrap());
+    bench.receive(Frame::new(0x70A, &[5]).unwrap());
+    bench.run(Duration::from_millis(500));
+    assert_eq!(emergencies(&mut bench), []);
+}
+
+#[test]
+fn entries_are_checked_and_an_unused_one_ends_the_watch() {
+    let mut bench = Bench::booted();
+    assert_eq!(bench.write32(0x1016, 1, 0x0109_0064), Err(0x0609_0030));
+    bench.write32(0x1016, 1, 0x0009_0064).unwrap();
+    assert_eq!(bench.write32(0x1016, 2, 0x0009_0032), Err(0x0604_0043));
+    assert_eq!(bench.write32(0x1016, 1, 0x0009_0032), Ok(()));
+    assert!(bench.device.service_ids().any(|id| id.get() == 0x709));
+    beat(&mut bench, 9);
+    bench.run(Duration::from_millis(50));
+    assert_eq!(emergencies(&mut bench), [(0x30, 0x81, 1)]);
+    for unused in [0x0009_0000, 0x0000_0064, 0x0080_0064] {
+        assert_eq!(bench.write32(0x1016, 1, unused), Ok(()));
+        assert!(!bench.device.service_ids().any(|id| id.get() == 0x709));
+    }
+    assert_eq!(emergencies(&mut bench), [(0, 0, 0)]);
 }

@@ -1,4 +1,4 @@
-//! Heartbeat producer and the boot-up message (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
+//! The producer and the boot-up message (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
 
 use crate::nmt::State;
 use crate::transmit::RETRY;

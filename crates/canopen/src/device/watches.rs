@@ -1,0 +1,70 @@
+//! The heartbeats of other nodes: object 1016h and what follows when one is missing.
+
+use super::{Application, Core, Device};
+use crate::dictionary::Entry;
+use crate::emcy::Fault;
+use crate::heartbeat::{Change, WATCHES, Watch};
+use crate::sdo::Abort;
+use crate::{Frame, Instant};
+
+const CONSUMER_TIME: u16 = 0x1016;
+/// Sub-index of 1029h for communication errors.
+const COMMUNICATION_ERROR: u8 = 1;
+
+impl<A: Application, const N: usize> Device<A, N> {
+    /// Looks for heartbeats that are missing.
+    pub(super) fn poll_watches(&mut self, now: Instant) {
+        if self.core.is_initialising() {
+            return;
+        }
+        while let Some(change) = self.core.watches.expire(now) {
+            self.core.on_watch(change, now);
+            self.apply_error_behaviour(COMMUNICATION_ERROR);
+        }
+    }
+}
+
+impl<A: Application, const N: usize> Core<A, N> {
+    pub(super) fn on_heartbeat(&mut self, frame: &Frame, now: Instant) {
+        if self.is_initialising() {
+            return;
+        }
+        if let Some(change) = self.watches.take(frame, now) {
+            self.on_watch(change, now);
+        }
+        self.services_due = self.services_due.min(self.watches.due());
+    }
+
+    fn on_watch(&mut self, change: Change, now: Instant) {
+        match change {
+            Change::Lost(number) => self.raise(Fault::Heartbeat(number), now),
+            Change::Back(number) => self.clear(Fault::Heartbeat(number), now),
+        }
+    }
+
+    /// Bits 24..31 are reserved; a node is watched once.
+    pub(super) fn admit_watch(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        if value >> 24 != 0 {
+            return Err(Abort::InvalidValue);
+        }
+        let Some(watch) = Watch::parse(value) else { return Ok(()) };
+        let mut others = (1..=WATCHES).filter(|&sub| sub != entry.sub());
+        let is_double = |sub| self.watch(sub).is_some_and(|other| other.node == watch.node);
+        if others.any(is_double) { Err(Abort::Parameter) } else { Ok(()) }
+    }
+
+    fn watch(&self, sub: u8) -> Option<Watch> {
+        Watch::parse(self.number(CONSUMER_TIME, sub))
+    }
+
+    /// A new watch knows of no fault yet.
+    pub(super) fn configure_watch(&mut self, sub: u8, now: Instant) {
+        let number = sub.saturating_sub(1);
+        self.watches.configure(number.into(), self.watch(sub));
+        self.clear(Fault::Heartbeat(number), now);
+    }
+
+    pub(super) fn configure_watches(&mut self, now: Instant) {
+        (1..=WATCHES).for_each(|sub| self.configure_watch(sub, now));
+    }
+}

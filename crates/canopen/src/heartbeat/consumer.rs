@@ -1,0 +1,92 @@
+//! The consumer (CiA 301, 7.2.8.2.2.2): watches the heartbeats of other nodes.
+
+use crate::{CanId, Duration, Frame, Instant, NodeId};
+
+/// How many nodes can be watched: entries of 1016h.
+pub(crate) const WATCHES: u8 = 4;
+
+/// An entry of 1016h: whose heartbeat must come how often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Watch {
+    pub(crate) node: NodeId,
+    period: Duration,
+}
+
+impl Watch {
+    /// From bits 0..15 (time in ms) and 16..23 (node-ID). `None` for an entry that is not used: time 0, or no node-ID.
+    pub(crate) fn parse(value: u32) -> Option<Watch> {
+        let [low, high, node, _] = value.to_le_bytes();
+        let period = Duration::from_millis(u16::from_le_bytes([low, high]).into());
+        NodeId::new(node).filter(|_| !period.is_zero()).map(|node| Watch { node, period })
+    }
+
+    fn id(self) -> CanId {
+        self.node.service(0x700)
+    }
+}
+
+/// A change in what the consumer knows about a node, with the number of its entry from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Change {
+    /// Its heartbeat did not come in time.
+    Lost(u8),
+    /// Its heartbeat is there again.
+    Back(u8),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    watch: Watch,
+    /// `NEVER` until the first heartbeat, and while it is lost.
+    due: Instant,
+    is_lost: bool,
+}
+
+/// Watches up to [`WATCHES`] nodes. Each is watched from its first heartbeat on.
+#[derive(Debug)]
+pub(crate) struct Consumer {
+    entries: [Option<Entry>; WATCHES as usize],
+}
+
+impl Consumer {
+    pub(crate) const fn new() -> Consumer {
+        Consumer { entries: [None; WATCHES as usize] }
+    }
+
+    /// Takes an entry of 1016h, from 0. The watch starts afresh.
+    pub(crate) fn configure(&mut self, number: usize, watch: Option<Watch>) {
+        if let Some(entry) = self.entries.get_mut(number) {
+            *entry = watch.map(|watch| Entry { watch, due: Instant::NEVER, is_lost: false });
+        }
+    }
+
+    /// Identifiers of the heartbeats that it watches.
+    pub(crate) fn ids(&self) -> impl Iterator<Item = CanId> {
+        self.entries.iter().flatten().map(|entry| entry.watch.id())
+    }
+
+    fn numbered(&mut self) -> impl Iterator<Item = (u8, &mut Entry)> {
+        (0..).zip(&mut self.entries).filter_map(|(number, entry)| Some((number, entry.as_mut()?)))
+    }
+
+    /// Takes a heartbeat or a boot-up message.
+    pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Option<Change> {
+        let is_heartbeat = frame.len() == 1 && !frame.is_remote();
+        let (number, entry) =
+            self.numbered().find(|(_, entry)| is_heartbeat && entry.watch.id().get() == frame.id())?;
+        entry.due = now + entry.watch.period;
+        core::mem::take(&mut entry.is_lost).then_some(Change::Back(number))
+    }
+
+    /// The next instant at which a heartbeat is missing.
+    pub(crate) fn due(&self) -> Instant {
+        self.entries.iter().flatten().map(|entry| entry.due).min().unwrap_or(Instant::NEVER)
+    }
+
+    /// A heartbeat that is missing. To be asked until there is none.
+    pub(crate) fn expire(&mut self, now: Instant) -> Option<Change> {
+        let (number, entry) = self.numbered().find(|(_, entry)| now >= entry.due)?;
+        (entry.due, entry.is_lost) = (Instant::NEVER, true);
+        Some(Change::Lost(number))
+    }
+}

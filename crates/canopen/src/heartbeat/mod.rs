@@ -1,0 +1,7 @@
+//! Heartbeat: the node's own, and those of the nodes that it watches.
+
+mod consumer;
+mod producer;
+
+pub(crate) use consumer::{Change, Consumer, WATCHES, Watch};
+pub(crate) use producer::Producer;
