@@ -1,25 +1,65 @@
-//! SYNC consumer (CiA 301, 7.2.5): which frames are the SYNC.
+//! SYNC consumer (CiA 301, 7.2.5): which frames are the SYNC, whether it comes in time, and the window after it.
 
 use crate::sdo::Abort;
-use crate::{CanId, CobId, Frame};
+use crate::{CanId, CobId, Duration, Frame, Instant};
 
-/// Recognises the SYNC message.
+/// A SYNC message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sync {
+    /// Its counter, where 1019h asks for one.
+    pub(crate) counter: Option<u8>,
+}
+
+/// A SYNC of another length than 1019h asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct WrongLength;
+
+/// What the dictionary says about SYNC.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Settings {
+    /// 1005h.
+    pub(crate) cob_id: u32,
+    /// 1006h: how often it comes; zero when nobody cares.
+    pub(crate) period: Duration,
+    /// 1007h: how long after it synchronous PDOs are good; zero for up to the next.
+    pub(crate) window: Duration,
+    /// 1019h: 0 for no counter.
+    pub(crate) overflow: u8,
+}
+
+/// Recognises the SYNC message and watches its period and its window.
 #[derive(Debug)]
 pub(crate) struct Consumer {
     id: CanId,
+    settings: Settings,
+    /// When the next SYNC is missing; `NEVER` before the first.
+    due: Instant,
+    window_end: Instant,
+    is_missing: bool,
 }
 
 impl Consumer {
-    /// The default of 1005h.
     pub(crate) const fn new() -> Consumer {
-        Consumer { id: CanId::of_service(0x080, 0) }
+        let none = Duration(0);
+        Consumer {
+            id: CanId::of_service(0x080, 0),
+            settings: Settings { cob_id: 0x80, period: none, window: none, overflow: 0 },
+            due: Instant::NEVER,
+            window_end: Instant::NEVER,
+            is_missing: false,
+        }
     }
 
-    /// Takes the COB-ID of 1005h.
-    pub(crate) fn configure(&mut self, value: u32) {
-        if let Some(cob_id) = CobId::parse(value) {
-            self.id = cob_id.id;
-        }
+    /// Takes new settings. The period is watched from the next SYNC on.
+    pub(crate) fn configure(&mut self, settings: Settings) {
+        self.id = CobId::parse(settings.cob_id).map_or(self.id, |cob_id| cob_id.id);
+        self.settings = settings;
+        self.stop();
+    }
+
+    /// Leaving Operational: SYNC means nothing until the next one.
+    pub(crate) fn stop(&mut self) {
+        (self.due, self.window_end, self.is_missing) = (Instant::NEVER, Instant::NEVER, false);
     }
 
     pub(crate) fn id(&self) -> CanId {
@@ -30,10 +70,56 @@ impl Consumer {
     pub(crate) fn accepts(&self, frame: &Frame) -> bool {
         frame.id() == self.id.get() && !frame.is_remote()
     }
+
+    /// Takes a frame that it accepts.
+    pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Result<Sync, WrongLength> {
+        let counter = match (frame.data(), self.settings.overflow) {
+            ([], 0) => None,
+            (&[counter], 1..) => Some(counter),
+            _ => return Err(WrongLength),
+        };
+        let Settings { period, window, .. } = self.settings;
+        self.window_end = if window.is_zero() { Instant::NEVER } else { now + window };
+        // Half a period late is too late.
+        self.due = if period.is_zero() { Instant::NEVER } else { now + Duration(period.0 + period.0 / 2) };
+        Ok(Sync { counter })
+    }
+
+    /// Whether synchronous PDOs come too late for the last SYNC.
+    pub(crate) fn is_window_over(&self, now: Instant) -> bool {
+        now > self.window_end
+    }
+
+    /// The next instant at which a SYNC is missing.
+    pub(crate) fn due(&self) -> Instant {
+        self.due
+    }
+
+    /// Whether a SYNC has just turned out to be missing.
+    pub(crate) fn expire(&mut self, now: Instant) -> bool {
+        let is_missing = now >= self.due;
+        if is_missing {
+            (self.due, self.is_missing) = (Instant::NEVER, true);
+        }
+        is_missing
+    }
+
+    /// Whether it was missing until now.
+    pub(crate) fn is_back(&mut self) -> bool {
+        core::mem::take(&mut self.is_missing)
+    }
 }
 
 /// Checks a new value of 1005h. Bit 30 would make the node a producer, which it is not; bit 31 has no meaning.
 pub(crate) fn check_cob_id(value: u32) -> Result<(), Abort> {
     let cob_id = CobId::parse(value).ok_or(Abort::InvalidValue)?;
     if cob_id.bit30 || cob_id.id.is_restricted() { Err(Abort::InvalidValue) } else { Ok(()) }
+}
+
+/// Checks a new value of 1019h, which is fixed while there is a period (1006h).
+pub(crate) fn check_overflow(value: u32, period: u32) -> Result<(), Abort> {
+    if period != 0 {
+        return Err(Abort::DeviceState);
+    }
+    if matches!(value, 0 | 2..=240) { Ok(()) } else { Err(Abort::InvalidValue) }
 }

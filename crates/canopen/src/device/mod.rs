@@ -8,6 +8,7 @@ mod objects;
 mod process;
 mod services;
 mod state;
+mod syncs;
 mod tpdos;
 mod watches;
 

@@ -91,12 +91,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         match entry.rule {
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
             Rule::SyncCobId => sync::check_cob_id(value),
+            Rule::SyncOverflow => sync::check_overflow(value, self.number(0x1006, 0)),
             Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
             Rule::TpdoCobId => self.admit_tpdo_cob_id(entry, value),
             Rule::TpdoType => self.admit_tpdo_type(entry, value),
-            Rule::TpdoInhibit if self.tpdo_is_valid(entry) => Err(Abort::InvalidValue),
+            Rule::TpdoInhibit | Rule::TpdoSyncStart if self.tpdo_is_valid(entry) => Err(Abort::InvalidValue),
             Rule::TpdoCount => self.admit_tpdo_count(entry, value),
             Rule::TpdoSlot => self.admit_tpdo_slot(entry, value),
             Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
@@ -111,11 +112,18 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
             Rule::ErrorCount => self.emcy.clear_history(),
-            Rule::SyncCobId => self.sync.configure(value),
+            Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
+                self.configure_sync(now);
+            }
+            Rule::EmcyInhibit => self.emcy.set_inhibit(Duration::from_inhibit(value)),
             Rule::EmcyCobId => self.emcy.configure(value),
             Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
-            Rule::TpdoCobId | Rule::TpdoType | Rule::TpdoInhibit | Rule::TpdoEventTimer => {
+            Rule::TpdoCobId
+            | Rule::TpdoType
+            | Rule::TpdoInhibit
+            | Rule::TpdoEventTimer
+            | Rule::TpdoSyncStart => {
                 self.configure_tpdo(super::tpdos::number(entry));
             }
             _ => (),

@@ -28,10 +28,11 @@ impl<A: Application, const N: usize> Device<A, N> {
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         let core = &mut self.core;
         if now >= core.process_due {
+            core.poll_sync(now);
             for tpdo in &mut core.tpdos {
                 tpdo.poll(&core.image, now, out);
             }
-            core.process_due = core.tpdos.iter().map(Tpdo::due).min().unwrap_or(Instant::NEVER);
+            core.process_due = core.tpdos.iter().map(Tpdo::due).fold(core.sync.due(), Instant::min);
         }
         core.process_due
     }
@@ -53,7 +54,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 impl<A: Application, const N: usize> Core<A, N> {
     fn on_pdo_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         if self.sync.accepts(frame) {
-            self.each_tpdo(|tpdo, image| tpdo.on_sync(image, now, out));
+            self.on_sync(frame, now, out);
         } else if frame.is_remote() {
             self.each_tpdo(|tpdo, image| {
                 if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
@@ -64,7 +65,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     /// What a TPDO could not send at once moves the next deadline.
-    fn each_tpdo(&mut self, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
+    pub(super) fn each_tpdo(&mut self, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
         for tpdo in &mut self.tpdos {
             visit(tpdo, &self.image);
             if tpdo.is_pending() {

@@ -129,6 +129,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             return;
         }
         self.state = state;
+        self.sync.stop();
         for tpdo in &mut self.tpdos {
             if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
         }
@@ -157,8 +158,9 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Gives every protocol its parameters.
     fn configure(&mut self, now: Instant) {
-        self.sync.configure(self.number(0x1005, 0));
+        self.configure_sync(now);
         self.emcy.configure(self.number_or(0x1014, 0, NO_EMCY));
+        self.emcy.set_inhibit(Duration::from_inhibit(self.number(0x1015, 0)));
         self.configure_watches(now);
         self.emcy.restart(now);
         self.update_error_register();

@@ -34,6 +34,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         let mut settings = Settings::new(cob_id, low_byte(parameter(2)))?;
         settings.inhibit = Duration::from_inhibit(parameter(3));
         settings.event = Duration::from_millis(parameter(5).into());
+        settings.sync_start = low_byte(parameter(6));
         settings.layout = self.tpdo_layout(number, self.number(MAPPING | number, 0)).ok()?;
         Some(settings)
     }

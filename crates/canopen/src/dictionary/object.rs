@@ -77,12 +77,20 @@ pub enum Rule {
     ErrorEntry,
     /// 1005h, COB-ID of SYNC.
     SyncCobId,
+    /// 1006h, communication cycle period.
+    SyncPeriod,
+    /// 1007h, synchronous window length.
+    SyncWindow,
     /// 1014h, COB-ID of EMCY.
     EmcyCobId,
+    /// 1015h, inhibit time of EMCY.
+    EmcyInhibit,
     /// 1016h:1 and up, a node whose heartbeat is watched.
     HeartbeatWatch,
     /// 1017h, heartbeat producer time.
     HeartbeatTime,
+    /// 1019h, synchronous counter overflow value.
+    SyncOverflow,
     /// 1F80h, NMT start-up.
     StartUp,
     /// 1800h..:1, COB-ID of a TPDO.
@@ -93,6 +101,8 @@ pub enum Rule {
     TpdoInhibit,
     /// 1800h..:5, event timer.
     TpdoEventTimer,
+    /// 1800h..:6, SYNC start value.
+    TpdoSyncStart,
     /// 1A00h..:0, number of mapped objects.
     TpdoCount,
     /// 1A00h..:1 and up, a mapped object.

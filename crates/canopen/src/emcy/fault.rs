@@ -35,6 +35,10 @@ pub enum Fault {
     ErrorPassive,
     /// The CAN controller was off the bus and is back.
     BusOffRecovered,
+    /// SYNC does not come in its period.
+    SyncMissing,
+    /// A SYNC of another length than 1019h asks for.
+    SyncLength,
     /// The heartbeat of a node is missing: entry of 1016h, from 0.
     Heartbeat(u8),
 }
@@ -44,7 +48,7 @@ const COMMUNICATION: u8 = 32;
 
 impl Fault {
     /// Those that exist once.
-    const SINGLE: [Fault; 16] = [
+    const SINGLE: [Fault; 18] = [
         Fault::SensorClock,
         Fault::SensorBoot,
         Fault::SensorBreak,
@@ -61,6 +65,8 @@ impl Fault {
         Fault::Overrun,
         Fault::ErrorPassive,
         Fault::BusOffRecovered,
+        Fault::SyncMissing,
+        Fault::SyncLength,
     ];
 
     fn all() -> impl Iterator<Item = Fault> {
@@ -87,6 +93,8 @@ impl Fault {
             Fault::Overrun => (COMMUNICATION, 0x8110),
             Fault::ErrorPassive => (COMMUNICATION + 1, 0x8120),
             Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),
+            Fault::SyncMissing => (COMMUNICATION + 3, 0x8100),
+            Fault::SyncLength => (COMMUNICATION + 4, 0x8240),
             Fault::Heartbeat(number) => (COMMUNICATION + 8 + (number & 3), 0x8130),
         }
     }

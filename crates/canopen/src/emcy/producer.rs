@@ -4,7 +4,7 @@ use super::history::History;
 use super::{Fault, FaultSet, Message};
 use crate::sdo::Abort;
 use crate::transmit::RETRY;
-use crate::{CobId, Frame, Instant, Transmit};
+use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
 /// Messages that can wait for the queue or for the inhibit time; what comes on top of that is only in the history.
@@ -18,6 +18,10 @@ pub(crate) struct Producer {
     active: FaultSet,
     history: History,
     waiting: Deque<Message, WAITING>,
+    /// 1015h.
+    inhibit: Duration,
+    /// The end of the inhibit time after the last message.
+    inhibited_until: Instant,
     due: Instant,
 }
 
@@ -28,6 +32,8 @@ impl Producer {
             active: FaultSet::EMPTY,
             history: History::new(),
             waiting: Deque::new(),
+            inhibit: Duration(0),
+            inhibited_until: Instant(0),
             due: Instant::NEVER,
         }
     }
@@ -35,6 +41,11 @@ impl Producer {
     /// Takes the COB-ID of 1014h. Bit 31 set means that EMCY does not exist.
     pub(crate) fn configure(&mut self, value: u32) {
         self.id = CobId::parse(value).filter(|cob_id| !cob_id.bit31);
+    }
+
+    /// Takes the inhibit time of 1015h, from the next message on.
+    pub(crate) fn set_inhibit(&mut self, inhibit: Duration) {
+        self.inhibit = inhibit;
     }
 
     /// After a reset: the list is empty, and the faults that are still there are news again.
@@ -69,7 +80,7 @@ impl Producer {
         let message = Message { code, register: self.register(), detail };
         // A full queue keeps the older messages: they tell how the trouble began.
         let _ = self.waiting.push_back(message);
-        self.due = self.due.min(now);
+        self.due = self.due.min(self.inhibited_until.max(now));
     }
 
     /// The error register, object 1001h.
@@ -106,6 +117,11 @@ impl Producer {
                 return;
             }
             let _ = self.waiting.pop_front();
+            if !self.inhibit.is_zero() {
+                self.inhibited_until = now + self.inhibit;
+                self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
+                return;
+            }
         }
         self.due = Instant::NEVER;
     }

@@ -5,6 +5,7 @@
 //! Entering Operational is an event in both cases.
 
 use super::{Layout, Transmission};
+use crate::sync::Sync;
 use crate::transmit::RETRY;
 use crate::{CanId, CobId, Duration, Frame, Instant, Transmit};
 
@@ -17,6 +18,8 @@ pub(crate) struct Settings {
     pub(crate) transmission: Transmission,
     pub(crate) inhibit: Duration,
     pub(crate) event: Duration,
+    /// SYNC counter with which the count of SYNCs begins; 0 for any.
+    pub(crate) sync_start: u8,
     pub(crate) layout: Layout,
 }
 
@@ -30,6 +33,7 @@ impl Settings {
             transmission: Transmission::parse(transmission)?,
             inhibit: Duration(0),
             event: Duration(0),
+            sync_start: 0,
             layout: Layout::default(),
         })
     }
@@ -47,6 +51,8 @@ pub(crate) struct Tpdo {
     pending: bool,
     /// SYNCs since the last transmission.
     syncs: u8,
+    /// The SYNC with the start value has come.
+    is_counting: bool,
     /// Data as last sent, or as sampled with SYNC for type 252.
     data: Option<[u8; 8]>,
     /// When the event timer elapses.
@@ -61,6 +67,7 @@ impl Tpdo {
             settings: None,
             pending: false,
             syncs: 0,
+            is_counting: false,
             data: None,
             event_due: Instant::NEVER,
             inhibited_until: Instant(0),
@@ -89,7 +96,7 @@ impl Tpdo {
 
     /// Leaving Operational: nothing is due, a PDO that waits is dropped.
     pub(crate) fn stop(&mut self) {
-        (self.pending, self.syncs, self.data) = (false, 0, None);
+        (self.pending, self.syncs, self.is_counting, self.data) = (false, 0, false, None);
         (self.event_due, self.inhibited_until) = (Instant::NEVER, Instant(0));
     }
 
@@ -99,10 +106,15 @@ impl Tpdo {
     }
 
     /// A SYNC arrived.
-    pub(crate) fn on_sync(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], now: Instant, out: &mut impl Transmit) {
         let Some(settings) = &self.settings else { return };
         match settings.transmission {
             Transmission::SyncCyclic(every) => {
+                self.is_counting |=
+                    sync.counter.is_none_or(|counter| [0, counter].contains(&settings.sync_start));
+                if !self.is_counting {
+                    return;
+                }
                 self.syncs = self.syncs.saturating_add(1);
                 if self.syncs >= every.get() {
                     self.syncs = 0;
@@ -136,6 +148,12 @@ impl Tpdo {
             self.pending = true;
             self.poll(image, now, out);
         }
+    }
+
+    /// The synchronous window is over: a synchronous PDO that still waits for room would be taken for one of the next.
+    pub(crate) fn drop_synchronous(&mut self) {
+        let kind = self.settings.as_ref().map(|settings| settings.transmission);
+        self.pending &= !matches!(kind, Some(Transmission::SyncAcyclic | Transmission::SyncCyclic(_)));
     }
 
     fn has_changed(&self, image: &[u8]) -> bool {

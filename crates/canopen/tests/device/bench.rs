@@ -23,23 +23,28 @@ const ROWS: &[Object] = &[
     Object::new(0x1003, 1, "", Type::Unsigned32, Access::ReadOnly).rule(Rule::ErrorEntry),
     Object::new(0x1003, 2, "", Type::Unsigned32, Access::ReadOnly).rule(Rule::ErrorEntry),
     parameter(0x1005, 0, Type::Unsigned32).value(0x80).rule(Rule::SyncCobId),
+    parameter(0x1006, 0, Type::Unsigned32).rule(Rule::SyncPeriod),
+    parameter(0x1007, 0, Type::Unsigned32).rule(Rule::SyncWindow),
     Object::new(0x1008, 0, "", Type::VisibleString(32), Access::Const)
         .default(DefaultValue::Text("a name of twenty-six chars")),
     parameter(0x1014, 0, Type::Unsigned32).default(DefaultValue::NodeId(0x80)).rule(Rule::EmcyCobId),
+    parameter(0x1015, 0, Type::Unsigned16).rule(Rule::EmcyInhibit),
     Object::highest(0x1016, 4, ""),
     parameter(0x1016, 1, Type::Unsigned32).rule(Rule::HeartbeatWatch),
     parameter(0x1016, 2, Type::Unsigned32).rule(Rule::HeartbeatWatch),
     parameter(0x1016, 3, Type::Unsigned32).rule(Rule::HeartbeatWatch),
     parameter(0x1016, 4, Type::Unsigned32).rule(Rule::HeartbeatWatch),
     parameter(0x1017, 0, Type::Unsigned16).value(1000).rule(Rule::HeartbeatTime),
+    parameter(0x1019, 0, Type::Unsigned8).limits(0, 240).rule(Rule::SyncOverflow),
     Object::highest(0x1029, 2, ""),
     parameter(0x1029, 1, Type::Unsigned8).limits(0, 254),
     parameter(0x1029, 2, Type::Unsigned8).limits(0, 2),
-    Object::highest(0x1800, 5, ""),
+    Object::highest(0x1800, 6, ""),
     parameter(0x1800, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x180)).rule(Rule::TpdoCobId),
     parameter(0x1800, 2, Type::Unsigned8).value(255).rule(Rule::TpdoType),
     parameter(0x1800, 3, Type::Unsigned16).rule(Rule::TpdoInhibit),
     parameter(0x1800, 5, Type::Unsigned16).value(100).rule(Rule::TpdoEventTimer),
+    parameter(0x1800, 6, Type::Unsigned8).limits(0, 240).rule(Rule::TpdoSyncStart),
     parameter(0x1A00, 0, Type::Unsigned8).limits(0, 4).value(1).rule(Rule::TpdoCount),
     parameter(0x1A00, 1, Type::Unsigned32).value(0x6000_0120).rule(Rule::TpdoSlot),
     parameter(0x1A00, 2, Type::Unsigned32).rule(Rule::TpdoSlot),
@@ -216,6 +221,7 @@ impl Bench {
             let sent = self.take().iter().filter(|frame| frame.id() == id).count();
             times.extend(std::iter::repeat_n(self.now.0 - start.0, sent));
             if due > end {
+                self.now = end;
                 return times;
             }
             self.now = due;

@@ -100,3 +100,18 @@ fn its_identifier_changes_only_while_it_does_not_exist() {
     bench.poll();
     assert_eq!(bench.sent(), [(0x0A0, vec![0x02, 0x80, 1, 0, 0, 0, 0, 0])]);
 }
+
+#[test]
+fn the_inhibit_time_separates_messages() {
+    let mut bench = Bench::booted();
+    bench.write(0x1015, 0, &[50, 0]).unwrap();
+    bench.device.raise(Fault::SensorBreak, bench.now);
+    bench.device.raise(Fault::PressureRail, bench.now);
+    bench.device.raise(Fault::TemperatureRail, bench.now);
+    assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0, 5_000, 10_000]);
+    bench.device.clear(Fault::SensorBreak, bench.now);
+    bench.device.raise(Fault::SensorBreak, bench.now);
+    assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0]);
+    bench.device.raise(Fault::Overrun, bench.now);
+    assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0]);
+}

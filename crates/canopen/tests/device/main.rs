@@ -8,4 +8,5 @@ mod mapping;
 mod nmt;
 mod robustness;
 mod sdo;
+mod sync;
 mod tpdo;

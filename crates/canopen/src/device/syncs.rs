@@ -1,0 +1,44 @@
+//! SYNC in the device: objects 1005h, 1006h, 1007h, 1019h, and what follows from a SYNC.
+
+use super::{Application, Core, STALE};
+use crate::emcy::Fault;
+use crate::sync::Settings;
+use crate::{Duration, Frame, Instant, Transmit};
+
+impl<A: Application, const N: usize> Core<A, N> {
+    pub(super) fn configure_sync(&mut self, now: Instant) {
+        let micros = |value: u32| Duration(value.into());
+        let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
+        self.sync.configure(Settings {
+            cob_id: self.number_or(0x1005, 0, 0x80),
+            period: micros(self.number(0x1006, 0)),
+            window: micros(self.number(0x1007, 0)),
+            overflow,
+        });
+        self.clear(Fault::SyncMissing, now);
+    }
+
+    pub(super) fn on_sync(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        let Ok(sync) = self.sync.take(frame, now) else {
+            self.raise(Fault::SyncLength, now);
+            self.clear(Fault::SyncLength, now);
+            return;
+        };
+        if self.sync.is_back() {
+            self.clear(Fault::SyncMissing, now);
+        }
+        self.each_tpdo(|tpdo, image| tpdo.on_sync(sync, image, now, out));
+        self.process_due = self.process_due.min(self.sync.due());
+    }
+
+    /// Looks for a SYNC that is missing, and drops what the synchronous window no longer lets out.
+    pub(super) fn poll_sync(&mut self, now: Instant) {
+        if self.sync.expire(now) {
+            self.raise(Fault::SyncMissing, now);
+            self.process_due = STALE;
+        }
+        if self.sync.is_window_over(now) {
+            self.tpdos.iter_mut().for_each(crate::pdo::Tpdo::drop_synchronous);
+        }
+    }
+}

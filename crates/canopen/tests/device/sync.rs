@@ -1,0 +1,113 @@
+//! SYNC with a counter, a period and a window: 1006h, 1007h, 1019h and 1800h:6.
+
+use crate::bench::Bench;
+use canopen::{Duration, Frame};
+
+const TPDO: u16 = 0x185;
+
+/// An operational device with a TPDO of type `every`, whose SYNC has a counter up to 10 if `counts`.
+fn bench(every: u8, start: u8, counts: bool) -> Bench {
+    let mut bench = Bench::booted();
+    bench.write32(0x1800, 1, 0x8000_0185).unwrap();
+    bench.write(0x1800, 2, &[every]).unwrap();
+    bench.write(0x1800, 6, &[start]).unwrap();
+    bench.write32(0x1800, 1, 0x0000_0185).unwrap();
+    bench.write(0x1019, 0, &[if counts { 10 } else { 0 }]).unwrap();
+    bench.nmt(1);
+    bench.take();
+    bench
+}
+
+fn sync(bench: &mut Bench, counter: u8) -> bool {
+    bench.receive(Frame::new(0x80, &[counter]).unwrap());
+    bench.take().iter().any(|frame| frame.id() == TPDO)
+}
+
+fn emergencies(bench: &mut Bench) -> Vec<u16> {
+    let messages = bench.sent().into_iter().filter(|(id, _)| *id == 0x085);
+    messages.map(|(_, data)| u16::from_le_bytes([data[0], data[1]])).collect()
+}
+
+#[test]
+fn the_count_begins_with_the_start_value() {
+    let mut bench = bench(2, 5, true);
+    let sent: Vec<_> = (1..=10).filter(|&counter| sync(&mut bench, counter)).collect();
+    assert_eq!(sent, [6, 8, 10]);
+}
+
+#[test]
+fn without_a_counter_or_a_start_value_every_sync_counts() {
+    let mut bench = bench(1, 0, true);
+    assert!(sync(&mut bench, 7));
+    let mut bench = self::bench(1, 5, false);
+    bench.sync();
+    assert_eq!(bench.take().len(), 1);
+}
+
+#[test]
+fn a_sync_of_the_wrong_length_is_an_error_and_no_sync() {
+    for (counts, data) in [(true, &[][..]), (true, &[1, 2]), (false, &[1])] {
+        let mut bench = bench(1, 0, counts);
+        bench.receive(Frame::new(0x80, data).unwrap());
+        let frames = bench.take();
+        assert!(frames.iter().all(|frame| frame.id() == 0x085));
+        assert_eq!(frames.len(), 2);
+        assert_eq!(frames[0].data()[..2], [0x40, 0x82]);
+    }
+}
+
+#[test]
+fn the_counter_is_0_or_2_to_240_and_fixed_while_there_is_a_period() {
+    let mut bench = Bench::booted();
+    assert_eq!(bench.write(0x1019, 0, &[1]), Err(0x0609_0030));
+    assert_eq!(bench.write(0x1019, 0, &[241]), Err(0x0609_0031));
+    assert_eq!(bench.write(0x1019, 0, &[240]), Ok(()));
+    bench.write32(0x1006, 0, 1000).unwrap();
+    assert_eq!(bench.write(0x1019, 0, &[0]), Err(0x0800_0022));
+}
+
+#[test]
+fn the_start_value_is_fixed_while_the_pdo_is_valid() {
+    let mut bench = Bench::booted();
+    assert_eq!(bench.write(0x1800, 6, &[1]), Err(0x0609_0030));
+}
+
+#[test]
+fn a_missing_sync_is_signalled_until_it_is_back() {
+    let mut bench = bench(1, 0, false);
+    bench.write32(0x1006, 0, 10_000).unwrap();
+    bench.run(Duration::from_millis(100));
+    assert_eq!(emergencies(&mut bench), []);
+    bench.sync();
+    bench.run(Duration(14_999));
+    assert_eq!(emergencies(&mut bench), []);
+    bench.run(Duration(1));
+    assert_eq!(emergencies(&mut bench), [0x8100]);
+    bench.run(Duration::from_millis(100));
+    bench.sync();
+    assert_eq!(emergencies(&mut bench), [0]);
+}
+
+#[test]
+fn outside_operational_no_sync_is_missed() {
+    let mut bench = bench(1, 0, false);
+    bench.write32(0x1006, 0, 10_000).unwrap();
+    bench.sync();
+    bench.nmt(0x80);
+    bench.run(Duration::from_millis(100));
+    assert_eq!(emergencies(&mut bench), []);
+}
+
+#[test]
+fn after_the_window_a_synchronous_pdo_is_dropped() {
+    for (window, sent) in [(500, 0), (5_000, 1), (0, 1)] {
+        let mut bench = bench(1, 0, false);
+        bench.write32(0x1007, 0, window).unwrap();
+        bench.take();
+        bench.out.room = 0;
+        bench.sync();
+        bench.out.room = 10;
+        bench.run(Duration::from_millis(20));
+        assert_eq!(bench.take().iter().filter(|frame| frame.id() == TPDO).count(), sent, "{window}");
+    }
+}
