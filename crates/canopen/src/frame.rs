@@ -26,6 +26,11 @@ impl Frame {
         Frame { id: id.get(), remote: false, len: len.min(8), data }
     }
 
+    /// The data bytes, then zeros.
+    pub(crate) fn bytes(&self) -> [u8; 8] {
+        self.data
+    }
+
     /// All eight bytes of a full data frame; `None` for any other.
     pub(crate) fn full(&self) -> Option<[u8; 8]> {
         (self.len == 8 && !self.remote).then_some(self.data)

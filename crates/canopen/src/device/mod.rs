@@ -5,11 +5,12 @@
 
 mod application;
 mod objects;
+mod pdos;
 mod process;
+mod rpdos;
 mod services;
 mod state;
 mod syncs;
-mod tpdos;
 mod watches;
 
 pub use application::{Application, Part};
@@ -17,12 +18,12 @@ pub use state::Action;
 
 use crate::dictionary::Dictionary;
 use crate::nmt::State;
-use crate::pdo::Tpdo;
+use crate::pdo::{Rpdo, Tpdo};
 use crate::sdo::{Response, Server};
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
 /// How many TPDOs a device can have; which of them it has, the dictionary says.
-const TPDOS: usize = 2;
+const TPDOS: usize = 8;
 
 /// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
 #[derive(Debug)]
@@ -48,6 +49,9 @@ struct Core<A, const N: usize> {
     sync: sync::Consumer,
     emcy: emcy::Producer,
     tpdos: [Tpdo; TPDOS],
+    rpdos: [Rpdo; rpdos::RPDOS as usize],
+    /// RPDOs that have a fault, a bit each.
+    rpdo_faults: u8,
     /// Cached next deadlines; `STALE` after a change that may have moved them.
     process_due: Instant,
     services_due: Instant,
@@ -71,6 +75,8 @@ impl<A: Application, const N: usize> Device<A, N> {
             sync: sync::Consumer::new(),
             emcy: emcy::Producer::new(),
             tpdos: [const { Tpdo::new() }; TPDOS],
+            rpdos: [const { Rpdo::new() }; rpdos::RPDOS as usize],
+            rpdo_faults: 0,
             process_due: Instant::NEVER,
             services_due: Instant::NEVER,
             pending: state::Pending::new(),

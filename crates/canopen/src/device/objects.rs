@@ -95,11 +95,11 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
-            Rule::TpdoCobId => self.admit_tpdo_cob_id(entry, value),
-            Rule::TpdoType => self.admit_tpdo_type(entry, value),
-            Rule::TpdoInhibit | Rule::TpdoSyncStart if self.tpdo_is_valid(entry) => Err(Abort::InvalidValue),
-            Rule::TpdoCount => self.admit_tpdo_count(entry, value),
-            Rule::TpdoSlot => self.admit_tpdo_slot(entry, value),
+            Rule::PdoCobId => self.admit_pdo_cob_id(entry, value),
+            Rule::PdoType => self.admit_pdo_type(entry, value),
+            Rule::PdoInhibit | Rule::PdoSyncStart if self.pdo_is_valid(entry) => Err(Abort::InvalidValue),
+            Rule::PdoCount => self.admit_pdo_count(entry, value),
+            Rule::PdoSlot => self.admit_pdo_slot(entry, value),
             Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
             _ => Ok(()),
         }
@@ -119,17 +119,13 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::EmcyCobId => self.emcy.configure(value),
             Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
-            Rule::TpdoCobId
-            | Rule::TpdoType
-            | Rule::TpdoInhibit
-            | Rule::TpdoEventTimer
-            | Rule::TpdoSyncStart => {
-                self.configure_tpdo(super::tpdos::number(entry));
+            Rule::PdoCobId | Rule::PdoType | Rule::PdoInhibit | Rule::PdoEventTimer | Rule::PdoSyncStart => {
+                self.configure_pdo(entry, now);
             }
             _ => (),
         }
         self.pending.identifiers |=
-            matches!(entry.rule, Rule::SyncCobId | Rule::TpdoCobId | Rule::HeartbeatWatch);
+            matches!(entry.rule, Rule::SyncCobId | Rule::PdoCobId | Rule::HeartbeatWatch);
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 }

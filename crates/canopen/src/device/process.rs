@@ -2,7 +2,7 @@
 
 use super::{Application, Core, Device, STALE};
 use crate::nmt::Command;
-use crate::pdo::Tpdo;
+use crate::pdo::{Rpdo, Tpdo};
 use crate::{CanId, Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize> Device<A, N> {
@@ -29,10 +29,12 @@ impl<A: Application, const N: usize> Device<A, N> {
         let core = &mut self.core;
         if now >= core.process_due {
             core.poll_sync(now);
+            core.poll_rpdos(now);
             for tpdo in &mut core.tpdos {
                 tpdo.poll(&core.image, now, out);
             }
-            core.process_due = core.tpdos.iter().map(Tpdo::due).fold(core.sync.due(), Instant::min);
+            core.process_due =
+                core.tpdos.iter().map(Tpdo::due).fold(core.sync.due().min(core.next_rpdo()), Instant::min);
         }
         core.process_due
     }
@@ -46,8 +48,9 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
     pub fn process_ids(&self) -> impl Iterator<Item = CanId> {
+        let received = self.core.rpdos.iter().filter_map(Rpdo::id);
         let requests = self.core.tpdos.iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
-        [CanId::NMT, self.core.sync.id()].into_iter().chain(requests.map(|tpdo| tpdo.id))
+        [CanId::NMT, self.core.sync.id()].into_iter().chain(received).chain(requests.map(|tpdo| tpdo.id))
     }
 }
 
@@ -61,6 +64,8 @@ impl<A: Application, const N: usize> Core<A, N> {
                     tpdo.on_remote(image, now, out);
                 }
             });
+        } else {
+            self.on_rpdo(frame, now);
         }
     }
 

@@ -133,6 +133,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         for tpdo in &mut self.tpdos {
             if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
         }
+        self.rpdos.iter_mut().for_each(crate::pdo::Rpdo::stop);
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 
@@ -162,11 +163,11 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.emcy.configure(self.number_or(0x1014, 0, NO_EMCY));
         self.emcy.set_inhibit(Duration::from_inhibit(self.number(0x1015, 0)));
         self.configure_watches(now);
+        self.configure_pdos(now);
         self.emcy.restart(now);
         self.update_error_register();
         let period = Duration::from_millis(self.number(0x1017, 0).into());
         self.heartbeat.boot_up(period, now);
-        (0..self.tpdos.len()).for_each(|number| self.configure_tpdo(number));
     }
 
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {

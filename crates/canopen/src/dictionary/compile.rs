@@ -157,6 +157,10 @@ const fn check_row(row: &Object) {
     assert!(!saved || matches!(row.access, Access::ReadWrite), "only a parameter can be saved");
     let tpdo = matches!(row.mapping, Mapping::Tpdo);
     assert!(!tpdo || row.access.is_readable(), "a TPDO sends what can be read");
+    let rpdo = matches!(row.mapping, Mapping::Rpdo);
+    // An RPDO writes without a check, so what it writes must have none: any value of an integer type.
+    let takes_any = matches!(row.rule, Rule::Plain) && row.limits.is_none() && row.kind.range().is_some();
+    assert!(!rpdo || (row.access.is_writable() && takes_any), "an RPDO writes what takes any value");
     let listed = matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
     assert!(!listed || row.index == 0x1003, "the error list is object 1003h");
 }

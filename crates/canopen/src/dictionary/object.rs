@@ -93,20 +93,20 @@ pub enum Rule {
     SyncOverflow,
     /// 1F80h, NMT start-up.
     StartUp,
-    /// 1800h..:1, COB-ID of a TPDO.
-    TpdoCobId,
-    /// 1800h..:2, transmission type.
-    TpdoType,
+    /// 1400h.., 1800h..:1, COB-ID of a PDO.
+    PdoCobId,
+    /// 1400h.., 1800h..:2, transmission type.
+    PdoType,
     /// 1800h..:3, inhibit time.
-    TpdoInhibit,
-    /// 1800h..:5, event timer.
-    TpdoEventTimer,
+    PdoInhibit,
+    /// 1400h.., 1800h..:5, event timer.
+    PdoEventTimer,
     /// 1800h..:6, SYNC start value.
-    TpdoSyncStart,
-    /// 1A00h..:0, number of mapped objects.
-    TpdoCount,
-    /// 1A00h..:1 and up, a mapped object.
-    TpdoSlot,
+    PdoSyncStart,
+    /// 1600h.., 1A00h..:0, number of mapped objects.
+    PdoCount,
+    /// 1600h.., 1A00h..:1 and up, a mapped object.
+    PdoSlot,
     /// The application decides, by this number.
     Application(u8),
 }

@@ -41,10 +41,16 @@ pub enum Fault {
     SyncLength,
     /// The heartbeat of a node is missing: entry of 1016h, from 0.
     Heartbeat(u8),
+    /// An RPDO, from 0, was shorter than its mapping and is not processed.
+    RpdoTooShort(u8),
+    /// An RPDO, from 0, was longer than its mapping.
+    RpdoTooLong(u8),
+    /// An RPDO, from 0, did not come in time.
+    RpdoDeadline(u8),
 }
 
 /// The first bit of communication faults in a set of faults.
-const COMMUNICATION: u8 = 32;
+const COMMUNICATION: u8 = 16;
 
 impl Fault {
     /// Those that exist once.
@@ -70,7 +76,12 @@ impl Fault {
     ];
 
     fn all() -> impl Iterator<Item = Fault> {
-        Fault::SINGLE.into_iter().chain((0..4).map(Fault::Heartbeat))
+        Fault::SINGLE
+            .into_iter()
+            .chain((0..4).map(Fault::Heartbeat))
+            .chain((0..8).map(Fault::RpdoTooShort))
+            .chain((0..8).map(Fault::RpdoTooLong))
+            .chain((0..8).map(Fault::RpdoDeadline))
     }
 
     /// Its bit in a set of faults, and its emergency error code: CiA 301, table 26, and the codes of the classes 50xxh,
@@ -95,7 +106,10 @@ impl Fault {
             Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),
             Fault::SyncMissing => (COMMUNICATION + 3, 0x8100),
             Fault::SyncLength => (COMMUNICATION + 4, 0x8240),
-            Fault::Heartbeat(number) => (COMMUNICATION + 8 + (number & 3), 0x8130),
+            Fault::Heartbeat(number) => (COMMUNICATION + 5 + (number & 3), 0x8130),
+            Fault::RpdoTooShort(number) => (COMMUNICATION + 9 + (number & 7), 0x8210),
+            Fault::RpdoTooLong(number) => (COMMUNICATION + 17 + (number & 7), 0x8220),
+            Fault::RpdoDeadline(number) => (COMMUNICATION + 25 + (number & 7), 0x8250),
         }
     }
 
@@ -109,7 +123,10 @@ impl Fault {
     #[must_use]
     pub const fn detail(self) -> [u8; 5] {
         match self {
-            Fault::Heartbeat(number) => [number.saturating_add(1), 0, 0, 0, 0],
+            Fault::Heartbeat(number)
+            | Fault::RpdoTooShort(number)
+            | Fault::RpdoTooLong(number)
+            | Fault::RpdoDeadline(number) => [number.saturating_add(1), 0, 0, 0, 0],
             _ => [0; 5],
         }
     }

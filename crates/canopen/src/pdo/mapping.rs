@@ -1,6 +1,6 @@
 //! PDO mapping: from mapping entries to places in the image, resolved once, when the mapping is enabled.
 
-use crate::dictionary::{self, Dictionary, Entry};
+use crate::dictionary::{Dictionary, Field, Mapping};
 use crate::sdo::Abort;
 
 /// A mapping entry (1600h.., 1A00h..): index, sub-index and length in bits.
@@ -28,28 +28,47 @@ impl MappedObject {
         let [low, high] = self.index.to_le_bytes();
         u32::from_le_bytes([self.bits, self.sub, low, high])
     }
+
+    /// Bytes of a dummy entry: a data type (0002h to 0007h) as index, for parts of an RPDO that the node skips
+    /// (CiA 301, 7.4.7.1).
+    const fn dummy_size(self) -> Option<u8> {
+        match (self.index, self.sub) {
+            (0x0002 | 0x0005, 0) => Some(1),
+            (0x0003 | 0x0006, 0) => Some(2),
+            (0x0004 | 0x0007, 0) => Some(4),
+            _ => None,
+        }
+    }
 }
 
 /// Which way the data goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Direction {
     Transmit,
+    Receive,
 }
 
-/// The entry that a mapping entry names.
+/// A place outside every image: reads as zero, takes no write.
+const NOWHERE: u16 = u16::MAX;
+
+/// The place that a mapping entry names.
 ///
 /// `NoObject` where there is none, `NotMappable` where it cannot go into such a PDO or the length is not its own.
 pub(crate) fn locate(
     dictionary: &Dictionary,
     mapped: MappedObject,
     direction: Direction,
-) -> Result<&'static Entry, Abort> {
-    let entry = dictionary.find(mapped.index, mapped.sub).map_err(|_| Abort::NoObject)?;
-    let fits = match direction {
-        Direction::Transmit => entry.mapping == dictionary::Mapping::Tpdo,
+) -> Result<Field, Abort> {
+    let (field, fits) = match mapped.dummy_size() {
+        Some(size) if direction == Direction::Receive => (Field { offset: NOWHERE, size }, true),
+        _ => {
+            let entry = dictionary.find(mapped.index, mapped.sub).map_err(|_| Abort::NoObject)?;
+            let needed = if direction == Direction::Transmit { Mapping::Tpdo } else { Mapping::Rpdo };
+            (entry.field, entry.mapping == needed)
+        }
     };
-    let same_length = u16::from(mapped.bits) == u16::from(entry.field.size) * 8;
-    if fits && same_length { Ok(entry) } else { Err(Abort::NotMappable) }
+    let same_length = u16::from(mapped.bits) == u16::from(field.size) * 8;
+    if fits && same_length { Ok(field) } else { Err(Abort::NotMappable) }
 }
 
 /// For each byte of the PDO the place in the image. Byte by byte, as nothing in the dictionary is shorter.
@@ -61,14 +80,14 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// Appends a mapped object; `PdoLength` when the PDO would grow beyond eight bytes.
-    pub(crate) fn push(&mut self, entry: &Entry) -> Result<(), Abort> {
+    pub(crate) fn push(&mut self, field: Field) -> Result<(), Abort> {
         let start = usize::from(self.len);
-        let end = start + usize::from(entry.field.size);
+        let end = start + usize::from(field.size);
         let places = self.places.get_mut(start..end).ok_or(Abort::PdoLength)?;
-        for (place, offset) in places.iter_mut().zip(entry.field.offset..) {
-            *place = offset;
+        for (i, place) in (0..).zip(places) {
+            *place = field.offset.saturating_add(i);
         }
-        self.len += entry.field.size;
+        self.len += field.size;
         Ok(())
     }
 
@@ -84,5 +103,14 @@ impl Layout {
             *byte = image.get(usize::from(place)).copied().unwrap_or(0);
         }
         data
+    }
+
+    /// The PDO's data into the image.
+    pub(crate) fn scatter(&self, data: [u8; 8], image: &mut [u8]) {
+        for (&byte, &place) in data.iter().zip(&self.places).take(usize::from(self.len)) {
+            if let Some(target) = image.get_mut(usize::from(place)) {
+                *target = byte;
+            }
+        }
     }
 }

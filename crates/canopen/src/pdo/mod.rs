@@ -1,10 +1,12 @@
 //! PDO: process data, mapped from and to the dictionary (CiA 301, 7.2.2).
 
 mod mapping;
+mod rpdo;
 mod tpdo;
 mod transmission;
 
 pub use mapping::MappedObject;
 pub(crate) use mapping::{Direction, Layout, locate};
+pub(crate) use rpdo::{Reception, Rpdo, RpdoSettings};
 pub(crate) use tpdo::{Settings, Tpdo};
 pub use transmission::Transmission;

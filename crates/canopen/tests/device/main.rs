@@ -7,6 +7,7 @@ mod heartbeat;
 mod mapping;
 mod nmt;
 mod robustness;
+mod rpdo;
 mod sdo;
 mod sync;
 mod tpdo;

@@ -20,27 +20,27 @@ const fn error(sub: u8) -> Object {
 
 const fn cob_id(index: u16, default: u32) -> Object {
     use canopen::dictionary::DefaultValue::NodeId;
-    parameter(index, 1, "COB-ID", Type::Unsigned32).default(NodeId(default)).rule(Rule::TpdoCobId)
+    parameter(index, 1, "COB-ID", Type::Unsigned32).default(NodeId(default)).rule(Rule::PdoCobId)
 }
 
 const fn transmission_type(index: u16) -> Object {
-    parameter(index, 2, "Transmission type", Type::Unsigned8).value(255).rule(Rule::TpdoType)
+    parameter(index, 2, "Transmission type", Type::Unsigned8).value(255).rule(Rule::PdoType)
 }
 
 const fn inhibit_time(index: u16) -> Object {
-    parameter(index, 3, "Inhibit time", Type::Unsigned16).unit("100 us").rule(Rule::TpdoInhibit)
+    parameter(index, 3, "Inhibit time", Type::Unsigned16).unit("100 us").rule(Rule::PdoInhibit)
 }
 
 const fn event_timer(index: u16) -> Object {
-    parameter(index, 5, "Event timer", Type::Unsigned16).value(1000).unit("ms").rule(Rule::TpdoEventTimer)
+    parameter(index, 5, "Event timer", Type::Unsigned16).value(1000).unit("ms").rule(Rule::PdoEventTimer)
 }
 
 const fn map_count(index: u16, name: &'static str, count: i64) -> Object {
-    parameter(index, 0, name, Type::Unsigned8).limits(0, 4).value(count).rule(Rule::TpdoCount)
+    parameter(index, 0, name, Type::Unsigned8).limits(0, 4).value(count).rule(Rule::PdoCount)
 }
 
 const fn map(index: u16, sub: u8, mapped: i64) -> Object {
-    parameter(index, sub, "Mapped object", Type::Unsigned32).value(mapped).rule(Rule::TpdoSlot)
+    parameter(index, sub, "Mapped object", Type::Unsigned32).value(mapped).rule(Rule::PdoSlot)
 }
 
 pub(super) const OBJECTS: &[Object] = &[

@@ -1,0 +1,174 @@
+//! The PDO objects 1400h.., 1600h.., 1800h.. and 1A00h..: their interlocks, and from them the settings of a PDO.
+//!
+//! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
+//! entries, count, COB-ID valid.
+
+use super::{Application, Core};
+use crate::dictionary::Entry;
+use crate::pdo::{Direction, Layout, MappedObject, RpdoSettings, Settings, Transmission, locate};
+use crate::sdo::Abort;
+use crate::{CobId, Duration, Instant};
+
+/// A PDO by the index of one of its objects.
+#[derive(Clone, Copy, Debug)]
+struct Pdo {
+    direction: Direction,
+    /// From 0.
+    number: u16,
+}
+
+impl Pdo {
+    fn of(entry: &Entry) -> Pdo {
+        let direction = if entry.index() & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive };
+        Pdo { direction, number: entry.index() & 0x01FF }
+    }
+
+    fn communication(self) -> u16 {
+        self.number | if self.direction == Direction::Transmit { 0x1800 } else { 0x1400 }
+    }
+
+    fn mapping(self) -> u16 {
+        self.number | if self.direction == Direction::Transmit { 0x1A00 } else { 0x1600 }
+    }
+}
+
+impl<A: Application, const N: usize> Core<A, N> {
+    /// Gives every PDO its settings.
+    pub(super) fn configure_pdos(&mut self, now: Instant) {
+        for number in (0..).take(self.tpdos.len()) {
+            self.apply(Pdo { direction: Direction::Transmit, number }, now);
+        }
+        for number in (0..).take(self.rpdos.len()) {
+            self.apply(Pdo { direction: Direction::Receive, number }, now);
+        }
+    }
+
+    /// Gives the PDO to which the entry belongs its settings.
+    pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Instant) {
+        self.apply(Pdo::of(entry), now);
+    }
+
+    fn apply(&mut self, pdo: Pdo, now: Instant) {
+        match pdo.direction {
+            Direction::Transmit => self.configure_tpdo(pdo),
+            Direction::Receive => self.configure_rpdo(pdo, now),
+        }
+    }
+
+    fn configure_tpdo(&mut self, pdo: Pdo) {
+        let settings = self.tpdo_settings(pdo);
+        if let Some(tpdo) = self.tpdos.get_mut(usize::from(pdo.number)) {
+            tpdo.configure(settings);
+            if self.state.has_pdos() {
+                tpdo.start();
+            }
+        }
+    }
+
+    fn configure_rpdo(&mut self, pdo: Pdo, now: Instant) {
+        let settings = self.rpdo_settings(pdo);
+        if let Some(rpdo) = self.rpdos.get_mut(usize::from(pdo.number)) {
+            rpdo.configure(settings);
+        }
+        let [number, _] = pdo.number.to_le_bytes();
+        self.forget_rpdo_faults(number, now);
+    }
+
+    fn tpdo_settings(&self, pdo: Pdo) -> Option<Settings> {
+        let parameter = |sub| self.number(pdo.communication(), sub);
+        let mut settings = Settings::new(self.cob_id_value(pdo), low_byte(parameter(2)))?;
+        settings.inhibit = Duration::from_inhibit(parameter(3));
+        settings.event = Duration::from_millis(parameter(5).into());
+        settings.sync_start = low_byte(parameter(6));
+        settings.layout = self.enabled_layout(pdo)?;
+        Some(settings)
+    }
+
+    fn rpdo_settings(&self, pdo: Pdo) -> Option<RpdoSettings> {
+        let parameter = |sub| self.number(pdo.communication(), sub);
+        let deadline = Duration::from_millis(parameter(5).into());
+        let layout = self.enabled_layout(pdo)?;
+        RpdoSettings::new(self.cob_id_value(pdo), low_byte(parameter(2)), deadline, layout)
+    }
+
+    fn enabled_layout(&self, pdo: Pdo) -> Option<Layout> {
+        self.layout(pdo, self.number(pdo.mapping(), 0)).ok()
+    }
+
+    /// The layout of the first `count` mapping entries.
+    fn layout(&self, pdo: Pdo, count: u32) -> Result<Layout, Abort> {
+        let mut layout = Layout::default();
+        for sub in (1..=u8::MAX).take(usize::from(low_byte(count))) {
+            let mapped = MappedObject::parse(self.number(pdo.mapping(), sub));
+            layout.push(locate(self.dictionary, mapped, pdo.direction)?)?;
+        }
+        Ok(layout)
+    }
+
+    /// A PDO without objects is one that is not valid.
+    fn cob_id_value(&self, pdo: Pdo) -> u32 {
+        self.number_or(pdo.communication(), 1, u32::MAX)
+    }
+
+    fn cob_id(&self, pdo: Pdo) -> Option<CobId> {
+        CobId::parse(self.cob_id_value(pdo))
+    }
+
+    fn is_valid(&self, pdo: Pdo) -> bool {
+        self.cob_id(pdo).is_some_and(|cob_id| !cob_id.bit31)
+    }
+
+    pub(super) fn pdo_is_valid(&self, entry: &Entry) -> bool {
+        self.is_valid(Pdo::of(entry))
+    }
+
+    /// The CAN-ID changes only while the PDO does not exist; to exist, it needs a CAN-ID that is free for PDOs, a
+    /// mapping, and remote frames if its type lives on them.
+    pub(super) fn admit_pdo_cob_id(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        let pdo = Pdo::of(entry);
+        let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
+        let moves = self.cob_id(pdo).is_some_and(|old| !old.bit31 && old.id != new.id);
+        let transmission = Transmission::parse(low_byte(self.number(entry.index(), 2)));
+        let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
+        let is_empty = self.number(pdo.mapping(), 0) == 0;
+        let cannot_exist = moves || contradicts || is_empty || new.id.is_restricted();
+        if !new.bit31 && cannot_exist { Err(Abort::InvalidValue) } else { Ok(()) }
+    }
+
+    /// An RPDO cannot be asked for, so it has no type that lives on remote frames.
+    pub(super) fn admit_pdo_type(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        let pdo = Pdo::of(entry);
+        let transmission = Transmission::parse(low_byte(value)).ok_or(Abort::InvalidValue)?;
+        let no_remote = self.cob_id(pdo).is_some_and(|cob_id| !cob_id.bit31 && cob_id.bit30);
+        let is_receive = pdo.direction == Direction::Receive;
+        if transmission.needs_remote() && (no_remote || is_receive) {
+            return Err(Abort::InvalidValue);
+        }
+        Ok(())
+    }
+
+    /// A mapping is switched on as a whole: only now is its length known.
+    pub(super) fn admit_pdo_count(&self, entry: &Entry, count: u32) -> Result<(), Abort> {
+        let pdo = Pdo::of(entry);
+        if self.is_valid(pdo) {
+            return Err(Abort::Access);
+        }
+        self.layout(pdo, count).map(|_| ())
+    }
+
+    pub(super) fn admit_pdo_slot(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        let pdo = Pdo::of(entry);
+        if self.is_valid(pdo) || self.number(entry.index(), 0) != 0 {
+            return Err(Abort::Access);
+        }
+        if value == 0 {
+            return Ok(());
+        }
+        locate(self.dictionary, MappedObject::parse(value), pdo.direction).map(|_| ())
+    }
+}
+
+/// Entries whose type is UNSIGNED8 have no more.
+fn low_byte(value: u32) -> u8 {
+    value.to_le_bytes()[0]
+}

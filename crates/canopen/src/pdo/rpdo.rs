@@ -1,0 +1,118 @@
+//! One RPDO: when its data is taken.
+//!
+//! The types 0 to 240 take it with the next SYNC, the types 254 and 255 at once. With an event timer, it must come
+//! again within that time.
+
+use super::{Layout, Transmission};
+use crate::{CanId, CobId, Duration, Frame, Instant};
+
+/// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RpdoSettings {
+    id: CanId,
+    is_synchronous: bool,
+    /// Deadline between two receptions; zero for none.
+    deadline: Duration,
+    layout: Layout,
+}
+
+impl RpdoSettings {
+    /// From a COB-ID and a transmission type as they are stored; `None` for a PDO that is not valid.
+    pub(crate) fn new(
+        cob_id: u32,
+        transmission: u8,
+        deadline: Duration,
+        layout: Layout,
+    ) -> Option<RpdoSettings> {
+        let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
+        let transmission = Transmission::parse(transmission).filter(|kind| !kind.needs_remote())?;
+        let is_synchronous = transmission != Transmission::Event;
+        Some(RpdoSettings { id: cob_id.id, is_synchronous, deadline, layout })
+    }
+}
+
+/// How the length of a frame compares with the mapping.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reception {
+    /// As mapped.
+    Complete,
+    /// Too short: not taken (EMCY 8210h).
+    TooShort,
+    /// Too long: the first bytes are taken (EMCY 8220h).
+    TooLong,
+}
+
+/// An RPDO. Without settings it does not exist.
+#[derive(Debug)]
+pub(crate) struct Rpdo {
+    settings: Option<RpdoSettings>,
+    /// Data that waits for SYNC, the newest.
+    waiting: Option<[u8; 8]>,
+    /// When the deadline passes; `NEVER` before the first reception.
+    due: Instant,
+}
+
+impl Rpdo {
+    pub(crate) const fn new() -> Rpdo {
+        Rpdo { settings: None, waiting: None, due: Instant::NEVER }
+    }
+
+    /// Takes new settings and starts afresh.
+    pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
+        *self = Rpdo { settings, ..Rpdo::new() };
+    }
+
+    /// Leaving Operational.
+    pub(crate) fn stop(&mut self) {
+        (self.waiting, self.due) = (None, Instant::NEVER);
+    }
+
+    /// Its CAN-ID, while it is valid.
+    pub(crate) fn id(&self) -> Option<CanId> {
+        self.settings.as_ref().map(|settings| settings.id)
+    }
+
+    /// Takes a data frame if it is this PDO's. `late` is true when the synchronous window is over: a synchronous PDO is
+    /// then ignored.
+    pub(crate) fn take(
+        &mut self,
+        frame: &Frame,
+        image: &mut [u8],
+        now: Instant,
+        late: bool,
+    ) -> Option<Reception> {
+        let settings = self.settings.as_ref().filter(|settings| settings.id.get() == frame.id())?;
+        let mapped = usize::from(settings.layout.len());
+        if frame.len() < mapped {
+            return Some(Reception::TooShort);
+        }
+        self.due = if settings.deadline.is_zero() { Instant::NEVER } else { now + settings.deadline };
+        match settings.is_synchronous {
+            false => settings.layout.scatter(frame.bytes(), image),
+            true if late => (),
+            true => self.waiting = Some(frame.bytes()),
+        }
+        Some(if frame.len() == mapped { Reception::Complete } else { Reception::TooLong })
+    }
+
+    /// A SYNC arrived: what waits becomes valid.
+    pub(crate) fn on_sync(&mut self, image: &mut [u8]) {
+        if let (Some(settings), Some(data)) = (&self.settings, self.waiting.take()) {
+            settings.layout.scatter(data, image);
+        }
+    }
+
+    /// The next instant at which a reception is missing.
+    pub(crate) fn due(&self) -> Instant {
+        self.due
+    }
+
+    /// Whether the deadline has just passed.
+    pub(crate) fn expire(&mut self, now: Instant) -> bool {
+        let is_over = now >= self.due;
+        if is_over {
+            self.due = Instant::NEVER;
+        }
+        is_over
+    }
+}
