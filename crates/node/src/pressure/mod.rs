@@ -2,6 +2,7 @@
 
 mod communication;
 mod manufacturer;
+mod pdos;
 mod profile;
 mod rules;
 mod values;
@@ -12,9 +13,11 @@ pub(crate) use values::{parameters, publish};
 use canopen::dictionary::{self, Dictionary, Entry, Object};
 
 /// The table: everything there is to say about every object, sorted.
-pub const OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
+pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 
-const PARTS: &[&[Object]] = &[communication::OBJECTS, manufacturer::OBJECTS, profile::OBJECTS];
+static PDOS: [Object; dictionary::count(pdos::PARTS)] = dictionary::gather(pdos::PARTS);
+const PARTS: &[&[Object]] =
+    &[communication::OBJECTS, &PDOS, communication::START_UP, manufacturer::OBJECTS, profile::OBJECTS];
 const ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
 const DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
 const _: () = dictionary::check(&OBJECTS);

@@ -1,5 +1,5 @@
-//! Every row of the table of CiA 404 objects against the running node, by SDO. The table is written by hand from the
-//! device it describes; the node's own table is another one.
+//! Every row of two tables against the running node, by SDO: the objects of the pressure transmitter, and what the node
+//! has of CiA 301 beyond them. They are written from the documents; the node's own table is another one.
 
 use std::collections::BTreeSet;
 
@@ -7,9 +7,10 @@ use host_tests::bench::{Bench, ID, setup};
 use node::pressure::OBJECTS;
 use node::{Personality, REVISION, VENDOR_ID};
 
-const TABLE: &str = include_str!("../tables/cia404.csv");
+const TRANSMITTER: &str = include_str!("../tables/cia404.csv");
+const COMMUNICATION: &str = include_str!("../tables/cia301.csv");
 
-/// Objects of the table that the node does not serve yet. A row that is served must not stand here.
+/// Objects of the tables that the node does not serve yet. A row that is served must not stand here.
 const NOT_SERVED: &[u16] = &[0x1010, 0x1011, 0x1F51, 0x1F56, 0x1F57];
 
 const NO_OBJECT: u32 = 0x0602_0000;
@@ -90,7 +91,7 @@ fn integer(text: &str) -> i64 {
 }
 
 fn table() -> impl Iterator<Item = Row> {
-    TABLE.lines().skip(1).map(Row::parse)
+    [TRANSMITTER, COMMUNICATION].into_iter().flat_map(|table| table.lines().skip(1)).map(Row::parse)
 }
 
 fn served() -> impl Iterator<Item = Row> {
@@ -107,7 +108,7 @@ fn the_list_of_what_is_not_served_is_exact() {
 }
 
 #[test]
-fn the_node_has_nothing_that_the_table_does_not_know() {
+fn the_node_has_nothing_that_the_tables_do_not_know() {
     let key = |row: Row| (row.index, row.sub, row.name.to_string());
     let own: BTreeSet<_> = OBJECTS.iter().map(|row| (row.index, row.sub, row.name.to_string())).collect();
     assert_eq!(served().map(key).collect::<BTreeSet<_>>(), own);
