@@ -18,12 +18,13 @@ pub use state::Action;
 
 use crate::dictionary::Dictionary;
 use crate::nmt::State;
-use crate::pdo::{Rpdo, Tpdo};
+use crate::pdo::{PdoSet, Rpdo, Tpdo};
 use crate::sdo::{Response, Server};
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
-/// How many TPDOs a device can have; which of them it has, the dictionary says.
+/// How many PDOs a device can have each way; which of them it has, the dictionary says.
 const TPDOS: usize = 8;
+const RPDOS: usize = 8;
 
 /// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
 #[derive(Debug)]
@@ -49,9 +50,11 @@ struct Core<A, const N: usize> {
     sync: sync::Consumer,
     emcy: emcy::Producer,
     tpdos: [Tpdo; TPDOS],
-    rpdos: [Rpdo; rpdos::RPDOS as usize],
-    /// RPDOs that have a fault, a bit each.
-    rpdo_faults: u8,
+    rpdos: [Rpdo; RPDOS],
+    /// The PDOs that are valid, and the RPDOs that have a fault.
+    valid_tpdos: PdoSet,
+    valid_rpdos: PdoSet,
+    faulty_rpdos: PdoSet,
     /// Cached next deadlines; `STALE` after a change that may have moved them.
     process_due: Instant,
     services_due: Instant,
@@ -75,8 +78,10 @@ impl<A: Application, const N: usize> Device<A, N> {
             sync: sync::Consumer::new(),
             emcy: emcy::Producer::new(),
             tpdos: [const { Tpdo::new() }; TPDOS],
-            rpdos: [const { Rpdo::new() }; rpdos::RPDOS as usize],
-            rpdo_faults: 0,
+            rpdos: [const { Rpdo::new() }; RPDOS],
+            valid_tpdos: PdoSet::EMPTY,
+            valid_rpdos: PdoSet::EMPTY,
+            faulty_rpdos: PdoSet::EMPTY,
             process_due: Instant::NEVER,
             services_due: Instant::NEVER,
             pending: state::Pending::new(),

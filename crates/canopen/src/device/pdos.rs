@@ -49,14 +49,16 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     fn apply(&mut self, pdo: Pdo, now: Instant) {
+        let [number, _] = pdo.number.to_le_bytes();
         match pdo.direction {
-            Direction::Transmit => self.configure_tpdo(pdo),
-            Direction::Receive => self.configure_rpdo(pdo, now),
+            Direction::Transmit => self.configure_tpdo(pdo, number),
+            Direction::Receive => self.configure_rpdo(pdo, number, now),
         }
     }
 
-    fn configure_tpdo(&mut self, pdo: Pdo) {
+    fn configure_tpdo(&mut self, pdo: Pdo, number: u8) {
         let settings = self.tpdo_settings(pdo);
+        self.valid_tpdos.set(number, settings.is_some());
         if let Some(tpdo) = self.tpdos.get_mut(usize::from(pdo.number)) {
             tpdo.configure(settings);
             if self.state.has_pdos() {
@@ -65,12 +67,12 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    fn configure_rpdo(&mut self, pdo: Pdo, now: Instant) {
+    fn configure_rpdo(&mut self, pdo: Pdo, number: u8, now: Instant) {
         let settings = self.rpdo_settings(pdo);
+        self.valid_rpdos.set(number, settings.is_some());
         if let Some(rpdo) = self.rpdos.get_mut(usize::from(pdo.number)) {
             rpdo.configure(settings);
         }
-        let [number, _] = pdo.number.to_le_bytes();
         self.forget_rpdo_faults(number, now);
     }
 

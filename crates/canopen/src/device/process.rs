@@ -30,11 +30,8 @@ impl<A: Application, const N: usize> Device<A, N> {
         if now >= core.process_due {
             core.poll_sync(now);
             core.poll_rpdos(now);
-            for tpdo in &mut core.tpdos {
-                tpdo.poll(&core.image, now, out);
-            }
-            core.process_due =
-                core.tpdos.iter().map(Tpdo::due).fold(core.sync.due().min(core.next_rpdo()), Instant::min);
+            core.each_tpdo(|tpdo, image| tpdo.poll(image, now, out));
+            core.process_due = core.next_tpdo().min(core.next_rpdo()).min(core.sync.due());
         }
         core.process_due
     }
@@ -69,9 +66,15 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    /// What a TPDO could not send at once moves the next deadline.
+    fn next_tpdo(&self) -> Instant {
+        let valid = self.valid_tpdos.iter().filter_map(|number| self.tpdos.get(usize::from(number)));
+        valid.map(Tpdo::due).fold(Instant::NEVER, Instant::min)
+    }
+
+    /// Visits the TPDOs that are valid. What one of them could not send at once moves the next deadline.
     pub(super) fn each_tpdo(&mut self, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
-        for tpdo in &mut self.tpdos {
+        for number in self.valid_tpdos.iter() {
+            let Some(tpdo) = self.tpdos.get_mut(usize::from(number)) else { return };
             visit(tpdo, &self.image);
             if tpdo.is_pending() {
                 self.process_due = STALE;

@@ -27,7 +27,10 @@ impl<A: Application, const N: usize> Core<A, N> {
         if self.sync.is_back() {
             self.clear(Fault::SyncMissing, now);
         }
-        self.rpdos.iter_mut().for_each(|rpdo| rpdo.on_sync(&mut self.image));
+        for number in self.valid_rpdos.iter() {
+            let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
+            rpdo.on_sync(&mut self.image);
+        }
         self.each_tpdo(|tpdo, image| tpdo.on_sync(sync, image, now, out));
         self.process_due = self.process_due.min(self.sync.due());
     }

@@ -19,6 +19,10 @@ impl Field {
 
     /// Replaces the value. Fewer bytes than the value has are followed by zeros, more are cut.
     pub fn set(self, image: &mut [u8], bytes: &[u8]) {
+        // The usual case, and the cheap one.
+        if let (4, Some(word)) = (self.size, bytes.first_chunk::<4>()) {
+            return self.store(image, *word);
+        }
         let start = usize::from(self.offset);
         let Some(place) = image.get_mut(start..start + usize::from(self.size)) else { return };
         let (value, rest) = place.split_at_mut(bytes.len().min(place.len()));
