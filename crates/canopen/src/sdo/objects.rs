@@ -110,7 +110,8 @@ impl Sink {
         match self.kind {
             Writable::Stream => objects.stream(self.at, Part::Data(self.len, bytes))?,
             Writable::Value(limit) if end <= limit => {
-                buffer.get_mut(self.len..end).ok_or(Abort::TooLong)?.copy_from_slice(bytes);
+                let rest = buffer.get_mut(self.len..).unwrap_or(&mut []);
+                rest.get_mut(..bytes.len()).ok_or(Abort::TooLong)?.copy_from_slice(bytes);
             }
             Writable::Value(_) => return Err(Abort::TooLong),
         }
