@@ -71,6 +71,7 @@ impl Server {
         objects: &mut impl Objects,
         now: Instant,
     ) -> Option<Response> {
+        // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
         if matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
             let answer = self.dispatch(frame, objects, now);
             return self.settle(answer, now);
