@@ -73,8 +73,11 @@ impl Station {
         self.drive || self.is_silent()
     }
 
+    /// Ready for the next frame: this one is over, or its start was never noticed, as when a bit error hides the
+    /// start of frame of an error-passive transmitter, who then gives up without a dominant bit.
     pub(crate) fn is_done(&self) -> bool {
-        self.phase == Phase::Done
+        let unaware = self.phase == Phase::Frame && self.sending.is_none() && !self.receiver.is_inside();
+        self.phase == Phase::Done || unaware
     }
 
     /// Whether its dominant error flag is on the wire or may still come.

@@ -156,6 +156,24 @@ fn traffic_counts_for_the_recovery_from_bus_off() {
     assert_eq!(place, Some(127));
 }
 
+/// Also when the hidden bit is the start of frame of an error-passive transmitter, which no receiver ever notices.
+#[test]
+fn a_bus_that_destroys_every_frame_goes_on() {
+    let mut nodes = [node(), node()];
+    let mut bus = Bus::new();
+    bus.faults.noise(1, 1.0);
+    for n in 0..200 {
+        nodes[0].send(standard(0x123, &[n]), Time::ZERO);
+    }
+    let events = run(&mut bus, &mut nodes, BIT * 100_000);
+    assert!(events.len() > 1000, "{} attempts", events.len());
+    bus.faults.quiet();
+    run(&mut bus, &mut nodes, BIT * 200_000);
+    // An error in the last bit of a frame makes it arrive and be sent again.
+    let heard: std::collections::HashSet<Frame> = frames(&mut nodes[1]).into_iter().collect();
+    assert_eq!(heard.len(), 200);
+}
+
 #[test]
 fn an_identifier_used_twice_is_a_bit_error() {
     let mut nodes = [node(), node(), node()];

@@ -104,15 +104,15 @@ impl<P: Peripherals + 'static> Machine<P> {
         engine::store(&mut self.cpu, address, bytes).map_err(|_| BusFault)
     }
 
-    /// Sets a core register, as a debugger does: 0..=12, 13 the stack pointer, 14 the link register.
+    /// Sets a core register, as a debugger does: 0 to 12, 13 the stack pointer, 14 the link register, 15 the program
+    /// counter. Others are ignored.
     pub fn set_register(&mut self, number: u8, value: u32) {
-        let register = RegisterARM::R0 as i32 + i32::from(number.min(12));
-        let register = match number {
-            13 => RegisterARM::SP as i32,
-            14 => RegisterARM::LR as i32,
-            _ => register,
-        };
-        let _ = self.cpu.reg_write(register, value.into());
+        let special = [RegisterARM::SP, RegisterARM::LR, RegisterARM::PC];
+        match number {
+            0..=12 => drop(self.cpu.reg_write(RegisterARM::R0 as i32 + i32::from(number), value.into())),
+            13..=15 => self.set(special[usize::from(number - 13)], value),
+            _ => {}
+        }
     }
 
     /// Switches the supply on at an instant.

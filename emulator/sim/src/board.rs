@@ -76,6 +76,11 @@ impl Board {
         if stop == Stop::Poked { limit.min(self.machine.now()) } else { limit }
     }
 
+    /// Core, memory and chip.
+    pub(crate) fn machine(&mut self) -> &mut Machine<Stm32f4> {
+        &mut self.machine
+    }
+
     /// Its CAN controller.
     pub(crate) fn controller(&mut self) -> &mut dyn Controller {
         self.machine.peripherals_mut().can1_mut()

@@ -4,6 +4,8 @@
 //! a board may be ahead of a start of frame by less than the shortest frame, too little to miss anything of it.
 
 use canbus::{Babbler, Bus, Controller, Event, Frame, HostNode, Stamped, StandardId, Time};
+use chip::Stm32f4;
+use emulator::Machine;
 
 use crate::board::Board;
 use crate::log::Line;
@@ -74,6 +76,14 @@ impl World {
     /// The boards, in the order of the command line.
     pub fn boards(&self) -> &[Board] {
         &self.boards
+    }
+
+    /// The machine of a board, in the order of the command line, for a test that breaks it.
+    ///
+    /// # Panics
+    /// Without such a board.
+    pub fn machine(&mut self, index: usize) -> &mut Machine<Stm32f4> {
+        self.boards[index].machine()
     }
 
     /// The bus, for bit errors.

@@ -1,0 +1,108 @@
+//! What must never happen, made to happen: the node comes back and says why.
+
+use canbus::Time;
+use chip::Peripherals;
+use sim::world::World;
+
+use crate::support::{SECOND, run, world};
+
+/// The first word of RAM, below which the stack must not grow.
+const RAM: u32 = 0x2000_0000;
+/// The start of what the bootloader looks at: the application's vector table (memory.x).
+const APPLICATION: u32 = 0x0801_0200;
+const VECTORS: usize = 512;
+/// Control register 1 of the timer that starts the conversions.
+const TIM3_CR1: u32 = 0x4000_0400;
+/// Stack pointer and program counter.
+const SP: u8 = 13;
+const PC: u8 = 15;
+
+/// A node that has run for a second, its log taken.
+fn running() -> World {
+    let mut world = world("--bitrate 1000");
+    world.run_until(SECOND);
+    world.take_log();
+    world
+}
+
+/// What the node says when it runs on for a second, in which it must boot once more and measure again.
+fn comes_back(world: &mut World) -> String {
+    let before = world.summary(1.0, 0);
+    let after = run(world, SECOND);
+    let (before, after) = (&before.nodes[0], &after.nodes[0]);
+    let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
+    let log = log.join("\n");
+    assert_eq!(after.heard.boot_ups, before.heard.boot_ups + 1, "it boots once more: {log}");
+    assert!(after.sampling.samples > before.sampling.samples + 600, "it measures again: {log}");
+    assert!(after.heard.process_value.is_some(), "it sends again: {log}");
+    log
+}
+
+#[test]
+fn a_stack_overflow_ends_in_a_recorded_reset() {
+    let mut world = running();
+    world.machine(0).set_register(SP, RAM + 8);
+    let log = comes_back(&mut world);
+    assert!(log.contains("stack overflow"), "{log}");
+    assert!(log.contains("reset by software"), "{log}");
+}
+
+#[test]
+fn a_wild_jump_ends_in_a_recorded_reset_with_its_address() {
+    let mut world = running();
+    world.machine(0).set_register(PC, 0x3000_0000);
+    let log = comes_back(&mut world);
+    assert!(log.contains("fault at 0x30000000"), "{log}");
+}
+
+#[test]
+fn a_crash_is_told_once() {
+    let mut world = running();
+    world.machine(0).set_register(PC, 0x3000_0000);
+    comes_back(&mut world);
+    let machine = world.machine(0);
+    machine.power_off();
+    machine.power_on(Time::ZERO);
+    let log = comes_back(&mut world);
+    assert!(!log.contains("the last run"), "{log}");
+    assert!(log.contains("reset by power on"), "{log}");
+}
+
+#[test]
+fn the_watchdog_restarts_a_node_that_no_longer_samples() {
+    let mut world = running();
+    let now = world.machine(0).now();
+    world.machine(0).peripherals_mut().write(TIM3_CR1, 4, 0, now).unwrap();
+    let log = comes_back(&mut world);
+    assert!(log.contains("reset by independent watchdog"), "{log}");
+}
+
+/// Every frame is destroyed for a while: the node goes bus-off, comes back without a reset and reports it.
+#[test]
+fn a_node_recovers_from_bus_off() {
+    let mut world = running();
+    world.bus().faults.noise(1, 1.0);
+    world.run_until(SECOND * 2);
+    world.bus().faults.quiet();
+    let silent = world.traffic().node(1);
+    let after = run(&mut world, SECOND * 3);
+    let node = &after.nodes[0];
+    assert!(node.heard.heartbeats > silent.heartbeats, "{after}");
+    assert!(node.heard.emcys > silent.emcys, "{after}");
+    assert_eq!(node.heard.boot_ups, silent.boot_ups, "{after}");
+    assert!(node.incidents.is_empty(), "{after}");
+}
+
+/// Without an application the bootloader stays where it is instead of jumping into erased flash.
+#[test]
+fn the_bootloader_does_not_start_an_erased_application() {
+    let mut world = running();
+    let boot_ups = world.traffic().node(1).boot_ups;
+    let machine = world.machine(0);
+    machine.write(APPLICATION, &[0xFF; VECTORS]).unwrap();
+    machine.power_off();
+    machine.power_on(Time::ZERO);
+    let after = run(&mut world, SECOND);
+    assert_eq!(after.nodes[0].heard.boot_ups, boot_ups);
+    assert!(after.nodes[0].incidents.is_empty(), "{after}");
+}

@@ -1,0 +1,5 @@
+//! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
+
+mod faults;
+mod running;
+mod support;

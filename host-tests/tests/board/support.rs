@@ -1,0 +1,79 @@
+//! A world of emulated boards, as `cargo sim` has it, and a client in it.
+
+use std::path::{Path, PathBuf};
+
+use canbus::{Frame, StandardId, Time};
+use clap::Parser;
+use sim::cli::Options;
+use sim::port::Adapter;
+use sim::summary::Summary;
+use sim::world::{PortId, World};
+
+pub(crate) const SECOND: Time = Time::from_millis(1000);
+/// SDO server and client, NMT, SYNC (CiA 301, 7.3.3).
+pub(crate) const SDO_REQUEST: u16 = 0x601;
+pub(crate) const SDO_RESPONSE: u16 = 0x581;
+pub(crate) const SYNC: u16 = 0x080;
+pub(crate) const START_ALL: (u16, [u8; 2]) = (0x000, [1, 0]);
+
+/// Where the ELF files are: $NODE_IMAGES, or where cargo puts them.
+fn images() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("target"), PathBuf::from);
+    let built = || target.join("thumbv7em-none-eabihf/release");
+    let dir = std::env::var_os("NODE_IMAGES").map_or_else(built, PathBuf::from);
+    for name in ["bootloader", "firmware"] {
+        assert!(
+            dir.join(name).exists(),
+            "no {name} in {}; run `cargo xtask images` to build it",
+            dir.display()
+        );
+    }
+    dir
+}
+
+/// A world as `cargo sim` with these flags has it, without its sockets.
+pub(crate) fn world(flags: &str) -> World {
+    let dir = images();
+    let (bootloader, firmware) = (dir.join("bootloader"), dir.join("firmware"));
+    let images =
+        ["sim", "--bootloader", bootloader.to_str().unwrap(), "--firmware", firmware.to_str().unwrap()];
+    let options = Options::try_parse_from(images.into_iter().chain(flags.split_whitespace())).unwrap();
+    sim::setup::world(&options).unwrap()
+}
+
+pub(crate) fn frame(id: u16, bytes: &[u8]) -> Frame {
+    Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
+}
+
+/// A client on the bus at 1 Mbit/s.
+pub(crate) struct Master {
+    pub(crate) port: PortId,
+}
+
+impl Master {
+    pub(crate) fn join(world: &mut World) -> Master {
+        let port = world.open_port();
+        world.port(port).attach(Some(Adapter { bit_rate: 1_000_000, silent: false }));
+        Master { port }
+    }
+
+    pub(crate) fn send(&self, world: &mut World, id: u16, bytes: &[u8]) {
+        let now = world.now();
+        world.port(self.port).send(frame(id, bytes), now);
+    }
+
+    /// What came with this identifier since the last call; the rest is dropped.
+    pub(crate) fn heard(&self, world: &mut World, id: u16) -> Vec<Frame> {
+        let port = world.port(self.port);
+        let all = std::iter::from_fn(|| port.receive()).map(|stamped| stamped.frame);
+        all.filter(|frame| frame.id() == StandardId::new(id).unwrap().into()).collect()
+    }
+}
+
+/// Runs on for a time and sums up what happened since power-on.
+pub(crate) fn run(world: &mut World, span: Time) -> Summary {
+    let started = std::time::Instant::now();
+    world.run_until(world.now() + span);
+    world.summary(started.elapsed().as_secs_f64(), 0)
+}
