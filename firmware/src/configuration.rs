@@ -29,8 +29,8 @@ pub(crate) fn load() -> (Setup, BitTiming) {
     (setup, timing)
 }
 
-/// Says who starts, and why the last run ended.
-pub(crate) fn log(setup: &Setup, cause: ResetCause) {
+/// Says who starts, and why the last run ended; true when that was not meant to happen.
+pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
     defmt::info!(
         "version {=str} on {=str}, serial {=u32:08x}, node {=u8} at {=u16} kbit/s, reset by {=str}",
         setup.software_version,
@@ -40,9 +40,11 @@ pub(crate) fn log(setup: &Setup, cause: ResetCause) {
         setup.bit_rate,
         cause.name()
     );
-    if let Some(crash) = crash::take() {
-        crash::log(&crash);
+    let crash = crash::take();
+    if let Some(crash) = &crash {
+        crash::log(crash);
     }
+    crash.is_some() || cause.is_unexpected()
 }
 
 /// What the maker of the chip measured.

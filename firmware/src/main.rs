@@ -78,7 +78,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.device);
         let (setup, timing) = configuration::load();
-        configuration::log(&setup, board.reset_cause);
+        let crashed = configuration::report_start(&setup, board.reset_cause);
         let lost: &'static Losses = cx.local.lost;
         let (receiver_process, process_frames) = Receiver::new(0, cx.local.process_queue, lost);
         let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
@@ -100,7 +100,15 @@ mod app {
             transmitter: board.transmitter,
             time: board.time,
             process: Process { frames: process_frames, alarm: process_alarm },
-            services: Services::new(board.can, timing, service_frames, lost, services_alarm, board.led),
+            services: Services::new(
+                board.can,
+                timing,
+                service_frames,
+                lost,
+                services_alarm,
+                board.led,
+                crashed,
+            ),
         };
         local.sampling.start();
         (shared, local)

@@ -8,7 +8,7 @@ use bsp::led::Led;
 use bsp::losses::Losses;
 use bsp::{Alarm, Clock, Frames};
 use canopen::{Duration, Instant};
-use node::{BusEvent, Request};
+use node::{BusEvent, Fault, Request};
 
 use crate::PROCESS;
 use crate::bus::event_of;
@@ -28,6 +28,8 @@ pub(crate) struct Services {
     watch: BusWatch,
     /// Going on the bus for the first time is a reset of the communication too.
     request: Option<Request>,
+    /// The last run ended in a crash, and the bus has not been told yet.
+    crashed: bool,
 }
 
 impl Services {
@@ -39,9 +41,10 @@ impl Services {
         lost: &'static Losses,
         alarm: Alarm,
         led: Led,
+        crashed: bool,
     ) -> Services {
         let request = Some(Request::ResetCommunication);
-        Services { can, timing, frames, lost, alarm, led, watch: BusWatch::default(), request }
+        Services { can, timing, frames, lost, alarm, led, watch: BusWatch::default(), request, crashed }
     }
 
     /// Does everything that is due and sets the alarm for what comes next.
@@ -98,6 +101,9 @@ impl Services {
         node.call(|_, queue| queue.clear());
         self.can.start(self.timing, &Banks::new());
         node.call(|protocol, out| protocol.start(Clock::now(), out));
+        if core::mem::take(&mut self.crashed) {
+            node.call(|protocol, out| protocol.set_fault(Fault::UnexpectedReset, true, Clock::now(), out));
+        }
         self.filter(node);
         rtic::pend(PROCESS);
     }

@@ -40,6 +40,12 @@ impl ResetCause {
         told.map_or(ResetCause::Unknown, |&(_, cause)| cause)
     }
 
+    /// Whether nobody asked for it: a watchdog, or a power-down mode that the images do not use.
+    #[must_use]
+    pub fn is_unexpected(self) -> bool {
+        matches!(self, ResetCause::IndependentWatchdog | ResetCause::WindowWatchdog | ResetCause::LowPower)
+    }
+
     /// For the log.
     #[must_use]
     pub fn name(self) -> &'static str {

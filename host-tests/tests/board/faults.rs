@@ -13,6 +13,8 @@ const APPLICATION: u32 = 0x0801_0200;
 const VECTORS: usize = 512;
 /// Control register 1 of the timer that starts the conversions.
 const TIM3_CR1: u32 = 0x4000_0400;
+/// EMCY code for a reset that nobody asked for (object 3000h:3, bit 6).
+const UNEXPECTED_RESET: u16 = 0x6101;
 /// Stack pointer and program counter.
 const SP: u8 = 13;
 const PC: u8 = 15;
@@ -43,6 +45,7 @@ fn a_stack_overflow_ends_in_a_recorded_reset() {
     let mut world = running();
     world.machine(0).set_register(SP, RAM + 8);
     let log = comes_back(&mut world);
+    assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET), "{log}");
     assert!(log.contains("stack overflow"), "{log}");
     assert!(log.contains("reset by software"), "{log}");
 }
@@ -75,6 +78,7 @@ fn the_watchdog_restarts_a_node_that_no_longer_samples() {
     world.machine(0).peripherals_mut().write(TIM3_CR1, 4, 0, now).unwrap();
     let log = comes_back(&mut world);
     assert!(log.contains("reset by independent watchdog"), "{log}");
+    assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET), "{log}");
 }
 
 /// Every frame is destroyed for a while: the node goes bus-off, comes back without a reset and reports it.
