@@ -22,11 +22,14 @@ mod services;
 mod shared;
 
 use bsp::pac::Interrupt;
+use canopen::Duration;
 
 /// Pended by whoever has work for the process data task.
 const PROCESS: Interrupt = Interrupt::TIM2;
 /// Pended by whoever has work for the services task.
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
+/// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
+const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 /// Pended by whoever has put a frame into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
 
@@ -38,13 +41,13 @@ mod app {
     use bsp::losses::Losses;
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
-    use bsp::{Board, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
+    use bsp::{Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
     use node::{FactoryCalibration, Measurement, Parameters, Protocol, Snapshot};
 
     use crate::process::Process;
     use crate::services::Services;
     use crate::shared::Shared as _;
-    use crate::{PROCESS, SERVICES, configuration};
+    use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration};
 
     #[shared]
     struct Shared {
@@ -82,8 +85,8 @@ mod app {
         let lost: &'static Losses = cx.local.lost;
         let (receiver_process, process_frames) = Receiver::new(0, cx.local.process_queue, lost);
         let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
-        let [process_alarm, services_alarm] = board.alarms;
-        rtic::pend(SERVICES);
+        let [process_alarm, mut services_alarm] = board.alarms;
+        services_alarm.set(Clock::now() + FIRST_SAMPLE);
         let shared = Shared {
             protocol: Protocol::new(&setup),
             transmit: TransmitQueue::new(),
