@@ -5,7 +5,7 @@ use sim::port::Adapter;
 use sim::summary::Summary;
 use sim::traffic::NmtState;
 
-use crate::support::{Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, SYNC, frame, run, world};
+use crate::support::{Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, SYNC, TPDO1, frame, run, world};
 
 /// Nothing happened that must not happen.
 fn assert_clean(summary: &Summary) {
@@ -26,6 +26,17 @@ fn a_node_alone_boots_and_sends_heartbeats_and_tpdos() {
     let node = &summary.nodes[0];
     assert!((9..=10).contains(&node.heard.heartbeats), "{summary}");
     assert!((8..=11).contains(&node.heard.tpdos), "{summary}");
+}
+
+/// Also a node that is started the moment it boots sends a measured value, not one from before its first sample.
+#[test]
+fn the_first_tpdo_carries_a_sample() {
+    let mut world = world("--pressure const:250000");
+    world.run_until(SECOND);
+    let frames = world.take_frames();
+    let first = frames.iter().find(|stamped| stamped.frame.id() == frame(TPDO1, &[]).id()).unwrap();
+    let bar = f32::from_le_bytes(first.frame.bytes()[..4].try_into().unwrap());
+    assert!((bar - 2.5).abs() < 0.004, "{bar} bar for 250000 Pa");
 }
 
 /// A full bus of foreign frames at 1 Mbit/s, a thousand SYNCs a second, and SDO requests as fast as they are answered:

@@ -10,7 +10,8 @@ use sim::summary::Summary;
 use sim::world::{PortId, World};
 
 pub(crate) const SECOND: Time = Time::from_millis(1000);
-/// SDO server and client, NMT, SYNC (CiA 301, 7.3.3).
+/// TPDO1, SDO server and client, NMT, SYNC (CiA 301, 7.3.3).
+pub(crate) const TPDO1: u16 = 0x181;
 pub(crate) const SDO_REQUEST: u16 = 0x601;
 pub(crate) const SDO_RESPONSE: u16 = 0x581;
 pub(crate) const SYNC: u16 = 0x080;
