@@ -4,7 +4,7 @@ use std::path::Path;
 use std::{env, fs};
 
 /// Writes the `image.x` that memory.x includes, and tells the linker about both. `region` is where the image lies.
-pub fn image(region: &str) {
+pub(crate) fn image(region: &str) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let common = root.join("crates/bsp/image.x");
     let script = fs::read_to_string(&common).expect("a linker script of the project");
