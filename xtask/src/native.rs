@@ -58,11 +58,11 @@ fn apt_get() -> Command {
 
 /// Looks where clang-sys, which loads libclang, looks.
 fn has_libclang() -> bool {
+    let of_llvm = output("llvm-config", &["--libdir"]);
+    let usual =
+        ["/usr/lib", "/usr/local/lib", "/usr/lib64", "/opt/homebrew/opt/llvm/lib", "/Library/Developer"];
     std::env::var_os("LIBCLANG_PATH").is_some()
-        || exists("llvm-config")
-        || ["/usr/lib", "/usr/local/lib", "/usr/lib64", "/opt/homebrew/opt/llvm/lib", "/Library/Developer"]
-            .iter()
-            .any(|dir| holds_libclang(Path::new(dir), 2))
+        || of_llvm.iter().map(String::as_str).chain(usual).any(|dir| holds_libclang(Path::new(dir), 2))
 }
 
 fn holds_libclang(dir: &Path, depth: u32) -> bool {
