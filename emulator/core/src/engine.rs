@@ -246,7 +246,7 @@ pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]
     Ok(())
 }
 
-/// Whether an effect needs the memory.
+/// Carries out an effect on memory; gives back any other.
 pub(crate) fn apply<P: Peripherals>(cpu: &mut Cpu<P>, effect: Effect) -> Result<Option<Effect>, Error> {
     match effect {
         Effect::Store { address, bytes } => store(cpu, address, &bytes).map(|()| None),

@@ -19,8 +19,6 @@ pub struct Activity {
     pub worst_cycles: u64,
     /// Longest time from pending to the first instruction.
     pub worst_latency: Time,
-    /// Shortest time from pending to the first instruction; zero before the first entry.
-    pub least_latency: Time,
     /// Instant of the first entry.
     pub first_entry: Time,
     /// Instant of the latest entry.
@@ -33,7 +31,6 @@ pub struct Activity {
 
 impl Activity {
     fn note_entry(&mut self, latency: Time, at: Time) {
-        self.least_latency = if self.entries == 0 { latency } else { self.least_latency.min(latency) };
         self.worst_latency = self.worst_latency.max(latency);
         let interval = at.since(self.last_entry);
         match self.entries {
@@ -46,11 +43,6 @@ impl Activity {
         }
         self.last_entry = at;
         self.entries += 1;
-    }
-
-    /// How far the entries are from an even beat.
-    pub fn jitter(&self) -> Time {
-        self.worst_latency.since(self.least_latency)
     }
 }
 
