@@ -45,6 +45,8 @@ pub struct DeviceInfo {
     pub bit_rates: BTreeSet<u16>,
     /// Smallest mappable part of a PDO in bits; 0 where the mapping is fixed.
     pub granularity: u8,
+    /// Whether it has multiplexed PDOs.
+    pub group_messaging: bool,
     /// Number of RPDOs.
     pub rpdos: u16,
     /// Number of TPDOs.

@@ -1,6 +1,6 @@
 //! From text to [`Eds`], as CiA 306 says and as vendors write.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ini::{Ini, Section};
 use crate::{Access, DataType, DeviceInfo, Eds, Entry, Error, Formula, Object, ObjectType, Problem, compact};
@@ -73,9 +73,9 @@ fn address(section: &str) -> Option<(u16, Option<u8>)> {
 
 fn device_info(section: Section) -> Result<DeviceInfo, Error> {
     let text = |key| section.get(key).unwrap_or_default().to_owned();
-    let mut bit_rates = std::collections::BTreeSet::new();
+    let mut bit_rates = BTreeSet::new();
     for (rate, key) in BIT_RATES {
-        if section.number::<u8>(key)? != 0 {
+        if flag(section, key)? {
             bit_rates.insert(rate);
         }
     }
@@ -88,10 +88,15 @@ fn device_info(section: Section) -> Result<DeviceInfo, Error> {
         order_code: text("OrderCode"),
         bit_rates,
         granularity: section.number("Granularity")?,
+        group_messaging: flag(section, "GroupMessaging")?,
         rpdos: section.number("NrOfRXPDO")?,
         tpdos: section.number("NrOfTXPDO")?,
-        lss: section.number::<u8>("LSS_Supported")? != 0,
+        lss: flag(section, "LSS_Supported")?,
     })
+}
+
+fn flag(section: Section, key: &'static str) -> Result<bool, Error> {
+    section.number::<u8>(key).map(|value| value != 0)
 }
 
 fn object(ini: &Ini, section: Section, index: u16) -> Result<Object, Error> {
@@ -132,7 +137,7 @@ fn entry(section: Section, index: u16, sub: u8) -> Result<Entry, Error> {
         default: formula(section, "DefaultValue", data_type)?,
         low: formula(section, "LowLimit", data_type)?,
         high: formula(section, "HighLimit", data_type)?,
-        mappable: section.number::<u8>("PDOMapping")? != 0,
+        mappable: flag(section, "PDOMapping")?,
         unit: String::new(),
     })
 }

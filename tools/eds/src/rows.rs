@@ -8,8 +8,8 @@ use node::{REVISION, VENDOR_ID};
 use crate::read::BIT_RATES;
 use crate::{Access, DataType, Device, DeviceInfo, Eds, Entry, Formula, Object, ObjectType, Value};
 
-/// CiA has assigned no vendor-ID to the project: [`VENDOR_ID`] is 0.
-const VENDOR_NAME: &str = "none";
+/// Vendor and order code: CiA has assigned no vendor-ID to the project, and an entry must not be empty.
+const NONE: &str = "none";
 
 /// Every data type of the dictionary is made of whole bytes.
 const GRANULARITY: u8 = 8;
@@ -30,14 +30,15 @@ impl Device {
     fn info(&self) -> DeviceInfo {
         let count = |first: u16| self.objects().filter(|rows| rows[0].index & 0xFE00 == first).count();
         DeviceInfo {
-            vendor_name: VENDOR_NAME.into(),
+            vendor_name: NONE.into(),
             vendor_number: VENDOR_ID,
             product_name: self.product_name().into(),
             product_number: self.personality.product_code(),
             revision_number: REVISION,
-            order_code: String::new(),
+            order_code: NONE.into(),
             bit_rates: BIT_RATES.iter().map(|(rate, _)| *rate).collect(),
             granularity: GRANULARITY,
+            group_messaging: self.rows.iter().any(is_mpdo),
             rpdos: u16::try_from(count(0x1400)).unwrap_or(u16::MAX),
             tpdos: u16::try_from(count(0x1800)).unwrap_or(u16::MAX),
             lss: true,
@@ -87,6 +88,12 @@ impl Device {
             _ => default(row.default),
         }
     }
+}
+
+/// A mapping parameter whose number of objects stands for a multiplexed PDO (CiA 301, 7.5.2.36 and 7.5.2.38).
+fn is_mpdo(row: &Row) -> bool {
+    let is_count = row.sub == 0 && matches!(row.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF);
+    is_count && matches!(row.default, DefaultValue::Integer(254..=255))
 }
 
 /// A string that is empty in the table is filled in by the node, too.

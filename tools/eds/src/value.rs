@@ -44,7 +44,8 @@ impl Formula {
         }
     }
 
-    /// The text of a value of a type.
+    /// The text of a value of a type. A real number has a point: python-canopen and the CANopenNode editor read it
+    /// so, and Lely, which wants the bits, refuses it instead of taking `10` for them.
     pub(crate) fn text(&self, data_type: DataType) -> String {
         match (self, data_type.class()) {
             (Formula::NodeId(base), _) => format!("$NODEID+0x{base:X}"),

@@ -81,7 +81,7 @@ fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Result {
     out.key("SimpleBootUpSlave", 1)?;
     out.key("Granularity", device.granularity)?;
     out.key("DynamicChannelsSupported", 0)?;
-    out.key("GroupMessaging", 0)?;
+    out.key("GroupMessaging", u8::from(device.group_messaging))?;
     out.key("NrOfRXPDO", device.rpdos)?;
     out.key("NrOfTXPDO", device.tpdos)?;
     out.key("LSS_Supported", u8::from(device.lss))
