@@ -6,11 +6,12 @@ use eds::files;
 fn the_generated_files_are_up_to_date() {
     for file in files() {
         let text = std::fs::read_to_string(&file.path).unwrap_or_default();
-        let line = (1..).zip(text.lines().zip(file.text.lines())).find(|(_, (old, new))| old != new);
-        assert!(
-            text == file.text,
-            "{} is out of date (first difference: {line:?}): run `cargo xtask eds` and commit what it writes",
-            file.path.display(),
-        );
+        let path = file.path.display();
+        if let Some((line, (old, new))) =
+            (1..).zip(text.lines().zip(file.text.lines())).find(|(_, (old, new))| old != new)
+        {
+            println!("{path}:{line} has \"{old}\" for \"{new}\"");
+        }
+        assert!(text == file.text, "{path} is out of date: run `cargo xtask eds` and commit what it writes");
     }
 }

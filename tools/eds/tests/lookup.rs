@@ -76,6 +76,7 @@ fn what_is_no_address_is_refused() {
         "1018 1",
         "g018",
         "ä018",
+        "€",
         "1018:0x100",
     ] {
         assert_eq!(address(text), None, "{text}");
