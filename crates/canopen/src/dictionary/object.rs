@@ -81,6 +81,10 @@ pub enum Rule {
     SyncPeriod,
     /// 1007h, synchronous window length.
     SyncWindow,
+    /// 1010h:1 and up, store parameters.
+    Store,
+    /// 1011h:1 and up, restore default parameters.
+    Restore,
     /// 1014h, COB-ID of EMCY.
     EmcyCobId,
     /// 1015h, inhibit time of EMCY.
@@ -112,6 +116,11 @@ pub enum Rule {
 }
 
 impl Rule {
+    /// Whether what is written is a command: the value that is read stays.
+    pub(crate) const fn is_command(self) -> bool {
+        matches!(self, Rule::Store | Rule::Restore)
+    }
+
     /// Whether the value lives elsewhere and takes no place in the image.
     pub(crate) const fn is_computed(self) -> bool {
         matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
