@@ -97,13 +97,8 @@ pub fn address(text: &str) -> Option<Multiplexer> {
     let sub = match (rest.strip_prefix("sub"), rest.strip_prefix(':')) {
         (Some(sub), _) => hex(sub)?,
         (_, Some(sub)) => sub.strip_prefix("0x").map_or_else(|| decimal(sub), hex)?,
-        (None, None) => {
-            if rest.is_empty() {
-                0
-            } else {
-                return None;
-            }
-        }
+        _ if rest.is_empty() => 0,
+        _ => return None,
     };
     Some(Multiplexer { index: hex(index)?, sub: u8::try_from(sub).ok()? })
 }

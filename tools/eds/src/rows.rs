@@ -134,7 +134,7 @@ pub(crate) fn object_type(rows: &[Row]) -> ObjectType {
     }
 }
 
-/// The records of CiA 301 (table 62): identity, OS command, SDO and PDO parameters.
+/// The records of CiA 301 (7.5.2): identity, OS command, SDO and PDO parameters.
 fn is_record(index: u16) -> bool {
     matches!(index, 0x1018 | 0x1023 | 0x1025 | 0x1200..=0x12FF | 0x1400..=0x1BFF)
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Object type (CiA 301, table 42): what an index holds.
+/// Object type (CiA 301, 7.4.3): what an index holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ObjectType {
     /// A large block of data.
@@ -124,7 +124,7 @@ pub enum Class {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct DataType(pub u16);
 
-/// The static data types (CiA 301, table 44).
+/// The static data types (CiA 301, 7.4.7).
 #[rustfmt::skip]
 const TYPES: [(u16, &str, Class); 25] = [
     (0x01, "BOOLEAN", Class::Unsigned(1)),
