@@ -7,7 +7,7 @@ use node::REVISION;
 use crate::read::BIT_RATES;
 use crate::{Device, DeviceInfo, Eds, Entry, Object};
 
-/// Day of the release that CHANGELOG.md names, as CiA 306 writes it: month, day, year.
+/// Day of the release, month first as CiA 306 asks. A constant, so that every run writes the same; it moves with `REVISION`.
 const RELEASE_DATE: &str = "11-21-2026";
 const RELEASE_TIME: &str = "12:00AM";
 const AUTHOR: &str = "cargo xtask eds";
