@@ -1,29 +1,34 @@
 //! Who this node is: what the parameter store and the chip say of it.
 
+use core::mem::MaybeUninit;
+
 use bsp::flash::ParameterFlash;
 use bsp::reset_cause::ResetCause;
 use bsp::{Sums, board, crash, factory, memory};
 use node::{BitRate, FactoryCalibration, NodeId, Personality, Protocol, RawSample, Setup};
-use storage::{DeviceRecord, Pages, Store, View};
+use storage::{DeviceRecord, Error, Pages, Store, View};
 
 /// Where the store has nothing to say: node-ID 1, 250 kbit/s, pressure.
 const DEFAULT_NODE_ID: Option<NodeId> = NodeId::new(1);
 const DEFAULT_BIT_RATE: u16 = 250;
 const PAGES: Pages = Pages::new(0, memory::PARAMETER_PAGE);
 
-/// The protocol with what is stored of it, its set-up, and the store ready to save. Without a store that works, the node
-/// runs with its defaults.
-pub(crate) fn load(flash: ParameterFlash) -> (Protocol, Setup, Option<Store<ParameterFlash>>) {
+/// Makes the protocol in its place, with what is stored of it; gives its set-up, and the store ready to save. Without a
+/// store that works, the node runs with its defaults.
+pub(crate) fn load(
+    flash: ParameterFlash,
+    place: &'static mut MaybeUninit<Protocol>,
+) -> (&'static mut Protocol, Setup, Option<Store<ParameterFlash>>) {
     let mut view = match View::open(flash, PAGES) {
         Ok(view) => view,
         Err(error) => {
-            defmt::error!("the parameter store cannot be read: {}", defmt::Debug2Format(&error));
+            defmt::error!("the parameter store cannot be read: {=str}", reason(&error));
             let setup = setup(None);
-            return (Protocol::new(&setup), setup, None);
+            return (place.write(Protocol::new(&setup)), setup, None);
         }
     };
     let setup = setup(view.device().ok().flatten());
-    let mut protocol = Protocol::new(&setup);
+    let protocol = place.write(Protocol::new(&setup));
     protocol.load(&mut view);
     (protocol, setup, prepare(view))
 }
@@ -31,8 +36,16 @@ pub(crate) fn load(flash: ParameterFlash) -> (Protocol, Setup, Option<Store<Para
 /// May erase pages: half a second in which the core stands still, so it is done before the node goes on the bus.
 fn prepare(view: View<ParameterFlash>) -> Option<Store<ParameterFlash>> {
     Store::prepare(view)
-        .inspect_err(|error| defmt::error!("nothing can be stored: {}", defmt::Debug2Format(error)))
+        .inspect_err(|error| defmt::error!("nothing can be stored: {=str}", reason(error)))
         .ok()
+}
+
+fn reason<E>(error: &Error<E>) -> &'static str {
+    match error {
+        Error::Flash(_) => "the flash controller has signalled an error",
+        Error::Corrupt => "the flash does not hold what was written",
+        _ => "its pages do not fit the flash",
+    }
 }
 
 fn setup(record: Option<DeviceRecord>) -> Setup {

@@ -14,12 +14,12 @@ use crate::shared::Shared;
 pub(crate) struct Keeper {
     /// `None` when the flash could not be prepared: then nothing can be stored.
     store: Option<Store<ParameterFlash>>,
-    parcel: Parcel,
+    parcel: &'static mut Parcel,
 }
 
 impl Keeper {
-    pub(crate) fn new(store: Option<Store<ParameterFlash>>) -> Keeper {
-        Keeper { store, parcel: Parcel::new() }
+    pub(crate) fn new(store: Option<Store<ParameterFlash>>, parcel: &'static mut Parcel) -> Keeper {
+        Keeper { store, parcel }
     }
 
     /// Whether it can store anything.
@@ -29,7 +29,7 @@ impl Keeper {
 
     /// Does the job that waits, if one does.
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
-        let parcel = &mut self.parcel;
+        let parcel = &mut *self.parcel;
         if !node.call(|protocol, _| protocol.pack(parcel)) {
             return;
         }

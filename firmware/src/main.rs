@@ -42,12 +42,14 @@ defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
 
 #[rtic::app(device = bsp::pac, peripherals = true)]
 mod app {
+    use core::mem::MaybeUninit;
+
     use bsp::can::Transmitter;
     use bsp::losses::Losses;
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
     use bsp::{Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
-    use node::{FactoryCalibration, Measurement, Parameters, Protocol, Snapshot};
+    use node::{FactoryCalibration, Measurement, Parameters, Parcel, Protocol, Snapshot};
 
     use crate::bit_rate::Rate;
     use crate::keeper::Keeper;
@@ -58,7 +60,7 @@ mod app {
 
     #[shared]
     struct Shared {
-        protocol: Protocol,
+        protocol: &'static mut Protocol,
         transmit: TransmitQueue,
         /// The latest, until the process data task has taken it.
         snapshot: Option<Snapshot>,
@@ -85,11 +87,14 @@ mod app {
         process_queue: ReceiveQueue = ReceiveQueue::new(),
         services_queue: ReceiveQueue = ReceiveQueue::new(),
         lost: Losses = Losses::new(),
+        // Too large to be handed around on the stack.
+        protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
+        parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.device);
-        let (protocol, setup, store) = configuration::load(board.parameters);
-        let keeper = Keeper::new(store);
+        let (protocol, setup, store) = configuration::load(board.parameters, cx.local.protocol);
+        let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new()));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
         let lost: &'static Losses = cx.local.lost;

@@ -4,6 +4,9 @@ use core::ops::Range;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 
+/// In flash: its table is too large for the stack.
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
 unsafe extern "C" {
     static _stack_start: u8;
     static _stack_end: u8;
@@ -50,7 +53,7 @@ pub fn program_id() -> u32 {
     let len = end.saturating_sub(start) as usize;
     // SAFETY: the linker puts the program there: flash, readable for ever, and nobody programs it while it runs.
     let program = unsafe { core::slice::from_raw_parts(start as *const u8, len) };
-    Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(program)
+    CRC.checksum(program)
 }
 
 /// Size of each of the two pages: a sector (memory.x).
