@@ -1,8 +1,13 @@
-//! A node on a bench, without a bus: frames in and out, and the time under control.
+//! A node with its parameter store on a bench, without a bus: frames in and out, and the time under control.
 
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
-use node::{FactoryCalibration, Measurement, Personality, Protocol, RawSample, Setup};
+use node::{
+    BitRate, FactoryCalibration, Measurement, Parcel, Personality, Protocol, RawSample, Request as Demand,
+    Setup,
+};
+use std::collections::VecDeque;
+use storage::{Memory, Pages, Store, View};
 
 use crate::sdo::{Channel, Client, Failure};
 
@@ -35,15 +40,25 @@ pub struct Bench {
     pub out: Queue,
     /// The time.
     pub now: Instant,
+    /// What it stores.
+    pub store: Flash,
+    demands: VecDeque<Demand>,
 }
+
+/// The parameter store in RAM.
+pub type Flash = Store<Memory<Vec<u8>>>;
+
+const PAGES: Pages = Pages::new(0, 4 * 1024);
+const ERASED: [u8; 8 * 1024] = [0xFF; 8 * 1024];
 
 /// A setup with recognisable values.
 #[must_use]
 pub fn setup() -> Setup {
     Setup {
         personality: Personality::Pressure,
-        node_id: NodeId::new(ID).expect("a node-ID"),
-        bit_rate: 250,
+        node_id: NodeId::new(ID),
+        bit_rate: BitRate::from_kbit(250).expect("a bit rate"),
+        program_id: 0x0BAD_CAFE,
         serial_number: 0x1234_5678,
         hardware_version: "NUCLEO-F446RE",
         software_version: "0.1.0",
@@ -68,19 +83,73 @@ pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
     }
 }
 
+/// An empty parameter store.
+///
+/// # Panics
+/// When it cannot be prepared.
+#[must_use]
+pub fn empty_store() -> Flash {
+    Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
+}
+
+/// Stores at once what the node asks to be stored.
+pub fn deliver(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
+    let mut parcel = Parcel::new();
+    if protocol.pack(&mut parcel) {
+        let result = parcel.deliver(store);
+        protocol.finish(&parcel, result, now, out);
+    }
+}
+
 impl Bench {
     /// A node that has booted, its boot-up message out of the way.
     #[must_use]
     pub fn booted() -> Bench {
+        Bench::with_flash(ERASED.to_vec())
+    }
+
+    /// A node that has booted with this content of its parameter pages.
+    ///
+    /// # Panics
+    /// When the store cannot be prepared.
+    #[must_use]
+    pub fn with_flash(flash: Vec<u8>) -> Bench {
+        let mut view = View::open(Memory(flash), PAGES).expect("pages");
+        let mut protocol = Protocol::new(&setup());
+        protocol.load(&mut view);
         let mut bench = Bench {
-            protocol: Protocol::new(&setup()),
+            protocol,
             measurement: Measurement::new(),
             out: Queue::default(),
             now: Instant(0),
+            store: Store::prepare(view).expect("a store"),
+            demands: VecDeque::new(),
         };
         bench.protocol.start(bench.now, &mut bench.out);
         bench.take();
         bench
+    }
+
+    /// Switches the power off and on.
+    #[must_use]
+    pub fn power_cycled(self) -> Bench {
+        Bench::with_flash(self.store.into_flash().0)
+    }
+
+    /// The next thing that the node asks of its firmware, but for storing, which it has got.
+    pub fn take_request(&mut self) -> Option<Demand> {
+        self.demands.pop_front().or_else(|| self.protocol.take_request())
+    }
+
+    /// Stores what the node asks to be stored.
+    fn serve_store(&mut self) {
+        while let Some(demand) = self.protocol.take_request() {
+            if demand != Demand::Store {
+                self.demands.push_back(demand);
+                continue;
+            }
+            deliver(&mut self.protocol, &mut self.store, self.now, &mut self.out);
+        }
     }
 
     /// All frames sent since the last call, as identifier and data.
@@ -98,6 +167,7 @@ impl Bench {
         if is_service {
             self.protocol.on_service_frame(frame, self.now, &mut self.out);
         }
+        self.serve_store();
         self.poll();
     }
 

@@ -125,6 +125,7 @@ impl Unit for DomainDevice {
             Action::ResetNode => Request::ResetNode,
             Action::ResetCommunication => Request::ResetCommunication,
             Action::Identifiers => Request::Filters,
+            other => panic!("{other:?}: the dictionary has nothing that leads to it"),
         })
     }
 

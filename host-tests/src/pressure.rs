@@ -1,9 +1,9 @@
-//! The pressure node as a station of a network: both halves, and readings that do not change.
+//! The pressure node as a station of a network: both halves, its parameter store, and readings that do not change.
 
 use canopen::{Duration, Frame, Instant, NodeId, Transmit};
-use node::{Measurement, Protocol, RawSample, Request, Setup};
+use node::{BitRate, Measurement, Protocol, RawSample, Request, Setup};
 
-use crate::bench::setup;
+use crate::bench::{Flash, deliver, empty_store, setup};
 use crate::network::Unit;
 
 const SAMPLE_PERIOD: Duration = Duration::from_millis(1);
@@ -15,22 +15,21 @@ pub struct PressureNode {
     pub protocol: Protocol,
     /// The sampling half.
     pub measurement: Measurement,
+    /// What it stores.
+    pub store: Flash,
     raw: RawSample,
     next_sample: Instant,
 }
 
 impl PressureNode {
-    /// A node with this node-ID, which is its serial number too, and these readings.
-    ///
-    /// # Panics
-    /// When the node-ID is none.
+    /// A node with this serial number and these readings. Without a node-ID it waits for LSS.
     #[must_use]
-    pub fn new(node_id: u8, raw: RawSample) -> PressureNode {
-        let node_id = NodeId::new(node_id).expect("a node-ID");
-        let setup = Setup { node_id, bit_rate: 1000, serial_number: node_id.get().into(), ..setup() };
+    pub fn new(node_id: Option<NodeId>, serial_number: u32, raw: RawSample) -> PressureNode {
+        let setup = Setup { node_id, bit_rate: BitRate::FASTEST, serial_number, ..setup() };
         PressureNode {
             protocol: Protocol::new(&setup),
             measurement: Measurement::new(),
+            store: empty_store(),
             raw,
             next_sample: Instant::NEVER,
         }
@@ -71,6 +70,10 @@ impl Unit for PressureNode {
 
     fn take_request(&mut self) -> Option<Request> {
         self.protocol.take_request()
+    }
+
+    fn store(&mut self, now: Instant, out: &mut impl Transmit) {
+        deliver(&mut self.protocol, &mut self.store, now, out);
     }
 
     fn process_ids(&self) -> Vec<u16> {

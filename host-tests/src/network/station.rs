@@ -17,6 +17,8 @@ pub trait Unit {
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant;
     /// The next thing that only the firmware can do.
     fn take_request(&mut self) -> Option<Request>;
+    /// Stores what it has asked to be stored.
+    fn store(&mut self, _now: Instant, _out: &mut impl Transmit) {}
     /// Identifiers for FIFO 0.
     fn process_ids(&self) -> Vec<u16>;
     /// Identifiers for FIFO 1.
@@ -90,7 +92,8 @@ impl<U: Unit> Station<U> {
                     self.due = now;
                 }
                 Request::Filters => self.filters = [self.unit.process_ids(), self.unit.service_ids()],
-                other => panic!("{other:?} in a network of one bit rate"),
+                Request::Store => self.unit.store(now, &mut self.port),
+                other => panic!("{other:?}: the network has one bit rate and no bootloader"),
             }
         }
     }
