@@ -6,7 +6,7 @@ mod station;
 
 use std::collections::VecDeque;
 
-use canbus::{Bus, Controller, Event, HostNode, Stamped, Time};
+use canbus::{Bus, Controller, Event, HostNode, Id, Stamped, StandardId, Time};
 use canopen::{Duration, Frame, Instant};
 
 use crate::sdo::Channel;
@@ -123,9 +123,21 @@ impl<U: Unit> Network<U> {
 
     /// As [`hear`](Network::hear), for one identifier. Others stay.
     pub fn hear_id(&mut self, id: u16) -> Option<Frame> {
-        let is_meant = |heard: &Stamped| from_bus(&heard.frame).is_some_and(|frame| frame.id() == id);
-        let place = self.heard.iter().position(is_meant)?;
+        let id = StandardId::new(id).map(Id::from);
+        let place = self.heard.iter().position(|heard| Some(heard.frame.id()) == id)?;
         self.heard.remove(place).and_then(|heard| from_bus(&heard.frame))
+    }
+
+    /// Waits for a frame with this identifier, at most so long.
+    pub fn await_id(&mut self, id: u16, span: Duration) -> Option<Frame> {
+        let end = self.now + Time::from_micros(span.0);
+        loop {
+            let frame = self.hear_id(id);
+            if frame.is_some() || self.now >= end {
+                return frame;
+            }
+            self.step(end);
+        }
     }
 
     /// Lets time pass.
@@ -189,13 +201,6 @@ impl<U: Unit> Channel for Link<'_, U> {
     }
 
     fn wait(&mut self) -> Option<[u8; 8]> {
-        let end = self.network.now + Time::from_micros(TIME_OUT.0);
-        loop {
-            let response = self.received();
-            if response.is_some() || self.network.now >= end {
-                return response;
-            }
-            self.network.step(end);
-        }
+        self.network.await_id(0x580 + self.node_id, TIME_OUT)?.data().try_into().ok()
     }
 }
