@@ -4,6 +4,7 @@
 //! event, and takes the clock along. So the time-outs of the master are those of the virtual time.
 
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -17,11 +18,15 @@ use zencan_client::common::CanId;
 const STEP: canopen::Duration = canopen::Duration::from_millis(1);
 
 /// One of the two ends of the interface.
-pub(crate) struct Port<U>(Arc<Mutex<Network<U>>>);
+pub(crate) struct Port<U> {
+    network: Arc<Mutex<Network<U>>>,
+    /// A block upload has been asked for and not been answered.
+    uploading: Arc<AtomicBool>,
+}
 
 impl<U> Clone for Port<U> {
     fn clone(&self) -> Port<U> {
-        Port(Arc::clone(&self.0))
+        Port { network: Arc::clone(&self.network), uploading: Arc::clone(&self.uploading) }
     }
 }
 
@@ -36,12 +41,22 @@ impl<U: Unit> Port<U> {
     pub(crate) fn new(units: impl IntoIterator<Item = U>) -> Port<U> {
         let mut network = Network::new(units);
         network.start();
-        Port(Arc::new(Mutex::new(network)))
+        Port { network: Arc::new(Mutex::new(network)), uploading: Arc::default() }
     }
 
     /// A look at the other side.
     pub(crate) fn with<R>(&self, look: impl FnOnce(&mut Network<U>) -> R) -> R {
-        look(&mut self.0.lock().expect("nobody panics with the lock"))
+        look(&mut self.network.lock().expect("nobody panics with the lock"))
+    }
+
+    /// zencan 0.0.5 takes the size flag of the response that begins a block upload (CiA 301, 7.2.4.3.13, bit 1 of the
+    /// first byte) for a part of its subcommand, and gives up. It gets the response without the flag.
+    fn without_size_flag(&self, frame: Frame) -> Frame {
+        let mut data: Vec<u8> = frame.data().to_vec();
+        if frame.id() & 0x780 == 0x580 && self.uploading.swap(false, Ordering::Relaxed) && data[0] >> 5 == 6 {
+            data[0] &= !0x02;
+        }
+        Frame::new(frame.id(), &data).expect("as long as before")
     }
 
     /// Lets the bus go on to its next event, and the clock with it.
@@ -79,6 +94,9 @@ impl<U: Unit + Send> AsyncCanSender for Port<U> {
             CanId::Extended(_) => None,
         };
         let frame = frame.ok_or(Refused(message))?;
+        if frame.id() & 0x780 == 0x600 {
+            self.uploading.store(frame.data()[0] & 0xE3 == 0xA0, Ordering::Relaxed);
+        }
         self.with(|network| network.send(&frame));
         Ok(())
     }
@@ -89,6 +107,7 @@ impl<U: Unit + Send> AsyncCanReceiver for Port<U> {
 
     fn try_recv(&mut self) -> Option<CanMessage> {
         let frame = self.with(|network| network.hear().and_then(|heard| from_bus(&heard.frame)))?;
+        let frame = self.without_size_flag(frame);
         Some(CanMessage::new(CanId::std(frame.id()), frame.data()))
     }
 

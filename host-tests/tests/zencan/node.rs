@@ -180,7 +180,8 @@ async fn what_is_saved_is_there_after_a_reset() {
     let (port, mut client) = node();
     client.write_u32(0x4000, 1, 77).await.unwrap();
     client.write_u16(0x1017, 0, 250).await.unwrap();
-    client.save_objects().await.unwrap();
+    // The signature as a string: the number that zencan has for it is in the wrong byte order (CiA 301, 7.5.2.13).
+    client.download(0x1010, 1, b"save").await.unwrap();
     client.write_u32(0x4000, 1, 78).await.unwrap();
     port.with(|network| {
         network.transmit(&canopen::Frame::new(0, &[0x81, ID]).unwrap());
