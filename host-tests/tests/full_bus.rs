@@ -75,7 +75,9 @@ fn hear_all(network: &mut Network<PressureNode>) -> BTreeMap<u16, Vec<Vec<u8>>> 
 
 fn print_figures(network: &Network<PressureNode>, share: f64) {
     let (frames, seconds) = (network.traffic().frames, network.now().as_secs_f64());
-    println!("{NODES} nodes: {seconds:.3} s of virtual time, {frames} frames, {share:.1} % load when all send");
+    println!(
+        "{NODES} nodes: {seconds:.3} s of virtual time, {frames} frames, {share:.1} % load when all send"
+    );
     let protocol = size_of::<Protocol>();
     let [measurement, queue, parcel] =
         [size_of::<Measurement>(), size_of::<TransmitQueue>(), size_of::<Parcel>()];

@@ -25,7 +25,8 @@ fn round(network: &mut Network<DomainDevice>, rng: &mut Rng, len: usize) {
     for (by_blocks, data) in [(true, first), (false, second)] {
         let mut link = network.server(ID);
         let mut client = Client::new(&mut link);
-        let written = if by_blocks { client.write_blocks(DOMAIN, &data) } else { client.write(DOMAIN, &data) };
+        let written =
+            if by_blocks { client.write_blocks(DOMAIN, &data) } else { client.write(DOMAIN, &data) };
         assert_eq!(written, Ok(()));
         assert!(network.stations[0].unit.content() == data);
         network.run(PAUSE);

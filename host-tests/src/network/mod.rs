@@ -167,7 +167,8 @@ impl<U: Unit> Network<U> {
         }
         let ports = self.stations.iter_mut().map(|station| &mut station.port as &mut dyn Controller);
         let others = [&mut self.master as &mut dyn Controller];
-        let burst = self.disturbance.as_mut().map(|disturbance| &mut disturbance.burst as &mut dyn Controller);
+        let burst =
+            self.disturbance.as_mut().map(|disturbance| &mut disturbance.burst as &mut dyn Controller);
         let mut participants: Vec<&mut dyn Controller> = ports.chain(others).chain(burst).collect();
         let traffic = &mut self.traffic;
         let next = self.bus.step(&mut participants, self.now, &mut |event| match event {

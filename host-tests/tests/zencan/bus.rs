@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use canopen::Frame;
 use host_tests::network::{Network, Unit, from_bus};
+use zencan_client::common::CanId;
 use zencan_client::common::messages::CanMessage;
 use zencan_client::common::traits::{AsyncCanReceiver, AsyncCanSender, CanSendError};
-use zencan_client::common::CanId;
 
 /// The longest that the bus goes on without a look at the clients.
 const STEP: canopen::Duration = canopen::Duration::from_millis(1);

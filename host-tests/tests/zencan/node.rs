@@ -118,7 +118,11 @@ async fn every_object_is_written_as_its_access_says() {
 async fn nmt_commands_move_the_node_and_the_heartbeat_tells() {
     let (port, mut manager) = manager();
     for (number, expected) in [(1, NmtState::Operational), (2, NmtState::Stopped)] {
-        if number == 1 { manager.nmt_start(ID).await } else { manager.nmt_stop(0).await }
+        if number == 1 {
+            manager.nmt_start(ID).await
+        } else {
+            manager.nmt_stop(0).await
+        }
         sleep(Duration::from_millis(1100)).await;
         let nodes = manager.node_list().await;
         assert_eq!(nodes.len(), 1);
@@ -169,8 +173,7 @@ async fn a_tpdo_is_remapped_and_sends_what_it_should() {
         network.send(&canopen::Frame::new(0, &[1, ID]).unwrap());
         network.send(&canopen::Frame::new(0x80, &[]).unwrap());
         let frame = network.await_id(0x1C5, canopen::Duration::from_millis(5)).unwrap();
-        let expected: Vec<u8> =
-            [&[0][..], &pressure.to_le_bytes(), &temperature.to_le_bytes()].concat();
+        let expected: Vec<u8> = [&[0][..], &pressure.to_le_bytes(), &temperature.to_le_bytes()].concat();
         assert_eq!(frame.data(), expected);
     });
 }
