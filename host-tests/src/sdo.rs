@@ -121,11 +121,15 @@ impl<'a, C: Channel> Client<'a, C> {
         if value.len() == size && end == end_of(&value) { Ok(value) } else { Err(Failure::Corrupt) }
     }
 
-    /// Takes the segments of one block that come in sequence, and gives the number of the last of them.
+    /// Takes the segments of one block that come in sequence, and gives the number of the last of them. A block whose
+    /// end is lost is over after the time-out.
     fn receive_block(&mut self, block_size: u8, value: &mut Vec<u8>) -> Result<u8, Failure> {
         let mut sequence = 0;
         loop {
-            let frame = self.frame()?;
+            let frame = match self.frame() {
+                Err(Failure::Silence) if sequence > 0 => return Ok(sequence),
+                frame => frame?,
+            };
             let segment = BlockSegment::parse(frame).ok_or(Failure::Unexpected(frame))?;
             if segment.sequence.get() == sequence + 1 {
                 sequence += 1;
