@@ -64,7 +64,9 @@ mod tests {
         for (numerator, denominator) in
             [(1, u32::MAX), (u32::MAX - 1, u32::MAX), (u32::MAX, u32::MAX), (1, 1)]
         {
-            [0, 1, u32::MAX - 1, u32::MAX].map(|value| check(value, numerator, denominator));
+            for value in [0, 1, u32::MAX - 1, u32::MAX] {
+                check(value, numerator, denominator);
+            }
         }
     }
 }

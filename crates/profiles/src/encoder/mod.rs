@@ -37,9 +37,9 @@
 
 mod area;
 mod cam;
+mod chain;
 mod channel;
 mod commissioning;
-mod encoder;
 mod fraction;
 mod input;
 mod kept;
@@ -54,9 +54,9 @@ mod supervision;
 
 pub use area::{Area, Module, OUT_OF_RANGE, OVERFLOW, UNDERFLOW, area_state};
 pub use cam::{Cam, CamChannel, Cams};
+pub use chain::{Encoder, Snapshot};
 pub use channel::ChannelValues;
 pub use commissioning::Progress;
-pub use encoder::{Encoder, Snapshot};
 pub use input::{
     RawEncoder, SENSOR_ALARM, SENSOR_HELD, SENSOR_IMPLAUSIBLE, SENSOR_INDEX, SENSOR_NO_SIGNAL, SENSOR_PARITY,
     SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED,

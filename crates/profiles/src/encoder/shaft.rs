@@ -120,7 +120,7 @@ fn div_floor(value: i64, divisor: NonZeroU32) -> i64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::cast_possible_truncation)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 mod tests {
     use proptest::prelude::*;
 

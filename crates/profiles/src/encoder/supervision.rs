@@ -73,6 +73,7 @@ impl Default for Limits {
 
 /// What is wrong, for emergency messages (CiA 406, 5.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools)] // Each is a fault of its own.
 pub struct Conditions {
     /// 2110h, input current too high.
     pub current: bool,
