@@ -84,9 +84,10 @@ impl Encoder {
             let [low, high, ..] = mask.to_le_bytes();
             self.supervision.acknowledge(u16::from_le_bytes([low, high]));
         }
-        let channels = self.channels.each_mut().map(|channel| {
-            channel.as_mut().map_or_else(ChannelValues::default, |channel| channel.sample(raw))
-        });
+        let mut channels = self.fixed.channels;
+        for (values, channel) in channels.iter_mut().zip(&mut self.channels) {
+            *values = channel.as_mut().map_or(*values, |channel| channel.sample(raw));
+        }
         let time = self.kept.operating_time;
         Snapshot {
             alarms: self.supervision.alarms(&channels),
@@ -119,7 +120,12 @@ fn apply(channel: &mut Option<Channel>, all: &Parameters, own: &ChannelParameter
 
 fn fixed(parameters: &Parameters) -> Snapshot {
     let first = parameters.sensors().next();
+    let unused = |channel: ChannelParameters| ChannelValues {
+        presets: channel.preset.count,
+        ..ChannelValues::default()
+    };
     Snapshot {
+        channels: parameters.channels.map(unused),
         operating_status: parameters.operating_status(),
         resolution: first.map_or(0, |sensor| sensor.resolution()),
         revolutions: first.map_or(0, |sensor| sensor.revolutions()),

@@ -174,9 +174,14 @@ impl Parameters {
     /// Object 6500h: the parameters as they are active. Bit 1 says that there is a commissioning diagnostic.
     #[must_use]
     pub fn operating_status(&self) -> u16 {
-        let direction = self.sensors().fold(0, |bits, sensor| bits | direction_bit(&sensor));
         let scaling = if self.is_consistent() { SCALING } else { 0 };
-        COMMISSIONING | self.operating & (direction | scaling)
+        COMMISSIONING | self.operating & (self.directions() | scaling)
+    }
+
+    /// The bits of 6000h that turn the direction of one of the sensors.
+    #[must_use]
+    pub fn directions(&self) -> u16 {
+        self.sensors().fold(0, |bits, sensor| bits | direction_bit(&sensor))
     }
 
     fn natives(&self) -> impl Iterator<Item = Native> {
