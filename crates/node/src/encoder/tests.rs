@@ -79,8 +79,8 @@ fn every_parameter_changes_what_the_measurement_gets() {
     // Values that differ from the default, are allowed, and keep the rest allowed.
     let special = |index, sub| match (index, sub) {
         (0x6000, _) => 2,
-        (0x2103, 3) => 0,
-        (0x2105, _) => 0,
+        (0x2103, 3) | (0x2105, _) => 0,
+        (0x6005, 1) => 20_000,
         _ => 5,
     };
     for row in OBJECTS.iter().filter(|row| row.group == Group::Application) {
