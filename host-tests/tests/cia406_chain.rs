@@ -46,7 +46,7 @@ fn parameters(cells: &[&str]) -> Parameters {
     };
     let direction = if kind(code).is_linear() { DIRECTION } else { CODE_SEQUENCE };
     Parameters {
-        operating: number::<u16>(scaling) * SCALING | number::<u16>(reversed) * direction,
+        operating: (number::<u16>(scaling) * SCALING) | (number::<u16>(reversed) * direction),
         per_revolution: number(per_revolution),
         range: number(range),
         step: number(step),

@@ -84,19 +84,18 @@ impl Encoder {
             let [low, high, ..] = mask.to_le_bytes();
             self.supervision.acknowledge(u16::from_le_bytes([low, high]));
         }
-        let mut channels = self.fixed.channels;
-        for (values, channel) in channels.iter_mut().zip(&mut self.channels) {
-            *values = channel.as_mut().map_or(*values, |channel| channel.sample(raw));
+        let mut snapshot = self.fixed;
+        for (values, channel) in snapshot.channels.iter_mut().zip(&mut self.channels) {
+            if let Some(channel) = channel {
+                *values = channel.sample(raw);
+            }
         }
-        let time = self.kept.operating_time;
-        Snapshot {
-            alarms: self.supervision.alarms(&channels),
-            warnings: self.supervision.warnings(&channels, &raw.board, &self.limits, time),
-            conditions: self.supervision.conditions(&channels, &raw.board, &self.limits),
-            operating_time: time.tenths(),
-            channels,
-            ..self.fixed
-        }
+        let (channels, limits, time) = (&snapshot.channels, &self.limits, self.kept.operating_time);
+        snapshot.alarms = self.supervision.alarms(channels);
+        snapshot.warnings = self.supervision.warnings(channels, &raw.board, limits, time);
+        snapshot.conditions = self.supervision.conditions(channels, &raw.board, limits);
+        snapshot.operating_time = time.tenths();
+        snapshot
     }
 
     /// What is to outlive a loss of power: see [`Kept`].

@@ -195,7 +195,7 @@ impl Input {
         let is_first = !core::mem::replace(&mut self.referenced, true);
         let is_wrong = error.unsigned_abs() > INDEX_TOLERANCE;
         if is_first || is_wrong {
-            tracker.correct(error.saturating_neg());
+            tracker.correct(error.wrapping_neg());
         }
         if is_wrong && !is_first { SENSOR_INDEX | SENSOR_POSITION_ERROR } else { 0 }
     }

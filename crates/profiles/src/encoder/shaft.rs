@@ -18,14 +18,13 @@ impl Shaft {
     #[must_use]
     pub fn at(total: i64, turn: NonZeroU32) -> Shaft {
         let turns = div_floor(total, turn);
-        let step = total.wrapping_sub(turns.wrapping_mul(turn.get().into()));
-        Shaft { turns, step: u32::try_from(step).unwrap_or(0) }
+        Shaft { turns, step: remainder(total, turns, turn) }
     }
 
-    /// Steps from its origin.
+    /// Steps from its origin, modulo 2^64.
     #[must_use]
     pub fn total(self, turn: NonZeroU32) -> i64 {
-        self.turns.saturating_mul(turn.get().into()).saturating_add(self.step.into())
+        self.turns.wrapping_mul(turn.get().into()).wrapping_add(self.step.into())
     }
 }
 
@@ -67,7 +66,7 @@ impl Tracker {
 
     /// Puts the shaft elsewhere, though it has not moved.
     pub fn correct(&mut self, steps: i64) {
-        let step = i64::from(self.shaft.step).saturating_add(steps);
+        let step = i64::from(self.shaft.step).wrapping_add(steps);
         let turn = i64::from(self.turn.get());
         // A shaft turns less than once in a sample: the division is for what never happens.
         let turns = match step {
@@ -75,8 +74,8 @@ impl Tracker {
             _ if step < 0 => -1,
             _ => i64::from(step >= turn),
         };
-        self.shaft.turns = self.shaft.turns.saturating_add(turns);
-        self.shaft.step = u32::try_from(step.wrapping_sub(turns.wrapping_mul(turn))).unwrap_or(0);
+        self.shaft.turns = self.shaft.turns.wrapping_add(turns);
+        self.shaft.step = remainder(step, turns, self.turn);
     }
 
     /// Counts in turns of another length from now on.
@@ -117,6 +116,12 @@ fn div_floor(value: i64, divisor: NonZeroU32) -> i64 {
     let divisor = NonZeroU64::from(divisor);
     let quotient = |n: u64| i64::try_from(n / divisor).unwrap_or(i64::MAX);
     if value >= 0 { quotient(value.unsigned_abs()) } else { -quotient(value.unsigned_abs() - 1) - 1 }
+}
+
+/// What is left of `value` after so many turns; less than one is.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn remainder(value: i64, turns: i64, turn: NonZeroU32) -> u32 {
+    value.wrapping_sub(turns.wrapping_mul(turn.get().into())) as u32
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@
 //! slow one, which changes once in many:
 //!
 //! * The interval ends at the last change and starts 1, 2, 4 .. 128 changes before: the shortest that has 256 steps or
-//!   128 ms, but none beyond 256 ms, except the one of a single change. What it says is exact to 1 %.
+//!   128 ms, but none beyond 256 ms, except the one of a single change. What it says is exact to 1 %. It is found from
+//!   the one before: it grows to twice as many changes at most, and shrinks to any.
 //! * While nothing changes, the speed is at most one step in the time since. After [`STANDSTILL`] it is 0.
 //!
 //! So a shaft that starts or stops shows after a few milliseconds, and one that dithers between two steps stands still.
@@ -30,11 +31,27 @@ struct Mark {
     count: u32,
 }
 
+/// Movement between two changes.
+#[derive(Clone, Copy, Debug)]
+struct Interval {
+    steps: i32,
+    /// In milliseconds.
+    time: u32,
+}
+
+impl Interval {
+    fn is_enough(self) -> bool {
+        self.steps.unsigned_abs() >= ENOUGH_STEPS || self.time >= ENOUGH_TIME
+    }
+}
+
 /// Remembers the last 128 changes.
 #[derive(Clone, Debug)]
 pub struct Speedometer {
     marks: [Mark; MARKS as usize],
     next: u32,
+    /// Changes in the present interval.
+    changes: u32,
     last: Mark,
     now: u32,
     /// Steps a millisecond.
@@ -46,7 +63,7 @@ impl Speedometer {
     #[must_use]
     pub fn new(count: u32) -> Speedometer {
         let last = Mark { time: 0, count };
-        Speedometer { marks: [last; MARKS as usize], next: 0, last, now: STANDSTILL, rate: 0.0 }
+        Speedometer { marks: [last; MARKS as usize], next: 0, changes: 1, last, now: STANDSTILL, rate: 0.0 }
     }
 
     /// Takes the movement up to now, once a millisecond; returns steps per second.
@@ -68,25 +85,26 @@ impl Speedometer {
     }
 
     #[allow(clippy::cast_precision_loss)]
-    fn rate_until(&self, now: Mark) -> f32 {
-        let (mut steps, mut time) = self.since(1, now);
-        let mut changes = 2;
-        while changes <= MARKS && steps.unsigned_abs() < ENOUGH_STEPS && time < ENOUGH_TIME {
-            let longer = self.since(changes, now);
-            if longer.1 > TOO_LONG {
+    fn rate_until(&mut self, now: Mark) -> f32 {
+        let mut changes = (self.changes * 2).min(MARKS);
+        let mut interval = self.since(changes, now);
+        while changes > 1 {
+            let half = self.since(changes / 2, now);
+            if interval.time <= TOO_LONG && !half.is_enough() {
                 break;
             }
-            (steps, time) = longer;
-            changes *= 2;
+            (changes, interval) = (changes / 2, half);
         }
-        steps as f32 / time as f32
+        self.changes = changes;
+        interval.steps as f32 / interval.time as f32
     }
 
-    /// Steps and milliseconds since that many changes before.
-    fn since(&self, changes: u32, now: Mark) -> (i32, u32) {
+    /// The interval since that many changes before.
+    fn since(&self, changes: u32, now: Mark) -> Interval {
         let index = self.next.wrapping_sub(changes) % MARKS;
         let mark = self.marks.get(index as usize).copied().unwrap_or(self.last);
-        (now.count.wrapping_sub(mark.count).cast_signed(), now.time.wrapping_sub(mark.time))
+        let steps = now.count.wrapping_sub(mark.count).cast_signed();
+        Interval { steps, time: now.time.wrapping_sub(mark.time) }
     }
 
     fn remember(&mut self, mark: Mark) {

@@ -42,6 +42,8 @@ pub struct Format {
     coding: Coding,
     alarm: bool,
     parity: Parity,
+    /// The bit before the word: the rest level.
+    head: u64,
 }
 
 /// What a good word says.
@@ -73,6 +75,7 @@ impl Format {
         coding: Coding::Gray,
         alarm: false,
         parity: Parity::None,
+        head: 1 << 25,
     };
 
     /// A layout; `None` for no step bits, more than 31 of them (6501h is an UNSIGNED32), or more than 32 position bits.
@@ -84,20 +87,16 @@ impl Format {
         alarm: bool,
         parity: Parity,
     ) -> Option<Format> {
-        let bits = revolution_bits.checked_add(step_bits)?;
-        ((1..=31).contains(&step_bits) && bits <= 32).then_some(Format {
-            revolution_bits,
-            step_bits,
-            coding,
-            alarm,
-            parity,
-        })
+        let bits = revolution_bits.checked_add(step_bits).filter(|bits| *bits <= 32)?;
+        let length = u32::from(bits) + u32::from(alarm) + u32::from(parity != Parity::None);
+        let format = Format { revolution_bits, step_bits, coding, alarm, parity, head: 1 << length };
+        (1..=31).contains(&step_bits).then_some(format)
     }
 
     /// Bits on the line.
     #[must_use]
     pub fn length(self) -> u32 {
-        self.position_bits() + u32::from(self.alarm) + u32::from(self.parity != Parity::None)
+        self.head.trailing_zeros()
     }
 
     /// Bits of the position within a revolution.
@@ -126,10 +125,10 @@ impl Format {
         let Some(tail) = frame.clocks.min(64).checked_sub(self.length() + 1).filter(|tail| *tail > 0) else {
             return Err(Fault::NoSignal);
         };
-        // `tail` is at most 62 here, and the word with the level before it at most 35 bits long.
-        let high_before = frame.bits >> tail >> self.length() & 1 == 1;
-        let low_after = frame.bits & ((1 << tail) - 1) == 0;
-        if high_before && low_after { self.decode(frame.bits >> tail) } else { Err(Fault::NoSignal) }
+        let word = frame.bits >> tail;
+        let is_high_before = word & self.head != 0;
+        let is_low_after = frame.bits.trailing_zeros() >= tail;
+        if is_high_before && is_low_after { self.decode(word) } else { Err(Fault::NoSignal) }
     }
 
     /// Reads a word, right-aligned; bits above its length are ignored.
@@ -137,22 +136,25 @@ impl Format {
     /// # Errors
     /// [`Fault::Parity`].
     pub fn decode(self, word: u64) -> Result<Reading, Fault> {
-        let word = word & ((1 << self.length()) - 1);
-        let odd = word.count_ones() % 2 == 1;
-        let good = match self.parity {
-            Parity::None => true,
-            Parity::Even => !odd,
-            Parity::Odd => odd,
+        let word = word & (self.head - 1);
+        let is_odd = || word.count_ones() % 2 == 1;
+        let rest = match self.parity {
+            Parity::None => word,
+            Parity::Even if is_odd() => return Err(Fault::Parity),
+            Parity::Odd if !is_odd() => return Err(Fault::Parity),
+            Parity::Even | Parity::Odd => word >> 1,
         };
-        if !good {
-            return Err(Fault::Parity);
-        }
-        let rest = if self.parity == Parity::None { word } else { word >> 1 };
         let (alarm, code) = if self.alarm { (rest & 1 == 1, rest >> 1) } else { (false, rest) };
-        let code = u32::try_from(code).unwrap_or(u32::MAX);
+        let code = low_word(code);
         let position = if self.coding == Coding::Gray { from_gray(code) } else { code };
         Ok(Reading { position, code, alarm })
     }
+}
+
+/// A position has at most 32 bits.
+#[allow(clippy::cast_possible_truncation)]
+fn low_word(code: u64) -> u32 {
+    code as u32
 }
 
 /// Each bit is the exclusive or of all Gray bits from the top down to it.
