@@ -6,12 +6,15 @@
 //! * every frame of an absolute encoder is there, has its parity, shows no alarm of the encoder, and lies no further
 //!   from the one before than the sensor can have moved: so a line, a supply or a code with a gap fails at standstill,
 //!   within a second;
-//! * over two turns (of a rod: 8192 steps) every bit of the code within a turn has been both 0 and 1: a bit that never
-//!   changes, while the movement was not so even that it could be the bit of an even number of steps, is stuck;
+//! * over two turns (of a rod: 8192 steps) made without a rest, every bit of the code within a turn is both 0 and 1: one
+//!   that never changes is stuck. Only bits that such a movement cannot step over are judged, so the slower the
+//!   shaft turns, the more bits are: all of them at one step a millisecond, or 7 rpm with 13 bits;
 //! * an incremental encoder is not faster than it may be, shows its index within two turns, and shows it whole turns
 //!   apart.
 //!
 //! The diagnostic starts when the bit is set and ends when it is cleared or something fails.
+
+use core::num::NonZeroU64;
 
 use super::Sensor;
 use super::input::{
@@ -20,6 +23,8 @@ use super::input::{
 
 /// Milliseconds after which standstill is checked.
 const STANDSTILL_MILLIS: u32 = 1000;
+/// Milliseconds without movement that are a rest.
+const REST_MILLIS: u32 = 100;
 /// Bits of a rod's code that are checked: those of 4096 steps.
 const ROD_BITS: u32 = 12;
 
@@ -65,49 +70,46 @@ impl Progress {
 pub(super) struct Commissioning {
     progress: Progress,
     millis: u32,
+    /// Milliseconds since the last movement.
+    rest: u32,
+    run: Run,
+}
+
+/// A movement without a rest.
+#[derive(Clone, Copy, Debug, Default)]
+struct Run {
+    millis: u32,
     travel: i64,
     /// Bits of the code that have been 1, and those that have been 0.
     ones: u32,
     zeros: u32,
-    /// Smallest and largest movement in a millisecond.
-    moved: Option<(i32, i32)>,
 }
 
-impl Commissioning {
-    /// Follows bit 1 of 6000h.
-    pub(super) fn set(&mut self, on: bool) {
-        if on != (self.progress != Progress::Off) {
-            let progress = if on { Progress::Running } else { Progress::Off };
-            *self = Commissioning { progress, ..Commissioning::default() };
-        }
-    }
-
-    pub(super) fn progress(&self) -> Progress {
-        self.progress
-    }
-
-    /// Looks at a sample.
-    pub(super) fn observe(&mut self, sensor: &Sensor, seen: &Observation) {
-        if self.progress == Progress::Off || self.progress.is_failure() {
-            return;
-        }
+impl Run {
+    fn follow(&mut self, seen: &Observation) {
         self.millis = self.millis.saturating_add(1);
-        self.travel = self.travel.saturating_add(seen.moved.into());
-        (self.ones, self.zeros) = (self.ones | seen.code, self.zeros | !seen.code);
-        let (least, most) = self.moved.unwrap_or((seen.moved, seen.moved));
-        self.moved = Some((least.min(seen.moved), most.max(seen.moved)));
+        self.rest = if seen.moved == 0 { self.rest.saturating_add(1) } else { 0 };
+        self.run.follow(seen);
         self.progress = self.judge(sensor, seen);
+        if self.rest > REST_MILLIS || self.is_over(sensor) {
+            self.run = Run::default();
+        }
+    }
+
+    /// Whether the run was two turns long.
+    fn is_over(&self, sensor: &Sensor) -> bool {
+        self.run.travel.unsigned_abs() >= 2 * turn(sensor)
     }
 
     fn judge(&self, sensor: &Sensor, seen: &Observation) -> Progress {
-        let turns_done = self.travel.unsigned_abs() >= 2 * turn(sensor);
+        let is_over = self.is_over(sensor);
         match seen.state {
             state if state & (SENSOR_HELD | SENSOR_ALARM) != 0 => Progress::BadReading,
             state if state & SENSOR_TOO_FAST != 0 => Progress::TooFast,
             state if state & SENSOR_INDEX != 0 => Progress::BadIndex,
-            state if turns_done && state & SENSOR_UNREFERENCED != 0 => Progress::BadIndex,
-            _ if turns_done && self.has_stuck_bit(sensor) => Progress::StuckBit,
-            _ if turns_done || self.progress == Progress::GoodOverTurns => Progress::GoodOverTurns,
+            state if is_over && state & SENSOR_UNREFERENCED != 0 => Progress::BadIndex,
+            _ if is_over && self.has_stuck_bit(sensor) => Progress::StuckBit,
+            _ if is_over || self.progress == Progress::GoodOverTurns => Progress::GoodOverTurns,
             _ if self.millis >= STANDSTILL_MILLIS => Progress::GoodAtRest,
             _ => Progress::Running,
         }
@@ -115,9 +117,7 @@ impl Commissioning {
 
     fn has_stuck_bit(&self, sensor: &Sensor) -> bool {
         let bits = if sensor.kind.is_linear() { ROD_BITS } else { sensor.format.step_bits() };
-        let checked = u32::MAX >> (32 - bits.min(sensor.bits()).clamp(1, 32));
-        let varied = self.moved.is_some_and(|(least, most)| least != most);
-        sensor.kind.is_absolute() && varied && self.ones & self.zeros & checked != checked
+        sensor.kind.is_absolute() && self.run.has_stuck_bit(bits.min(sensor.bits()))
     }
 }
 

@@ -84,8 +84,10 @@ impl KeptChannel {
 /// What is to be kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kept {
-    pub(super) channels: [KeptChannel; 2],
-    pub(super) operating_time: OperatingTime,
+    /// Of each channel.
+    pub channels: [KeptChannel; 2],
+    /// Operating time (6508h).
+    pub operating_time: OperatingTime,
 }
 
 /// What the memory had when the power came back.
