@@ -88,17 +88,46 @@ struct Run {
 impl Run {
     fn follow(&mut self, seen: &Observation) {
         self.millis = self.millis.saturating_add(1);
+        self.travel = self.travel.saturating_add(seen.moved.into());
+        (self.ones, self.zeros) = (self.ones | seen.code, self.zeros | !seen.code);
+    }
+
+    /// Whether one of the lowest so many bits never changed, though the movement was slow enough to show it: a bit keeps
+    /// its value for as many steps as it is worth, or twice as many in Gray code.
+    fn has_stuck_bit(&self, bits: u32) -> bool {
+        let millis = NonZeroU64::new(self.millis.into()).unwrap_or(NonZeroU64::MIN);
+        let mean = self.travel.unsigned_abs().saturating_add(millis.get() - 1) / millis;
+        let hidden = mean.checked_next_power_of_two().and_then(|steps| u32::try_from(steps - 1).ok());
+        let judged = (u32::MAX >> (32 - bits.clamp(1, 32))) & !hidden.unwrap_or(u32::MAX);
+        self.ones & self.zeros & judged != judged
+    }
+}
+
+impl Commissioning {
+    /// Follows bit 1 of 6000h.
+    pub(super) fn set(&mut self, on: bool) {
+        if on != (self.progress != Progress::Off) {
+            let progress = if on { Progress::Running } else { Progress::Off };
+            *self = Commissioning { progress, ..Commissioning::default() };
+        }
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    /// Looks at a sample.
+    pub(super) fn observe(&mut self, sensor: &Sensor, seen: &Observation) {
+        if self.progress == Progress::Off || self.progress.is_failure() {
+            return;
+        }
+        self.millis = self.millis.saturating_add(1);
         self.rest = if seen.moved == 0 { self.rest.saturating_add(1) } else { 0 };
         self.run.follow(seen);
         self.progress = self.judge(sensor, seen);
         if self.rest > REST_MILLIS || self.is_over(sensor) {
             self.run = Run::default();
         }
-    }
-
-    /// Whether the run was two turns long.
-    fn is_over(&self, sensor: &Sensor) -> bool {
-        self.run.travel.unsigned_abs() >= 2 * turn(sensor)
     }
 
     fn judge(&self, sensor: &Sensor, seen: &Observation) -> Progress {
@@ -113,6 +142,11 @@ impl Run {
             _ if self.millis >= STANDSTILL_MILLIS => Progress::GoodAtRest,
             _ => Progress::Running,
         }
+    }
+
+    /// Whether the run was two turns long.
+    fn is_over(&self, sensor: &Sensor) -> bool {
+        self.run.travel.unsigned_abs() >= 2 * turn(sensor)
     }
 
     fn has_stuck_bit(&self, sensor: &Sensor) -> bool {
