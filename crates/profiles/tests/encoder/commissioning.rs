@@ -27,7 +27,7 @@ fn off_until_it_is_asked_for() {
 #[test]
 fn a_good_encoder_passes_at_rest_and_over_two_turns() {
     for kind in [SensorType::MultiTurn, SensorType::SingleTurn, SensorType::IncrementalCounted] {
-        for speed in [1, 7, -13, 64, 400] {
+        for speed in [1_i64, 7, -13, 64, 400] {
             let mut bench = diagnosed(kind);
             (0..1000).for_each(|_| _ = bench.stay());
             assert_eq!(progress(&mut bench), Progress::GoodAtRest, "{kind:?}");

@@ -37,8 +37,8 @@ fn a_wrong_parity_is_no_position() {
     parameters.format = Format::new(0, 8, Coding::Binary, false, Parity::Even).unwrap();
     let mut bench = Bench::new(parameters);
     let frame = |word: u64| Some(Frame { bits: (1 << 9 | word) << 1, clocks: 11 });
-    assert_eq!(bench.receive(frame(0b0000_0011_0)).channels[0].position, 3);
-    let values = bench.receive(frame(0b0000_0111_0)).channels[0];
+    assert_eq!(bench.receive(frame(3 << 1)).channels[0].position, 3);
+    let values = bench.receive(frame(7 << 1)).channels[0];
     assert_eq!((values.position, values.sensor_state), (3, SENSOR_PARITY));
 }
 
@@ -48,8 +48,8 @@ fn the_encoder_s_own_alarm_is_one() {
     parameters.format = Format::new(0, 8, Coding::Binary, true, Parity::None).unwrap();
     let mut bench = Bench::new(parameters);
     let frame = |word: u64| Some(Frame { bits: (1 << 9 | word) << 1, clocks: 11 });
-    assert_eq!(bench.receive(frame(0b0000_0011_0)).alarms, 0);
-    assert_eq!(bench.receive(frame(0b0000_0011_1)).alarms, ALARM_POSITION);
+    assert_eq!(bench.receive(frame(3 << 1)).alarms, 0);
+    assert_eq!(bench.receive(frame(3 << 1 | 1)).alarms, ALARM_POSITION);
 }
 
 /// After an outage the sensor may be further away: as far as it can have moved.
