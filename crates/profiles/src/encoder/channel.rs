@@ -95,14 +95,14 @@ impl Channel {
 
     /// Takes over parameters, from the next sample on. Another sensor makes another channel.
     pub(super) fn apply(&mut self, all: &Parameters, own: &ChannelParameters, sensor: Sensor) {
-        if sensor != *self.input.sensor() {
+        if !sensor.is_like(self.input.sensor()) {
             *self = Channel::new(all, own, sensor, &KeptChannel::default());
             return;
         }
         let scale = all.scale(&sensor);
         let shaft = self.input.tracker().map(super::Tracker::shaft).unwrap_or_default();
         self.position.rescale(scale, shaft);
-        self.input.apply(&scale, all.module.offset);
+        self.input.apply(sensor, &scale, all.module.offset);
         self.preset.set(own.preset);
         self.configure(all, own, &scale);
     }

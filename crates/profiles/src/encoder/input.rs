@@ -52,8 +52,6 @@ pub(super) struct Observation {
     pub(super) moved: i32,
     /// The position as it was coded on the line.
     pub(super) code: u32,
-    /// An index came.
-    pub(super) index: bool,
 }
 
 /// Where a position was left.
@@ -91,8 +89,9 @@ impl Input {
         &self.sensor
     }
 
-    /// Moves the zero and counts in the turns of this scale.
-    pub(super) fn apply(&mut self, scale: &Scale, offset: i32) {
+    /// Takes another description of the same sensor, moves the zero, and counts in the turns of this scale.
+    pub(super) fn apply(&mut self, sensor: Sensor, scale: &Scale, offset: i32) {
+        self.sensor = sensor;
         let moved = i64::from(offset) - i64::from(self.offset);
         self.offset = offset;
         if let Some(tracker) = &mut self.tracker {
@@ -141,7 +140,7 @@ impl Input {
         }
         self.missed = 0;
         let state = if reading.alarm { SENSOR_ALARM | SENSOR_POSITION_ERROR } else { 0 };
-        Observation { state, moved: self.follow(word, scale), code: reading.code, index: false }
+        Observation { state, moved: self.follow(word, scale), code: reading.code }
     }
 
     fn miss(&mut self, state: u8) -> Observation {
@@ -154,10 +153,10 @@ impl Input {
         let moved = self.follow(raw.counter.into(), scale);
         let is_fast = self.sensor.fastest > 0 && moved.unsigned_abs() > self.sensor.fastest;
         let index = raw.index.filter(|_| self.sensor.index);
-        let wrong = index.map_or(0, |index| self.reference(index));
+        let lost = index.map_or(0, |index| self.reference(index));
         let unreferenced = if self.sensor.index && !self.referenced { SENSOR_UNREFERENCED } else { 0 };
-        let state = wrong | unreferenced | if is_fast { SENSOR_TOO_FAST } else { 0 };
-        Observation { state, moved, code: raw.counter.into(), index: index.is_some() }
+        let state = lost | unreferenced | if is_fast { SENSOR_TOO_FAST } else { 0 };
+        Observation { state, moved, code: raw.counter.into() }
     }
 
     fn follow(&mut self, word: u32, scale: &Scale) -> i32 {

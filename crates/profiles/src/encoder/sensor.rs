@@ -108,6 +108,13 @@ pub struct Sensor {
 }
 
 impl Sensor {
+    /// Whether readings of both mean the same, so that a position goes on from one to the other.
+    #[must_use]
+    pub fn is_like(&self, other: &Sensor) -> bool {
+        let is_same_code = !self.kind.is_absolute() || self.format == other.format;
+        self.kind == other.kind && self.resolution() == other.resolution() && is_same_code
+    }
+
     /// What it resolves.
     #[must_use]
     pub fn native(&self) -> Native {

@@ -79,7 +79,7 @@ impl Speedometer {
             self.rate = 0.0;
         } else {
             let most = 1.0 / silence as f32;
-            self.rate = self.rate.clamp(-most, most);
+            self.rate = self.rate.max(-most).min(most);
         }
         self.rate * 1000.0
     }

@@ -1,6 +1,6 @@
 //! Presets, offsets, and what becomes of them.
 
-use profiles::encoder::{CODE_SEQUENCE, Parameters, SCALING, SensorType};
+use profiles::encoder::{CODE_SEQUENCE, Coding, Format, Parameters, Parity, SCALING, SensorType};
 
 use crate::bench::{Bench, one, two};
 
@@ -71,18 +71,31 @@ fn in_other_units_the_offset_is_gone() {
     }
 }
 
-/// Parameters that have nothing to do with units leave offset, cam history and speed alone.
+/// Parameters that have nothing to do with units leave position, offset and speed alone: those of an incremental sensor
+/// cannot be found again.
 #[test]
 fn other_parameters_leave_the_position() {
-    let mut bench = Bench::new(one(SensorType::MultiTurn));
+    let changes: [fn(&mut Parameters); 5] = [
+        |parameters| parameters.limits.highest_current = 1,
+        |parameters| parameters.channels[0].fastest = 0,
+        |parameters| parameters.channels[0].area.low = 7,
+        |parameters| parameters.channels[1].kind = Some(SensorType::MultiTurn),
+        |parameters| {
+            parameters.format = Format::new(0, 10, Coding::Binary, true, Parity::Odd).unwrap();
+        },
+    ];
+    let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
     bench.preset(0, 77);
     bench.stay();
+    bench.change(|parameters| parameters.index = false);
     (0..100).for_each(|_| _ = bench.step(30));
-    let before = bench.step(30).channels[0];
-    bench.change(|parameters| parameters.limits.highest_current = 1);
-    let after = bench.step(30).channels[0];
-    assert_eq!((after.position, after.offset, after.speed), (before.position + 30, 77, before.speed));
+    for change in changes {
+        let before = bench.step(30).channels[0];
+        bench.change(change);
+        let after = bench.step(30).channels[0];
+        assert_eq!((after.position, after.offset, after.speed), (before.position + 30, 77, before.speed));
+    }
 }
 
 #[test]
