@@ -37,8 +37,8 @@ impl Default for Module {
 /// The area state register at a position value and a position in native steps.
 ///
 /// Limits belong to the area; only what is beyond them is reported, or a sensor that uses its whole range would be out
-/// of range at both ends ("is reached" in CiA 406). The limits are signed and 6004h is not: both are compared in 64 bits.
-/// The ends of INTEGER32 are no limits to the sensor.
+/// of range at both ends ("is reached" in CiA 406). The limits are signed and 6004h is not: both are compared in 64
+/// bits. The ends of INTEGER32 are no limits to the sensor.
 #[must_use]
 pub fn area_state(area: &Area, module: &Module, position: u32, native: i64) -> u8 {
     let position = i64::from(position);

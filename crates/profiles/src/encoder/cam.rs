@@ -61,7 +61,7 @@ pub struct CamChannel {
 }
 
 impl CamChannel {
-    /// Takes over parameters. A cam that is not enabled forgets its state, so after enabling its limits alone decide.
+    /// Takes over parameters.
     pub fn apply(&mut self, cams: &Cams) {
         (self.enable, self.polarity, self.reachable) = (cams.enable, cams.polarity, 0);
         for ((cam, windows), bit) in cams.cams.iter().zip(&mut self.windows).zip(BITS) {
@@ -69,11 +69,11 @@ impl CamChannel {
             self.reachable |= if on.is_some() { bit } else { 0 };
             *windows = [on.unwrap_or_default(), stay.unwrap_or_default()];
         }
-        self.active &= self.enable & self.reachable;
     }
 
     /// The cam state register (6300h) at `position`. A cam that is not enabled reads 0 whatever its polarity: 6301h says
-    /// that its calculation is off and its state permanently 0.
+    /// that its calculation is off and its state permanently 0. It forgets its state, so after enabling its limits alone
+    /// decide.
     pub fn update(&mut self, position: u32) -> u8 {
         let mut active = 0;
         for ([on, stay], bit) in self.windows.iter().zip(BITS) {
@@ -110,7 +110,9 @@ mod tests {
     }
 
     prop_compose! {
-        fn any_cam()(low in any_limit(), high in any_limit(), hysteresis in prop_oneof![0..20_u16, any::<u16>()]) -> Cam {
+        fn any_cam()(
+            low in any_limit(), high in any_limit(), hysteresis in prop_oneof![0..20_u16, any::<u16>()],
+        ) -> Cam {
             Cam { low, high, hysteresis }
         }
     }

@@ -1,6 +1,7 @@
 //! Multiplication by a fraction without a division.
 //!
-//! A 64-bit division is a library call of more than a hundred instructions on a Cortex-M4; this is three multiplications.
+//! A 64-bit division is a library call of more than a hundred instructions on a Cortex-M4; this is three
+//! multiplications.
 
 use core::num::NonZeroU32;
 

@@ -2,8 +2,8 @@
 //!
 //! When to store it: the firmware may copy [`Kept`] to battery-backed RAM after every sample, for that does not wear.
 //! To flash it goes when the supply falls, and whenever 6508h has changed, which is every 6 minutes: a record of
-//! less than 80 bytes fills a page of 16 KiB in 20 hours, and the 10 000 erasures that a page stands are used up after 23
-//! years with one page, 46 with two.
+//! less than 80 bytes fills a page of 16 KiB in 20 hours, and the 10 000 erasures that a page stands are used up after
+//! 23 years with one page, 46 with two.
 
 use super::input::Left;
 use super::{Position, SensorType};
@@ -36,7 +36,8 @@ impl OperatingTime {
     }
 }
 
-/// What one channel keeps. It is taken back by a channel whose sensor is still the same; its offset only in the same units.
+/// What one channel keeps. It is taken back by a channel whose sensor is still the same; its offset only in the same
+/// units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KeptChannel {
     /// Code of the sensor's type, 0 for a channel that has no position.

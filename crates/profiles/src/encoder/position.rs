@@ -82,7 +82,9 @@ mod tests {
     proptest! {
         /// With additions it is what it is with divisions.
         #[test]
-        fn agrees_with_the_scale(scale in any_scale(), offset: i32, start in -(1_i64 << 50)..1 << 50, walk in any_walk()) {
+        fn agrees_with_the_scale(
+            scale in any_scale(), offset: i32, start in -(1_i64 << 50)..1 << 50, walk in any_walk(),
+        ) {
             let mut position = Position::new(scale, offset);
             let mut total = start;
             for steps in walk {
@@ -104,7 +106,9 @@ mod tests {
         }
 
         #[test]
-        fn counting_the_other_way_leaves_the_value(scale in any_scale(), offset: i32, total in -(1_i64 << 50)..1 << 50) {
+        fn counting_the_other_way_leaves_the_value(
+            scale in any_scale(), offset: i32, total in -(1_i64 << 50)..1 << 50,
+        ) {
             let shaft = shaft_at(total, &scale);
             let mut position = Position::new(scale, offset);
             let before = position.value(shaft);

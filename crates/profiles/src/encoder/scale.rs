@@ -126,7 +126,8 @@ impl Scale {
         Scale { turn, units, range, reversed, within: Fraction::new(units, turn) }
     }
 
-    /// Native steps in a turn. For a linear encoder that is a way which is a whole number both of its own steps and of units.
+    /// Native steps in a turn. For a linear encoder that is a way which is a whole number both of its own steps and of
+    /// units.
     #[must_use]
     pub fn turn(&self) -> NonZeroU32 {
         self.turn

@@ -193,6 +193,15 @@ mod tests {
         assert!(back.iter().all(|speed| deviation(*speed, -400_000.0) < 0.01), "{back:?}");
     }
 
+    /// Two steps a second, then a hundred: the long pauses before say nothing about now.
+    #[test]
+    fn a_slow_shaft_that_speeds_up_forgets_how_slow_it_was() {
+        let mut speedometer = Speedometer::new(0);
+        (1..=3000_u32).for_each(|t| _ = speedometer.update(t / 500));
+        let speeds: Vec<f32> = (1..=300_u32).map(|t| speedometer.update(6 + t / 10)).collect();
+        assert!(speeds[20..].iter().all(|speed| deviation(*speed, 100.0) < 0.01), "{speeds:?}");
+    }
+
     #[test]
     fn dithering_between_two_steps_is_no_speed() {
         let mut speedometer = Speedometer::new(0);
