@@ -39,12 +39,13 @@ impl Sender {
         self.phase == Phase::Sending
     }
 
-    /// The client is ready for the first block.
-    pub(super) fn start(&mut self) -> Result<(), Abort> {
-        if self.phase != Phase::Ready {
-            return Err(Abort::Command);
+    /// The client is ready for the first block. It may say so twice.
+    pub(super) fn start(&mut self, is_repeated: bool) -> Result<(), Abort> {
+        match self.phase {
+            Phase::Ready => self.phase = Phase::Sending,
+            _ if is_repeated => (),
+            _ => return Err(Abort::Command),
         }
-        self.phase = Phase::Sending;
         Ok(())
     }
 
