@@ -303,7 +303,7 @@ fn the_begin_of_a_download_that_comes_twice_is_no_segment() {
 }
 
 #[test]
-fn the_requests_of_an_upload_that_nobody_answers_may_come_twice() {
+fn the_requests_of_an_upload_may_come_twice() {
     let mut client = Client::new();
     client.bench.device.application_mut().domain = data(20);
     client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 3, threshold: 0 });
@@ -311,7 +311,9 @@ fn the_requests_of_an_upload_that_nobody_answers_may_come_twice() {
     client.request(Request::BlockUploadStart);
     assert_eq!(client.block().len(), 3);
     let all = Request::BlockAcknowledge { sequence: 3, block_size: 3 };
-    assert_eq!(client.bench.ask(all), Some(Response::BlockUploadEnd(end(&data(20)))));
+    for _ in 0..2 {
+        assert_eq!(client.bench.ask(all), Some(Response::BlockUploadEnd(end(&data(20)))));
+    }
     client.request(Request::BlockUploadEnded);
     client.request(Request::BlockUploadEnded);
     assert_eq!(client.block(), [[0; 8]; 0]);
