@@ -42,6 +42,7 @@ impl Row {
             "UNSIGNED8" => Some(1),
             "UNSIGNED16" | "INTEGER16" => Some(2),
             "UNSIGNED32" | "INTEGER32" | "REAL32" => Some(4),
+            "UNSIGNED64" => Some(8),
             "VISIBLE_STRING" | "DOMAIN" => None,
             other => panic!("{other}"),
         }
