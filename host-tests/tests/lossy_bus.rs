@@ -8,7 +8,7 @@ use host_tests::sdo::Client;
 
 /// Each has four transfers.
 const ROUNDS: u64 = 80;
-/// Of three: what is left of a transfer on the bus is over when the next one begins.
+/// Between two transfers: what the bus repeats or holds up of one is over when the next one begins.
 const PAUSE: Duration = Duration::from_millis(10);
 
 fn bus(seed: u64, percent: u32) -> Network<DomainDevice> {
