@@ -80,7 +80,7 @@ impl Server {
             return self.settle(answer, now);
         }
         if let Some(response) = self.repeated(frame) {
-            return Some(response);
+            return response;
         }
         let answer = match self.block_segment(frame) {
             Some(segment) => self.take_block_segment(segment, objects),
@@ -92,12 +92,29 @@ impl Server {
         response
     }
 
-    /// The answer to a frame that came twice, be it that the bus repeated it or that the client missed the answer.
-    /// Segments and the end of a block download change from one to the next; only they can be known as repeated.
-    fn repeated(&self, frame: [u8; 8]) -> Option<Response> {
+    /// The answer to a frame that came twice, be it that the bus repeated it or that the client missed the answer; `None`
+    /// for any other frame. Segments and the end of a block download change from one to the next; only they can be known
+    /// as repeated. So can what begins a block download, for the first segment has another first byte, and what begins
+    /// and ends a block upload, which has no answer.
+    fn repeated(&self, frame: [u8; 8]) -> Option<Option<Response>> {
         let (previous, response) = self.previous;
-        let changes = matches!(frame[0] >> 5, 0 | 3) || frame[0] & 0xE1 == 0xC1;
-        response.filter(|_| changes && frame == previous && !self.wants_block_segments())
+        if frame != previous {
+            return None;
+        }
+        match (Request::parse(frame), response) {
+            (_, Some(Response::BlockDownload(..))) => Some(response),
+            _ if self.wants_block_segments() => None,
+            (Some(Request::BlockUploadStart | Request::BlockUploadEnded), None) => Some(None),
+            (
+                Some(
+                    Request::UploadSegment { .. }
+                    | Request::DownloadSegment(_)
+                    | Request::BlockDownloadEnd(_),
+                ),
+                _,
+            ) => response.map(Some),
+            _ => None,
+        }
     }
 
     fn dispatch(&mut self, frame: [u8; 8], objects: &mut impl Objects, now: Instant) -> Answer {
