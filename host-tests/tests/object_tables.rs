@@ -145,7 +145,7 @@ fn a_value_of_the_wrong_length_is_refused() {
             assert_eq!(bench.write(row.index, row.sub, &[0; 4][..=size]), Err(TOO_LONG), "{row:X?}");
         }
         if size > 1 {
-            assert_eq!(bench.write(row.index, row.sub, &[0; 4][..size - 1]), Err(TOO_SHORT), "{row:X?}");
+            assert_eq!(bench.write(row.index, row.sub, &[0; 8][..size - 1]), Err(TOO_SHORT), "{row:X?}");
         }
     }
 }
