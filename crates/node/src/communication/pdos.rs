@@ -1,7 +1,7 @@
 //! PDO objects: eight PDOs each way. RPDOs wait for a use in every personality; what a TPDO is by default is a matter of
 //! the personality.
 
-use canopen::dictionary::{Access, DefaultValue, Group, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Group, Object, Rule, Type};
 
 /// What a TPDO is by default.
 pub(crate) struct Tpdo {
@@ -138,8 +138,10 @@ const fn rpdo_mappings() -> [[Object; 9]; 8] {
     rows
 }
 
+const RPDO_PARTS: &[&[Object]] = &[rpdos().as_flattened(), rpdo_mappings().as_flattened()];
+
 /// 1400h to 1607h: eight RPDOs.
-pub(crate) const RPDOS: [&[Object]; 2] = [rpdos().as_flattened(), rpdo_mappings().as_flattened()];
+pub(crate) static RPDOS: [Object; dictionary::count(RPDO_PARTS)] = dictionary::gather(RPDO_PARTS);
 
 /// The communication parameters of these TPDOs.
 pub(crate) const fn tpdos<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 6]; N] {

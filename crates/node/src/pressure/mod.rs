@@ -6,14 +6,17 @@ mod profile;
 mod rules;
 mod values;
 
-pub(crate) use rules::write;
-pub(crate) use values::{parameters, publish};
+pub(crate) use manufacturer::STATUS_AND_USER;
+pub(crate) use profile::{INTEGER, REAL};
+pub(crate) use values::Fields;
 
-use crate::communication;
+use crate::manufacturer::{TRANSFER_BUFFER, personality};
+use crate::personality::Definition;
+use crate::{Personality, communication, flags};
 use canopen::dictionary::{self, Dictionary, Entry, Object};
 
 /// CiA 404, two analogue input blocks.
-const DEVICE_TYPE: i64 = 0x0002_0194;
+pub(crate) const DEVICE_TYPE: i64 = 0x0002_0194;
 
 /// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
@@ -26,15 +29,21 @@ const PARTS: &[&[Object]] = &[
     communication::SERVICES,
     &PDOS,
     communication::START_UP,
-    manufacturer::OBJECTS,
-    profile::OBJECTS,
+    &[personality(Personality::Pressure), TRANSFER_BUFFER],
+    STATUS_AND_USER,
+    REAL,
+    INTEGER,
 ];
-const ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
-const DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
+static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
+static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
 const _: () = dictionary::check(&OBJECTS);
 
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-/// The dictionary as the node runs it.
-pub(crate) const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static FLAGS: flags::Fields = flags::Fields::new(&DICTIONARY);
+static FIELDS: Fields = Fields::new(&DICTIONARY, 0);
+
+pub(crate) static DEFINITION: Definition =
+    Definition { dictionary: &DICTIONARY, flags: Some(&FLAGS), pressure: Some(&FIELDS), encoder: None };

@@ -38,8 +38,7 @@ const SPARE: [Tpdo; 6] =
 
 /// All of them, in the order of the table.
 pub(super) const PARTS: &[&[Object]] = &[
-    RPDOS[0],
-    RPDOS[1],
+    &RPDOS,
     &TPDO1,
     &TPDO2,
     tpdos(&SPARE).as_flattened(),
