@@ -1,0 +1,23 @@
+//! The host's side of a CANopen bus.
+//!
+//! [`bus`] opens one, over SocketCAN, socketcand or slcan; [`Network`] is what the services share: [`sdo`], [`nmt`],
+//! [`heartbeat`], [`lss`]. On them stand [`update`] (CiA 302-3) and the command line tool of this crate.
+//!
+//! ```no_run
+//! use nodectl::{Network, object, sdo};
+//!
+//! let address: nodectl::bus::Address = "socketcand://127.0.0.1:29536/vcan0".parse()?;
+//! let mut network = Network::open(move || address.open(250))?;
+//! let node = canopen::NodeId::new(1).ok_or("a node-ID")?;
+//! let mut client = sdo::Client::new(&mut network, node, sdo::Options::default());
+//! let device_type = client.upload(object::at(0x1000, 0))?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod bus;
+mod network;
+pub mod object;
+pub mod sdo;
+
+pub use network::Network;
