@@ -1,0 +1,7 @@
+//! The library against nodes in this process, in virtual time.
+
+mod blocks;
+mod loader;
+mod pressure;
+mod transfers;
+mod wire;
