@@ -1,8 +1,13 @@
-//! A node on a bench: frames in and out, an SDO client, and the time under control.
+//! A node with its parameter store on a bench: frames in and out, an SDO client, and the time under control.
 
 use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response};
 use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
-use node::{FactoryCalibration, Measurement, Personality, Protocol, RawSample, Setup};
+use node::{
+    BitRate, FactoryCalibration, Measurement, Parcel, Personality, Protocol, RawSample, Request as Demand,
+    Setup,
+};
+use std::collections::VecDeque;
+use storage::{Memory, Pages, Store, View};
 
 /// Node-ID of the node on the bench.
 pub const ID: u8 = 0x21;
@@ -33,15 +38,24 @@ pub struct Bench {
     pub out: Queue,
     /// The time.
     pub now: Instant,
+    /// What it stores.
+    pub store: Flash,
+    demands: VecDeque<Demand>,
 }
+
+/// The parameter store in RAM.
+pub type Flash = Store<Memory<Vec<u8>>>;
+
+const PAGES: Pages = Pages::new(0, 4 * 1024);
 
 /// A setup with recognisable values.
 #[must_use]
 pub fn setup() -> Setup {
     Setup {
         personality: Personality::Pressure,
-        node_id: NodeId::new(ID).expect("a node-ID"),
-        bit_rate: 250,
+        node_id: NodeId::new(ID),
+        bit_rate: BitRate::from_kbit(250).expect("a bit rate"),
+        program_id: 0x0BAD_CAFE,
         serial_number: 0x1234_5678,
         hardware_version: "NUCLEO-F446RE",
         software_version: "0.1.0",
@@ -70,15 +84,55 @@ impl Bench {
     /// A node that has booted, its boot-up message out of the way.
     #[must_use]
     pub fn booted() -> Bench {
+        Bench::with_flash(vec![0xFF; 8 * 1024])
+    }
+
+    /// A node that has booted with this content of its parameter pages.
+    ///
+    /// # Panics
+    /// When the store cannot be prepared.
+    #[must_use]
+    pub fn with_flash(flash: Vec<u8>) -> Bench {
+        let mut view = View::open(Memory(flash), PAGES).expect("pages");
+        let mut protocol = Protocol::new(&setup());
+        protocol.load(&mut view);
         let mut bench = Bench {
-            protocol: Protocol::new(&setup()),
+            protocol,
             measurement: Measurement::new(),
             out: Queue::default(),
             now: Instant(0),
+            store: Store::prepare(view).expect("a store"),
+            demands: VecDeque::new(),
         };
         bench.protocol.start(bench.now, &mut bench.out);
         bench.take();
         bench
+    }
+
+    /// Switches the power off and on.
+    #[must_use]
+    pub fn power_cycled(self) -> Bench {
+        Bench::with_flash(self.store.into_flash().0)
+    }
+
+    /// The next thing that the node asks of its firmware, but for storing, which it has got.
+    pub fn take_request(&mut self) -> Option<Demand> {
+        self.demands.pop_front().or_else(|| self.protocol.take_request())
+    }
+
+    /// Stores what the node asks to be stored.
+    fn serve_store(&mut self) {
+        while let Some(demand) = self.protocol.take_request() {
+            if demand != Demand::Store {
+                self.demands.push_back(demand);
+                continue;
+            }
+            let mut parcel = Parcel::new();
+            if self.protocol.pack(&mut parcel) {
+                let result = parcel.deliver(&mut self.store);
+                self.protocol.finish(&parcel, result, self.now, &mut self.out);
+            }
+        }
     }
 
     /// All frames sent since the last call, as identifier and data.
@@ -96,6 +150,7 @@ impl Bench {
         if is_service {
             self.protocol.on_service_frame(frame, self.now, &mut self.out);
         }
+        self.serve_store();
         self.poll();
     }
 

@@ -25,6 +25,11 @@ impl CanId {
         CanId((function & 0x780) | (node & 0x7F) as u16)
     }
 
+    /// One of the two identifiers of LSS (CiA 305): 0 for the responses, 1 for the requests.
+    pub(crate) const fn of_lss(direction: u16) -> CanId {
+        CanId(0x7E4 | (direction & 1))
+    }
+
     /// Whether no configurable service may use it: NMT, SDO, error control, and the ranges that
     /// CiA 301 reserves (7.3.5, restricted CAN-IDs).
     #[must_use]

@@ -15,6 +15,7 @@ pub mod dictionary;
 pub mod emcy;
 mod frame;
 mod heartbeat;
+pub mod lss;
 pub mod nmt;
 mod node_id;
 pub mod pdo;
@@ -24,7 +25,7 @@ mod time;
 mod transmit;
 
 pub use can_id::{CanId, CobId};
-pub use device::{Action, Application, Device, Part};
+pub use device::{Action, Application, Device, Job, Part, Selection, Stored};
 pub use frame::Frame;
 pub use node_id::NodeId;
 pub use time::{Duration, Instant};

@@ -18,5 +18,21 @@ pub trait Transmit {
     fn room(&self) -> usize;
 }
 
+/// A queue that can be shut: it then takes nothing, and the senders try again later.
+pub(crate) struct Gate<'a, T> {
+    pub(crate) out: &'a mut T,
+    pub(crate) is_open: bool,
+}
+
+impl<T: Transmit> Transmit for Gate<'_, T> {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        if self.is_open { self.out.send(frame) } else { Err(QueueFull) }
+    }
+
+    fn room(&self) -> usize {
+        if self.is_open { self.out.room() } else { 0 }
+    }
+}
+
 /// When to try again after `QueueFull`.
 pub(crate) const RETRY: Duration = Duration::from_millis(1);

@@ -16,8 +16,14 @@
 #![forbid(unsafe_code)]
 
 pub mod bus;
+mod catalogue;
+pub mod heartbeat;
+pub mod lss;
 mod network;
+pub mod nmt;
 pub mod object;
 pub mod sdo;
+pub mod value;
 
+pub use catalogue::Catalogue;
 pub use network::Network;

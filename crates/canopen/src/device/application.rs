@@ -1,6 +1,7 @@
 //! What a device does beyond CANopen, as the device sees it.
 
-use crate::dictionary::Entry;
+use super::Stored;
+use crate::dictionary::{Entry, Group};
 use crate::sdo::Abort;
 
 /// The part of a personality that is code: rules of its own objects.
@@ -14,6 +15,15 @@ pub trait Application {
     /// # Errors
     /// The reason to refuse it; nothing is stored then.
     fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort>;
+
+    /// What is stored of a group, for every reset that covers it.
+    fn stored(&self, _group: Group) -> Stored<'_> {
+        Stored { packed: &[], is_sound: true }
+    }
+
+    /// Whether what is stored of a group was sound and fitted the dictionary. Where it did not fit, the group has its
+    /// defaults.
+    fn loaded(&mut self, _group: Group, _good: bool) {}
 
     /// The content of the domain with the rule of this number.
     ///

@@ -1,22 +1,28 @@
 //! The CANopen device: the protocols, the dictionary's values and what connects them.
 //!
+//! Without a node-ID it hears LSS and nothing else.
+//!
 //! Two callers share it, one for process data and one for services. After any call that took a frame or changed
 //! something, `poll_process` and `poll_services` say when the device wants to be called next.
 
 mod application;
+mod lss;
 mod objects;
 mod pdos;
 mod process;
 mod rpdos;
 mod services;
 mod state;
+mod store;
 mod syncs;
 mod watches;
 
 pub use application::{Application, Part};
 pub use state::Action;
+pub use store::{Job, Selection, Stored};
 
 use crate::dictionary::Dictionary;
+use crate::lss::{BitRate, Configuration, Slave};
 use crate::nmt::State;
 use crate::pdo::{PdoSet, Rpdo, Tpdo};
 use crate::sdo::{Response, Server};
@@ -34,6 +40,10 @@ pub struct Device<A, const N: usize> {
     response: Option<(Response, Instant)>,
     /// When to go on with a block that found the queue full.
     block_due: Instant,
+    lss: Slave,
+    /// As `response`, of LSS.
+    lss_response: Option<(crate::lss::Response, Instant)>,
+    switching: Option<lss::Switching>,
     core: Core<A, N>,
 }
 
@@ -41,7 +51,8 @@ pub struct Device<A, const N: usize> {
 #[derive(Debug)]
 struct Core<A, const N: usize> {
     dictionary: &'static Dictionary,
-    node_id: NodeId,
+    /// `None` for a device that waits to be given one.
+    node_id: Option<NodeId>,
     state: State,
     image: [u8; N],
     application: A,
@@ -59,14 +70,22 @@ struct Core<A, const N: usize> {
     process_due: Instant,
     services_due: Instant,
     pending: state::Pending,
+    jobs: store::Jobs,
+    unsound: store::Unsound,
 }
 
 /// A deadline in the past: the next poll looks at everything.
 const STALE: Instant = Instant(0);
 
 impl<A: Application, const N: usize> Device<A, N> {
-    /// A device that has not started: silent and deaf until [`start`](Device::start).
-    pub fn new(dictionary: &'static Dictionary, node_id: NodeId, application: A) -> Device<A, N> {
+    /// A device that has not started: silent and deaf until [`start`](Device::start). It stores its bit rate for LSS
+    /// only; 1 Mbit/s unless [`with_bit_rate`](Device::with_bit_rate) says otherwise.
+    pub fn new(
+        dictionary: &'static Dictionary,
+        node_id: impl Into<Option<NodeId>>,
+        application: A,
+    ) -> Device<A, N> {
+        let node_id = node_id.into();
         let core = Core {
             dictionary,
             node_id,
@@ -85,8 +104,31 @@ impl<A: Application, const N: usize> Device<A, N> {
             process_due: Instant::NEVER,
             services_due: Instant::NEVER,
             pending: state::Pending::new(),
+            jobs: store::Jobs::new(),
+            unsound: store::Unsound::default(),
         };
-        Device { server: Server::new(), response: None, block_due: Instant::NEVER, core }
+        Device {
+            server: Server::new(),
+            response: None,
+            block_due: Instant::NEVER,
+            lss: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
+            lss_response: None,
+            switching: None,
+            core,
+        }
+    }
+
+    /// Takes the bit rate that is configured, for LSS to store along with a new node-ID.
+    #[must_use]
+    pub fn with_bit_rate(mut self, bit_rate: BitRate) -> Device<A, N> {
+        self.lss = Slave::new(Configuration { bit_rate, ..self.lss.pending() });
+        self
+    }
+
+    /// The node-ID in use.
+    #[must_use]
+    pub fn node_id(&self) -> Option<NodeId> {
+        self.core.node_id
     }
 
     /// The NMT state.

@@ -1,7 +1,7 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
 use super::{Application, Core, Part, STALE};
-use crate::dictionary::{Entry, Field, Group, Rule, Type};
+use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Duration, Instant, emcy, sync};
@@ -35,13 +35,17 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
-        entry.check_value(value)?;
+        entry.check_value(bytes)?;
         self.admit(entry, value, bytes)?;
-        if !entry.rule.is_computed() {
+        if !entry.rule.is_computed() && !entry.rule.is_command() {
             entry.field.set(&mut self.image, bytes);
         }
         self.follow(entry, value, now);
         Ok(())
+    }
+
+    fn take_deferred(&mut self) -> bool {
+        self.jobs.take_deferred()
     }
 
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
@@ -94,6 +98,8 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::SyncOverflow => sync::check_overflow(value, self.number(0x1006, 0)),
             Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
+            Rule::Store | Rule::Restore => self.admit_store(entry, value),
+            Rule::ProgramControl => self.admit_program_control(value),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
             Rule::PdoCobId => self.admit_pdo_cob_id(entry, value),
             Rule::PdoType => self.admit_pdo_type(entry, value),
@@ -137,12 +143,4 @@ fn stored<'a>(entry: &Entry, image: &'a [u8]) -> &'a [u8] {
         Type::VisibleString(_) => value.split(|&byte| byte == 0).next().unwrap_or(value),
         _ => value,
     }
-}
-
-/// The number in the first four bytes.
-fn little_endian(bytes: &[u8]) -> u32 {
-    if let Some(bytes) = bytes.first_chunk() {
-        return u32::from_le_bytes(*bytes);
-    }
-    bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
 }

@@ -93,6 +93,15 @@ impl<A: Application, const N: usize> Core<A, N> {
         RpdoSettings::new(self.cob_id_value(pdo), low_byte(parameter(2)), deadline, layout)
     }
 
+    /// Whether every mapping names objects that can be mapped. A stored one may be of an older dictionary.
+    pub(super) fn mappings_are_sound(&self) -> bool {
+        let numbers = (0..).take(self.tpdos.len());
+        let pdos = numbers.flat_map(|number| {
+            [Direction::Transmit, Direction::Receive].map(|direction| Pdo { direction, number })
+        });
+        pdos.into_iter().all(|pdo| self.enabled_layout(pdo).is_some())
+    }
+
     fn enabled_layout(&self, pdo: Pdo) -> Option<Layout> {
         self.layout(pdo, self.number(pdo.mapping(), 0)).ok()
     }

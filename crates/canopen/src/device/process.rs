@@ -8,6 +8,7 @@ use crate::{CanId, Frame, Instant, Transmit};
 impl<A: Application, const N: usize> Device<A, N> {
     /// A frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        let out = &mut self.gate(out);
         if frame.id() == CanId::NMT.get() {
             self.on_nmt(frame, now, out);
         } else if self.core.state.has_pdos() {
@@ -16,16 +17,19 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     fn on_nmt(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let is_deaf = self.core.is_initialising();
-        let Some(command) = Command::parse(frame.data(), self.core.node_id).filter(|_| !is_deaf) else {
-            return;
-        };
+        let own = self.core.node_id.filter(|_| !self.core.is_initialising());
+        let Some(command) = own.and_then(|own| Command::parse(frame.data(), own)) else { return };
         self.command(command);
-        self.poll_process(now, out);
+        self.send_process(now, out);
     }
 
     /// Sends what is due. Returns the instant of the next call.
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        let out = &mut self.gate(out);
+        self.send_process(now, out)
+    }
+
+    pub(super) fn send_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         let core = &mut self.core;
         if now >= core.process_due {
             core.poll_sync(now);
@@ -38,6 +42,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// The application has updated values in the image: sends what a change triggers.
     pub fn changed(&mut self, now: Instant, out: &mut impl Transmit) {
+        let out = &mut self.gate(out);
         if self.core.state.has_pdos() {
             self.core.each_tpdo(|tpdo, image| tpdo.on_change(image, now, out));
         }

@@ -1,6 +1,7 @@
-//! Services: SDO, heartbeat and EMCY.
+//! Services: SDO, heartbeat, EMCY and LSS.
 
 use super::{Application, Device, STALE};
+use crate::lss;
 use crate::sdo::Response;
 use crate::transmit::RETRY;
 use crate::{CanId, Frame, Instant, Transmit};
@@ -15,17 +16,20 @@ const RESERVED_ROOM: usize = 10;
 impl<A: Application, const N: usize> Device<A, N> {
     /// A frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        if frame.id() & 0x780 == ERROR_CONTROL {
-            self.core.on_heartbeat(frame, now);
-        } else if frame.id() == self.core.node_id.service(SDO_REQUEST).get() && self.core.state.has_services()
-        {
+        let out = &mut self.gate(out);
+        if frame.id() == self.core.service(SDO_REQUEST).get() {
             self.on_sdo(frame, now, out);
+        } else if frame.id() == lss::REQUEST.get() {
+            self.on_lss(frame, now, out);
+        } else if frame.id() & 0x780 == ERROR_CONTROL {
+            self.core.on_heartbeat(frame, now);
         }
     }
 
     /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
     fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let Some(request) = frame.full() else { return };
+        let has_sdo = self.core.state.has_services();
+        let Some(request) = frame.full().filter(|_| has_sdo) else { return };
         let response = self.server.answer(request, &mut self.core, now);
         self.core.services_due = self.core.services_due.min(self.server.deadline());
         self.respond(response, now, out);
@@ -36,7 +40,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
     fn send_block(&mut self, now: Instant, out: &mut impl Transmit) {
-        let id = self.core.node_id.service(SDO_RESPONSE);
+        let id = self.core.service(SDO_RESPONSE);
         let abort = self.server.send_block(&mut self.core, now, |data| {
             out.room() > RESERVED_ROOM && out.send(Frame::data_frame(id, 8, data)).is_ok()
         });
@@ -48,10 +52,10 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     /// Sends a response. One that still waits is obsolete: its client has gone on.
-    fn respond(&mut self, response: Option<Response>, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn respond(&mut self, response: Option<Response>, now: Instant, out: &mut impl Transmit) {
         self.response = None;
         let Some(response) = response else { return };
-        let id = self.core.node_id.service(SDO_RESPONSE);
+        let id = self.core.service(SDO_RESPONSE);
         if out.send(Frame::data_frame(id, 8, response.encode())).is_err() {
             self.response = Some((response, now + RETRY));
             self.core.services_due = STALE;
@@ -61,6 +65,9 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// Sends what is due. Returns the instant of the next call.
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         if now >= self.core.services_due {
+            self.poll_switching(now);
+            let out = &mut self.gate(out);
+            self.poll_lss(now, out);
             self.poll_heartbeat(now, out);
             self.poll_watches(now);
             if self.core.state.has_services() {
@@ -74,7 +81,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     fn poll_heartbeat(&mut self, now: Instant, out: &mut impl Transmit) {
         if !self.core.is_initialising() {
-            let id = self.core.node_id.service(ERROR_CONTROL);
+            let id = self.core.service(ERROR_CONTROL);
             self.core.heartbeat.poll(id, self.core.state, now, out);
         }
     }
@@ -94,10 +101,11 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     fn next_service(&self) -> Instant {
         let core = &self.core;
+        let lss = self.next_lss();
         if core.is_initialising() {
-            return Instant::NEVER;
+            return lss;
         }
-        let heartbeat = core.heartbeat.due().min(core.watches.due());
+        let heartbeat = lss.min(core.heartbeat.due()).min(core.watches.due());
         if !core.state.has_services() {
             return heartbeat;
         }
@@ -107,6 +115,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).
     pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
-        core::iter::once(self.core.node_id.service(SDO_REQUEST)).chain(self.core.watches.ids())
+        let sdo = self.core.node_id.map(|own| own.service(SDO_REQUEST));
+        [lss::REQUEST].into_iter().chain(sdo).chain(self.core.watches.ids())
     }
 }

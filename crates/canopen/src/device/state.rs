@@ -1,9 +1,11 @@
 //! NMT state, resets, and the reactions to errors.
 
-use super::{Application, Core, Device, STALE};
+use super::{Application, Core, Device, Job, STALE};
+use crate::dictionary::{Entry, Group};
 use crate::emcy::Fault;
+use crate::lss::BitRate;
 use crate::nmt::{Command, State};
-use crate::{Duration, Instant, Transmit};
+use crate::{CanId, Duration, Instant, NodeId, Transmit};
 
 /// 1F80h: the one value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
@@ -17,6 +19,12 @@ pub enum Action {
     ResetCommunication,
     /// The sets of identifiers to receive have changed.
     Identifiers,
+    /// Run the bus at this bit rate from now on.
+    BitRate(BitRate),
+    /// Go to the bootloader; the request for it is not answered.
+    Bootloader,
+    /// Store something, then call [`Device::finish`].
+    Store(Job),
 }
 
 /// What [`Device::start`] has to initialise.
@@ -34,20 +42,34 @@ pub(super) struct Pending {
     reset_untold: bool,
     pub(super) identifiers: bool,
     pub(super) parameters: bool,
+    /// Of LSS or of program control.
+    pub(super) request: Option<Action>,
 }
 
 impl Pending {
     pub(super) const fn new() -> Pending {
-        Pending { reset: Reset::Node, reset_untold: false, identifiers: false, parameters: false }
+        Pending {
+            reset: Reset::Node,
+            reset_untold: false,
+            identifiers: false,
+            parameters: false,
+            request: None,
+        }
     }
 }
 
 impl<A: Application, const N: usize> Device<A, N> {
-    /// Initialises what the last reset covers (at first everything), boots up, and starts by itself if 1F80h says so.
+    /// Initialises what the last reset covers (at first everything), boots up, and starts by itself if 1F80h says so. A
+    /// node-ID that LSS has configured is taken now; without one, the device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) {
         self.forget_transfer();
+        self.lss.reset();
         self.core.enter(State::Initialising);
+        self.core.node_id = self.lss.pending().node_id;
         self.core.load();
+        if self.core.node_id.is_none() {
+            return;
+        }
         self.core.configure(now);
         self.core.enter(State::PreOperational);
         self.poll_services(now, out);
@@ -66,7 +88,13 @@ impl<A: Application, const N: usize> Device<A, N> {
                 Reset::Communication => Action::ResetCommunication,
             });
         }
-        core::mem::take(&mut pending.identifiers).then_some(Action::Identifiers)
+        if let Some(request) = pending.request.take() {
+            return Some(request);
+        }
+        if core::mem::take(&mut pending.identifiers) {
+            return Some(Action::Identifiers);
+        }
+        self.core.jobs.take_untold().map(Action::Store)
     }
 
     /// Whether application parameters have changed since the last call; they have after a start.
@@ -119,6 +147,16 @@ impl<A: Application, const N: usize> Device<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
+    /// A device that had no node-ID has got one. Whoever calls the device starts it again.
+    pub(super) fn begin_join(&mut self) {
+        self.begin_reset(Reset::Communication);
+    }
+
+    /// The identifier of one of its services; that of no device while it has no node-ID.
+    pub(super) fn service(&self, function: u16) -> CanId {
+        CanId::of_service(function, self.node_id.map_or(0, NodeId::get))
+    }
+
     fn begin_reset(&mut self, reset: Reset) {
         self.enter(State::Initialising);
         (self.pending.reset, self.pending.reset_untold) = (reset, true);
@@ -137,11 +175,20 @@ impl<A: Application, const N: usize> Core<A, N> {
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 
-    /// Takes the default values of what is to be reset. Communication parameters (1000h to 1FFFh) come first in the image.
+    /// Takes the values of what is to be reset: the defaults, then what is stored.
     fn load(&mut self) {
         let everything = self.pending.reset == Reset::Node;
-        let entries = self.dictionary.entries();
-        for entry in entries.iter().filter(|entry| everything || entry.index() < 0x2000) {
+        self.load_defaults(|entry| everything || entry.index() < 0x2000);
+        self.load_stored(Group::Communication);
+        if everything {
+            self.load_stored(Group::Application);
+        }
+        self.application.initialise(&mut self.image);
+        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
+    }
+
+    pub(super) fn load_defaults(&mut self, is_meant: impl Fn(&Entry) -> bool) {
+        for entry in self.dictionary.entries().iter().filter(|entry| is_meant(entry)) {
             let default: [u8; 4] = entry.field.load(self.dictionary.defaults());
             if entry.node_relative {
                 self.store_node_relative(entry.field, u32::from_le_bytes(default));
@@ -149,12 +196,13 @@ impl<A: Application, const N: usize> Core<A, N> {
                 entry.field.set(&mut self.image, entry.field.get(self.dictionary.defaults()));
             }
         }
-        self.application.initialise(&mut self.image);
-        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
     }
 
     fn store_node_relative(&mut self, field: crate::dictionary::Field, base: u32) {
-        field.store(&mut self.image, base.wrapping_add(self.node_id.get().into()).to_le_bytes());
+        field.store(
+            &mut self.image,
+            base.wrapping_add(self.node_id.map_or(0, NodeId::get).into()).to_le_bytes(),
+        );
     }
 
     /// Gives every protocol its parameters.
@@ -165,6 +213,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.configure_watches(now);
         self.configure_pdos(now);
         self.emcy.restart(now);
+        self.report_stored(now);
         self.update_error_register();
         let period = Duration::from_millis(self.number(0x1017, 0).into());
         self.heartbeat.boot_up(period, now);

@@ -169,5 +169,6 @@ const fn check_limits(row: &Object) {
     if let Some((low, high)) = row.limits {
         let Some((min, max)) = row.kind.range() else { panic!("limits of what is not an integer") };
         assert!(min <= low && low <= high && high <= max, "limits are wider than the type");
+        assert!(row.kind.size() <= 4, "limits of more than 32 bits are not checked");
     }
 }

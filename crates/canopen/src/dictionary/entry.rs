@@ -7,7 +7,8 @@ use crate::sdo::Abort;
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     pub(crate) key: u32,
-    /// Limits of an integer: the smallest value fits a signed word and the largest an unsigned one for every type there is.
+    /// Limits of an integer of at most 32 bits: the smallest value fits a signed word and the largest an unsigned one.
+    /// Longer ones take any value.
     pub(crate) low: i32,
     pub(crate) high: u32,
     pub(crate) field: Field,
@@ -49,12 +50,12 @@ impl Entry {
         if len < size && !matches!(self.kind, Type::VisibleString(_)) { Err(Abort::TooShort) } else { Ok(()) }
     }
 
-    /// Checks a value to be written, in its first four bytes.
-    pub(crate) fn check_value(&self, word: u32) -> Result<(), Abort> {
+    /// Checks a value of the right length that is to be written.
+    pub(crate) fn check_value(&self, bytes: &[u8]) -> Result<(), Abort> {
         match self.kind {
-            Type::VisibleString(_) | Type::Domain => Ok(()),
-            Type::Real32 => check_real(f32::from_bits(word)),
-            _ => self.check_limits(self.kind.integer(word)),
+            Type::VisibleString(_) | Type::Domain | Type::Unsigned48 => Ok(()),
+            Type::Real32 => check_real(f32::from_bits(little_endian(bytes))),
+            _ => self.check_limits(self.kind.integer(little_endian(bytes))),
         }
     }
 
@@ -64,6 +65,14 @@ impl Entry {
         }
         if value < i64::from(self.low) { Err(Abort::ValueTooLow) } else { Ok(()) }
     }
+}
+
+/// The number in the first four bytes.
+pub(crate) fn little_endian(bytes: &[u8]) -> u32 {
+    if let Some(bytes) = bytes.first_chunk() {
+        return u32::from_le_bytes(*bytes);
+    }
+    bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
 }
 
 /// A parameter that is not a number would turn every measured value into one that is not.

@@ -10,10 +10,13 @@ mod compile;
 mod entry;
 mod field;
 mod object;
+mod packed;
 mod types;
 
 pub use compile::{check, compile, count, default_image, gather, image_size};
+pub(crate) use entry::little_endian;
 pub use entry::{Dictionary, Entry};
 pub use field::Field;
 pub use object::{Access, DefaultValue, Group, Mapping, Object, Rule};
+pub use packed::{BufferFull, packed_size};
 pub use types::Type;

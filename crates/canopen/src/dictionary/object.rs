@@ -81,6 +81,10 @@ pub enum Rule {
     SyncPeriod,
     /// 1007h, synchronous window length.
     SyncWindow,
+    /// 1010h:1 and up, store parameters.
+    Store,
+    /// 1011h:1 and up, restore default parameters.
+    Restore,
     /// 1014h, COB-ID of EMCY.
     EmcyCobId,
     /// 1015h, inhibit time of EMCY.
@@ -91,6 +95,8 @@ pub enum Rule {
     HeartbeatTime,
     /// 1019h, synchronous counter overflow value.
     SyncOverflow,
+    /// 1F51h:1, program control of a program that runs (CiA 302-3).
+    ProgramControl,
     /// 1F80h, NMT start-up.
     StartUp,
     /// 1400h.., 1800h..:1, COB-ID of a PDO.
@@ -112,6 +118,11 @@ pub enum Rule {
 }
 
 impl Rule {
+    /// Whether what is written is a command: the value that is read stays.
+    pub(crate) const fn is_command(self) -> bool {
+        matches!(self, Rule::Store | Rule::Restore | Rule::ProgramControl)
+    }
+
     /// Whether the value lives elsewhere and takes no place in the image.
     pub(crate) const fn is_computed(self) -> bool {
         matches!(self, Rule::ErrorCount | Rule::ErrorEntry)

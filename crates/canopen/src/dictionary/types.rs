@@ -15,6 +15,8 @@ pub enum Type {
     Unsigned16,
     /// UNSIGNED32
     Unsigned32,
+    /// UNSIGNED48
+    Unsigned48,
     /// REAL32
     Real32,
     /// `VISIBLE_STRING` of at most this many characters.
@@ -31,6 +33,7 @@ impl Type {
             Type::Integer8 | Type::Unsigned8 => 1,
             Type::Integer16 | Type::Unsigned16 => 2,
             Type::Integer32 | Type::Unsigned32 | Type::Real32 => 4,
+            Type::Unsigned48 => 6,
             Type::VisibleString(capacity) => capacity,
             Type::Domain => 0,
         }
@@ -49,6 +52,7 @@ impl Type {
             Type::Real32 => 0x08,
             Type::VisibleString(_) => 0x09,
             Type::Domain => 0x0F,
+            Type::Unsigned48 => 0x19,
         }
     }
 
@@ -62,11 +66,12 @@ impl Type {
             Type::Unsigned8 => Some((0, u8::MAX as i64)),
             Type::Unsigned16 => Some((0, u16::MAX as i64)),
             Type::Unsigned32 => Some((0, u32::MAX as i64)),
+            Type::Unsigned48 => Some((0, (1 << 48) - 1)),
             Type::Real32 | Type::VisibleString(_) | Type::Domain => None,
         }
     }
 
-    /// The value of an integer type whose bytes, and zeros above them, are this word.
+    /// The value of an integer type of at most 32 bits whose bytes, and zeros above them, are this word.
     pub(crate) fn integer(self, word: u32) -> i64 {
         let [a, b, c, d] = word.to_le_bytes();
         match self {

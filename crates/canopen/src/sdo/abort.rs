@@ -30,6 +30,8 @@ pub enum Abort {
     PdoLength = 0x0604_0042,
     /// The value contradicts that of another parameter.
     Parameter = 0x0604_0043,
+    /// The hardware has failed.
+    Hardware = 0x0606_0000,
     /// The length of the data does not match the type.
     Length = 0x0607_0010,
     /// The data is longer than the type.

@@ -23,6 +23,8 @@ pub(crate) trait Objects {
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
     /// Replaces the value of an entry and does what follows from it.
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
+    /// Whether the response to the write just made has to wait for [`Server::release`](super::Server::release); once.
+    fn take_deferred(&mut self) -> bool;
     /// Hands over a part of a stream.
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort>;
 }

@@ -35,6 +35,8 @@ enum Transfer {
     Download(Download),
     BlockUpload(Sender),
     BlockDownload(Receiver),
+    /// All has arrived; the response waits until the device has done what was asked.
+    Held(Response),
 }
 
 /// A response, or nothing to say yet.
@@ -74,6 +76,7 @@ impl Server {
         // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
         if matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
             let answer = self.dispatch(frame, objects, now);
+            let answer = self.hold(answer, objects);
             return self.settle(answer, now);
         }
         if let Some(response) = self.repeated(frame) {
@@ -83,6 +86,7 @@ impl Server {
             Some(segment) => self.take_block_segment(segment, objects),
             None => self.dispatch(frame, objects, now),
         };
+        let answer = self.hold(answer, objects);
         let response = self.settle(answer, now);
         self.previous = (frame, response);
         response
@@ -123,6 +127,24 @@ impl Server {
                 Ok(None)
             }
         }
+    }
+
+    /// Keeps back the response to a write that takes its time.
+    fn hold(&mut self, answer: Answer, objects: &mut impl Objects) -> Answer {
+        match answer {
+            Ok(Some(response)) if objects.take_deferred() => {
+                self.transfer = Transfer::Held(response);
+                Ok(None)
+            }
+            answer => answer,
+        }
+    }
+
+    /// The response that was kept back, if its client still waits for it.
+    pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Instant) -> Option<Response> {
+        let Transfer::Held(response) = self.transfer else { return None };
+        self.transfer = Transfer::Idle;
+        self.settle(result.map(|()| Some(response)), now)
     }
 
     /// Does what the time demands: answers a block that has lost its end, or gives up the transfer.

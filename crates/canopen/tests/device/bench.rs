@@ -4,7 +4,7 @@ use canopen::dictionary::{
     self, Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Rule, Type,
 };
 use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response, Segment};
-use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Transmit};
+use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Stored, Transmit};
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
@@ -14,6 +14,10 @@ const fn parameter(index: u16, sub: u8, kind: Type) -> Object {
 
 const fn value(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadOnly).mappable(Mapping::Tpdo)
+}
+
+const fn command(index: u16, sub: u8, rule: Rule) -> Object {
+    Object::new(index, sub, "", Type::Unsigned32, Access::ReadWrite).value(1).rule(rule)
 }
 
 const ROWS: &[Object] = &[
@@ -27,6 +31,14 @@ const ROWS: &[Object] = &[
     parameter(0x1007, 0, Type::Unsigned32).rule(Rule::SyncWindow),
     Object::new(0x1008, 0, "", Type::VisibleString(32), Access::Const)
         .default(DefaultValue::Text("a name of twenty-six chars")),
+    Object::highest(0x1010, 3, ""),
+    command(0x1010, 1, Rule::Store),
+    command(0x1010, 2, Rule::Store),
+    command(0x1010, 3, Rule::Store),
+    Object::highest(0x1011, 3, ""),
+    command(0x1011, 1, Rule::Restore),
+    command(0x1011, 2, Rule::Restore),
+    command(0x1011, 3, Rule::Restore),
     parameter(0x1014, 0, Type::Unsigned32).default(DefaultValue::NodeId(0x80)).rule(Rule::EmcyCobId),
     parameter(0x1015, 0, Type::Unsigned16).rule(Rule::EmcyInhibit),
     Object::highest(0x1016, 4, ""),
@@ -35,6 +47,11 @@ const ROWS: &[Object] = &[
     parameter(0x1016, 3, Type::Unsigned32).rule(Rule::HeartbeatWatch),
     parameter(0x1016, 4, Type::Unsigned32).rule(Rule::HeartbeatWatch),
     parameter(0x1017, 0, Type::Unsigned16).value(1000).rule(Rule::HeartbeatTime),
+    Object::highest(0x1018, 4, ""),
+    Object::new(0x1018, 1, "", Type::Unsigned32, Access::ReadOnly).value(0x1A),
+    Object::new(0x1018, 2, "", Type::Unsigned32, Access::ReadOnly).value(0x2B),
+    Object::new(0x1018, 3, "", Type::Unsigned32, Access::ReadOnly).value(0x0001_0002),
+    Object::new(0x1018, 4, "", Type::Unsigned32, Access::ReadOnly).value(0x8000_0005),
     parameter(0x1019, 0, Type::Unsigned8).limits(0, 240).rule(Rule::SyncOverflow),
     Object::highest(0x1029, 2, ""),
     parameter(0x1029, 1, Type::Unsigned8).limits(0, 254),
@@ -97,6 +114,11 @@ pub(crate) struct Numbers {
     pub(crate) start_up: u8,
     pub(crate) domain: Vec<u8>,
     pub(crate) downloads: usize,
+    /// What is stored, communication and application.
+    pub(crate) stored: [Vec<u8>; 2],
+    pub(crate) is_damaged: bool,
+    /// What the device said of the groups that it loaded.
+    pub(crate) loaded: Vec<(Group, bool)>,
 }
 
 impl Application for Numbers {
@@ -107,6 +129,16 @@ impl Application for Numbers {
     fn write(&mut self, number: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
         assert_eq!(number, 7);
         if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+
+    fn stored(&self, group: Group) -> Stored<'_> {
+        let [communication, application] = &self.stored;
+        let packed = if group == Group::Communication { communication } else { application };
+        Stored { packed, is_sound: !self.is_damaged }
+    }
+
+    fn loaded(&mut self, group: Group, good: bool) {
+        self.loaded.push((group, good));
     }
 
     fn read_domain(&self, number: u8) -> Result<&[u8], Abort> {
@@ -176,7 +208,18 @@ impl Bench {
     }
 
     pub(crate) fn unstarted() -> Bench {
-        let device = Device::new(&DICTIONARY, NodeId::new(ID).unwrap(), Numbers::default());
+        Bench::with_node_id(NodeId::new(ID))
+    }
+
+    /// A device that has started without a node-ID.
+    pub(crate) fn unconfigured() -> Bench {
+        let mut bench = Bench::with_node_id(None);
+        bench.start();
+        bench
+    }
+
+    fn with_node_id(node_id: Option<NodeId>) -> Bench {
+        let device = Device::new(&DICTIONARY, node_id, Numbers::default());
         Bench { device, out: Queue { frames: vec![], room: usize::MAX }, now: Instant(1_000_000) }
     }
 

@@ -82,7 +82,7 @@ fn faults_of_an_access_have_their_abort_codes() {
     let mut bench = Bench::booted();
     assert_eq!(bench.read(0x2000, 0), Err(0x0602_0000));
     assert_eq!(bench.read(0x1800, 4), Err(0x0609_0011));
-    assert_eq!(bench.read(0x1018, 0), Err(0x0602_0000));
+    assert_eq!(bench.read(0x1013, 0), Err(0x0602_0000));
     assert_eq!(bench.read(0x6102, 0), Err(0x0601_0001));
     assert_eq!(bench.write32(0x2000, 0, 0), Err(0x0602_0000));
     assert_eq!(bench.write32(0x1800, 7, 0), Err(0x0609_0011));

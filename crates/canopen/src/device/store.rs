@@ -1,0 +1,214 @@
+//! What the memory has to do with: objects 1010h, 1011h and 1F51h, the configuration of LSS, and what a start finds stored.
+//!
+//! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
+
+use super::{Action, Application, Core, Device};
+use crate::dictionary::{Entry, Group, Rule};
+use crate::emcy::Fault;
+use crate::lss::{Configuration, Slave};
+use crate::sdo::Abort;
+use crate::{Instant, Transmit};
+
+/// What 1010h and 1011h take: "save" and "load".
+const SAVE: u32 = u32::from_le_bytes(*b"save");
+const LOAD: u32 = u32::from_le_bytes(*b"load");
+
+/// What 1F51h takes (CiA 302-3); to clear a program is a matter of the bootloader.
+const STOP_PROGRAM: u32 = 0;
+const START_PROGRAM: u32 = 1;
+const RESET_PROGRAM: u32 = 2;
+
+/// Storage groups, by the sub-index of 1010h or 1011h.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// Sub-index 1.
+    All,
+    /// Sub-index 2.
+    Communication,
+    /// Sub-index 3.
+    Application,
+}
+
+impl Selection {
+    fn of_sub(sub: u8) -> Option<Selection> {
+        Some(match sub {
+            1 => Selection::All,
+            2 => Selection::Communication,
+            3 => Selection::Application,
+            _ => return None,
+        })
+    }
+
+    /// Whether the group is one of them.
+    #[must_use]
+    pub fn contains(self, group: Group) -> bool {
+        match self {
+            Selection::All => group != Group::Volatile,
+            Selection::Communication => group == Group::Communication,
+            Selection::Application => group == Group::Application,
+        }
+    }
+}
+
+/// Something to be stored. It is done when [`Device::finish`] says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Job {
+    /// Store the present values of these groups.
+    Save(Selection),
+    /// Forget what is stored of these groups.
+    Restore(Selection),
+    /// Store node-ID and bit rate.
+    Configure(Configuration),
+}
+
+/// What is stored of a group.
+#[derive(Clone, Copy, Debug)]
+pub struct Stored<'a> {
+    /// As [`Dictionary::pack`](crate::dictionary::Dictionary::pack) has made it; empty for the defaults.
+    pub packed: &'a [u8],
+    /// The memory is sure that it is what was stored last.
+    pub is_sound: bool,
+}
+
+/// The job under way and who waits for its end.
+#[derive(Debug)]
+pub(super) struct Jobs {
+    running: Option<Job>,
+    /// The caller has not been told of it yet.
+    is_untold: bool,
+    /// The request that has just been served began it or waits for it.
+    is_deferred: bool,
+    lss_waits: bool,
+}
+
+impl Jobs {
+    pub(super) const fn new() -> Jobs {
+        Jobs { running: None, is_untold: false, is_deferred: false, lss_waits: false }
+    }
+
+    /// A second request for the same job waits for the first; for another one there is no room.
+    fn begin(&mut self, job: Job) -> Result<(), Abort> {
+        match self.running {
+            Some(running) if running != job => return Err(Abort::DeviceState),
+            Some(_) => (),
+            None => (self.running, self.is_untold) = (Some(job), true),
+        }
+        Ok(())
+    }
+
+    /// The job, once.
+    pub(super) fn take_untold(&mut self) -> Option<Job> {
+        self.running.filter(|_| core::mem::take(&mut self.is_untold))
+    }
+
+    /// Whether the response to the request just served has to wait.
+    pub(super) fn take_deferred(&mut self) -> bool {
+        core::mem::take(&mut self.is_deferred)
+    }
+}
+
+impl<A: Application, const N: usize> Device<A, N> {
+    /// The job is done, or cannot be: whoever waits for it is answered.
+    pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) {
+        let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
+        let out = &mut self.gate(out);
+        if lss_waits {
+            self.respond_lss(Slave::stored(result.is_ok()), now, out);
+        }
+        if let Some(response) = self.server.release(result, now) {
+            self.respond(Some(response), now, out);
+        }
+    }
+
+    pub(super) fn store_configuration(
+        &mut self,
+        configuration: Configuration,
+        now: Instant,
+        out: &mut impl Transmit,
+    ) {
+        match self.core.jobs.begin(Job::Configure(configuration)) {
+            Ok(()) => self.core.jobs.lss_waits = true,
+            Err(_) => self.respond_lss(Slave::stored(false), now, out),
+        }
+    }
+}
+
+impl Default for Jobs {
+    fn default() -> Jobs {
+        Jobs::new()
+    }
+}
+
+impl<A: Application, const N: usize> Core<A, N> {
+    /// Begins the job that a write to 1010h or 1011h asks for.
+    pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        let selection = Selection::of_sub(entry.sub()).ok_or(Abort::Access)?;
+        let job = match (entry.rule, value) {
+            (Rule::Store, SAVE) => Job::Save(selection),
+            (Rule::Restore, LOAD) => Job::Restore(selection),
+            _ => return Err(Abort::NotStored),
+        };
+        self.jobs.begin(job)?;
+        self.jobs.is_deferred = true;
+        Ok(())
+    }
+
+    /// Stop and reset of the program lead to the bootloader, which is what answers next: nobody else does.
+    pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
+        match value {
+            STOP_PROGRAM | RESET_PROGRAM => {
+                self.pending.request = Some(Action::Bootloader);
+                self.jobs.is_deferred = true;
+                Ok(())
+            }
+            START_PROGRAM => Ok(()),
+            _ => Err(Abort::InvalidValue),
+        }
+    }
+
+    /// Takes what is stored of a group; where that is damaged or does not fit, the defaults stay as a whole.
+    pub(super) fn load_stored(&mut self, group: Group) {
+        let Stored { packed, is_sound } = self.application.stored(group);
+        let fits =
+            self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
+        if !fits {
+            self.load_defaults(|entry| entry.group == group);
+        }
+        self.unsound.set(group, !(fits && is_sound));
+        self.application.loaded(group, fits && is_sound);
+    }
+
+    /// Says on the bus what could not be loaded.
+    pub(super) fn report_stored(&mut self, now: Instant) {
+        let faults =
+            [(Group::Communication, Fault::CommunicationData), (Group::Application, Fault::ApplicationData)];
+        for (group, fault) in faults {
+            if self.unsound.get(group) { self.raise(fault, now) } else { self.clear(fault, now) }
+        }
+    }
+}
+
+/// The groups whose stored values were not loaded as they should.
+#[derive(Debug, Default)]
+pub(super) struct Unsound {
+    communication: bool,
+    application: bool,
+}
+
+impl Unsound {
+    fn set(&mut self, group: Group, is_unsound: bool) {
+        match group {
+            Group::Communication => self.communication = is_unsound,
+            Group::Application => self.application = is_unsound,
+            Group::Volatile => (),
+        }
+    }
+
+    fn get(&self, group: Group) -> bool {
+        match group {
+            Group::Communication => self.communication,
+            Group::Application => self.application,
+            Group::Volatile => false,
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The values of a storage group as one string of bytes that says itself what it holds.
+//!
+//! ```text
+//! run                                      the values of sub-indexes that follow each other and have one size
+//! ┌─────────┬─────┬───────┬──────┬───────────┐
+//! │ index   │ sub │ count │ size │ values    │
+//! │ 2 bytes │ 1   │ 1     │ 1    │ count × size
+//! └─────────┴─────┴───────┴──────┴───────────┘
+//! ```
+//!
+//! As every value carries its index, a set that an older firmware has stored fits a newer dictionary: objects that came
+//! later keep their defaults. A set that names an object which is gone, has another size or no longer takes the value
+//! is refused as a whole.
+
+use super::{DefaultValue, Dictionary, Entry, Group, Object};
+use crate::NodeId;
+use crate::sdo::Abort;
+
+/// Bytes before the values of a run.
+const HEAD: usize = 5;
+
+/// The buffer had no room for all values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BufferFull;
+
+/// The most bytes that the group of a table takes when packed.
+#[must_use]
+pub const fn packed_size(rows: &[Object], group: Group) -> usize {
+    let (mut total, mut i) = (0, 0);
+    while i < rows.len() {
+        let row = &rows[i];
+        if is_of(row, group) {
+            let continues = i > 0 && is_of(&rows[i - 1], group) && is_next(&rows[i - 1], row);
+            total += row.kind.size() as usize + if continues { 0 } else { HEAD };
+        }
+        i += 1;
+    }
+    total
+}
+
+const fn is_of(row: &Object, group: Group) -> bool {
+    row.group as u8 == group as u8
+}
+
+const fn is_next(a: &Object, b: &Object) -> bool {
+    let follows = b.key() == a.key() + 1 && b.index == a.index && a.kind.size() == b.kind.size();
+    follows && !matches!(a.default, DefaultValue::NodeId(_)) && !matches!(b.default, DefaultValue::NodeId(_))
+}
+
+impl Dictionary {
+    /// Appends the values of a group to `out`. A COB-ID that is still the default of this node-ID is left out: it goes
+    /// on following the node-ID.
+    ///
+    /// # Errors
+    /// `BufferFull`; what is in `out` then is of no use.
+    pub fn pack(
+        &self,
+        group: Group,
+        node_id: Option<NodeId>,
+        image: &[u8],
+        out: &mut heapless::VecView<u8>,
+    ) -> Result<(), BufferFull> {
+        let is_kept = |entry: &&Entry| entry.group == group && !self.follows_node_id(entry, node_id, image);
+        let mut last: Option<(&Entry, usize)> = None;
+        for entry in self.entries().iter().filter(is_kept) {
+            let head = match last.filter(|(last, _)| last.is_followed_by(entry)) {
+                Some((_, head)) => head,
+                None => begin(entry, out)?,
+            };
+            // The count is the fourth byte of the head; a run has at most as many values as there are sub-indexes.
+            if let Some(count) = out.get_mut(head + 3) {
+                *count = count.wrapping_add(1);
+            }
+            out.extend_from_slice(entry.field.get(image)).map_err(|_| BufferFull)?;
+            last = Some((entry, head));
+        }
+        Ok(())
+    }
+
+    /// Takes the values of a packed group into the image.
+    ///
+    /// # Errors
+    /// Why the set does not fit this dictionary; the image then holds a part of it and is to be loaded anew.
+    pub(crate) fn unpack(&self, group: Group, mut packed: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        while !packed.is_empty() {
+            let (run, rest) = Run::parse(packed).ok_or(Abort::General)?;
+            for (sub, value) in run.values() {
+                self.unpack_value(group, run.index, sub, value, image)?;
+            }
+            packed = rest;
+        }
+        Ok(())
+    }
+
+    fn unpack_value(
+        &self,
+        group: Group,
+        index: u16,
+        sub: u8,
+        value: &[u8],
+        image: &mut [u8],
+    ) -> Result<(), Abort> {
+        let entry = self.find(index, sub)?;
+        if entry.group != group || value.len() != usize::from(entry.field.size) {
+            return Err(Abort::Length);
+        }
+        entry.check_value(value)?;
+        entry.field.set(image, value);
+        Ok(())
+    }
+
+    fn follows_node_id(&self, entry: &Entry, node_id: Option<NodeId>, image: &[u8]) -> bool {
+        let default = entry.field.u32(self.defaults()).wrapping_add(node_id.map_or(0, NodeId::get).into());
+        entry.node_relative && entry.field.u32(image) == default
+    }
+}
+
+impl Entry {
+    fn is_followed_by(&self, next: &Entry) -> bool {
+        let adjacent = next.key == self.key.wrapping_add(1) && next.index() == self.index();
+        adjacent && next.field.size == self.field.size && !self.node_relative && !next.node_relative
+    }
+}
+
+/// Begins a run of no values yet; returns the place of its head.
+fn begin(entry: &Entry, out: &mut heapless::VecView<u8>) -> Result<usize, BufferFull> {
+    let at = out.len();
+    let [low, high] = entry.index().to_le_bytes();
+    out.extend_from_slice(&[low, high, entry.sub(), 0, entry.field.size]).map_err(|_| BufferFull)?;
+    Ok(at)
+}
+
+struct Run<'a> {
+    index: u16,
+    sub: u8,
+    size: usize,
+    bytes: &'a [u8],
+}
+
+impl<'a> Run<'a> {
+    fn parse(packed: &'a [u8]) -> Option<(Run<'a>, &'a [u8])> {
+        let (&[low, high, sub, count, size], rest) = packed.split_first_chunk::<HEAD>()?;
+        let size = usize::from(size);
+        let (bytes, rest) = rest.split_at_checked(usize::from(count) * size)?;
+        // A run of nothing has no place in a set.
+        (!bytes.is_empty())
+            .then_some((Run { index: u16::from_le_bytes([low, high]), sub, size, bytes }, rest))
+    }
+
+    /// The values with their sub-indexes. A run that would go beyond sub-index 255 wraps to entries it does not fit.
+    fn values(&self) -> impl Iterator<Item = (u8, &'a [u8])> {
+        let subs = (0..=u8::MAX).map(|i| self.sub.wrapping_add(i));
+        subs.zip(self.bytes.chunks_exact(self.size.max(1)))
+    }
+}

@@ -1,0 +1,38 @@
+//! Fastscan: the master finds the identity of an unconfigured slave bit by bit, all slaves answering with one frame.
+
+use super::{Identity, Part, Request};
+
+/// How far a scan has come: the part of the identity that is compared next.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Fastscan {
+    part: u8,
+}
+
+/// What a step of the scan means for the slave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// It is not the one, or not its turn: silence.
+    Silent,
+    /// It may be the one.
+    Match,
+    /// It is the one: the whole identity has matched.
+    Found,
+}
+
+impl Fastscan {
+    /// Takes a step. `bit` is the lowest bit that is compared.
+    pub(super) fn step(&mut self, identity: &Identity, value: u32, bit: u8, part: u8, next: u8) -> Step {
+        if bit == Request::CONFIRM {
+            self.part = 0;
+            return Step::Match;
+        }
+        let own = Part::numbered(part).filter(|_| part == self.part).map(|part| identity.part(part));
+        let mask = u32::MAX.checked_shl(bit.into()).unwrap_or(0);
+        if own.is_none_or(|own| (own ^ value) & mask != 0) {
+            return Step::Silent;
+        }
+        self.part = next;
+        // The last part is done when the master has nothing further to compare: it names a part that was before.
+        if bit == 0 && next < part { Step::Found } else { Step::Match }
+    }
+}

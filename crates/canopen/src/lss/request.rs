@@ -1,0 +1,136 @@
+//! What the master asks.
+
+use super::{Part, frame_of_word, word};
+
+/// A request of the LSS master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Switch state global (04h): all slaves to configuration, or back to waiting.
+    SwitchGlobal {
+        /// To configuration.
+        configuration: bool,
+    },
+    /// Switch state selective (40h to 43h): one of four messages that name one slave.
+    Select(Part, u32),
+    /// Configure node-ID (11h); 255 takes it away.
+    NodeId(u8),
+    /// Configure bit timing parameters (13h): a table and an index in it.
+    BitTiming {
+        /// Table selector; 0 is that of CiA 301.
+        table: u8,
+        /// Index in the table.
+        index: u8,
+    },
+    /// Activate bit timing parameters (15h), with the switch delay in ms.
+    Activate {
+        /// How long to wait before the switch, and how long after it, in ms.
+        delay: u16,
+    },
+    /// Store configuration (17h).
+    Store,
+    /// Identify remote slave (46h to 4Bh): one of six messages that name a range of identities.
+    Identify(Bound, u32),
+    /// Identify non-configured remote slave (4Ch).
+    IdentifyUnconfigured,
+    /// Fastscan (51h).
+    Fastscan {
+        /// The value to compare with.
+        value: u32,
+        /// The lowest bit to compare, 0 to 31, or [`Request::CONFIRM`].
+        bit: u8,
+        /// Which part of the identity, 0 to 3.
+        part: u8,
+        /// Which part comes next.
+        next: u8,
+    },
+    /// Inquire identity (5Ah to 5Dh).
+    Inquire(Part),
+    /// Inquire node-ID (5Eh).
+    InquireNodeId,
+}
+
+/// A bound of the range in which a slave is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// The vendor-ID.
+    Vendor,
+    /// The product code.
+    Product,
+    /// The lowest revision number.
+    RevisionLow,
+    /// The highest revision number.
+    RevisionHigh,
+    /// The lowest serial number.
+    SerialLow,
+    /// The highest serial number.
+    SerialHigh,
+}
+
+impl Bound {
+    /// All bounds, in the order in which they are sent.
+    pub const ALL: [Bound; 6] = [
+        Bound::Vendor,
+        Bound::Product,
+        Bound::RevisionLow,
+        Bound::RevisionHigh,
+        Bound::SerialLow,
+        Bound::SerialHigh,
+    ];
+}
+
+const SELECT: u8 = 0x40;
+const IDENTIFY: u8 = 0x46;
+const INQUIRE: u8 = 0x5A;
+
+impl Request {
+    /// The bit of a fastscan that asks whether there is any unconfigured slave.
+    pub const CONFIRM: u8 = 0x80;
+
+    /// `None` for a frame that is no request.
+    #[must_use]
+    pub fn parse(frame: [u8; 8]) -> Option<Request> {
+        let [command, first, second, ..] = frame;
+        let value = word(frame);
+        Some(match command {
+            0x04 if first <= 1 => Request::SwitchGlobal { configuration: first == 1 },
+            0x11 => Request::NodeId(first),
+            0x13 => Request::BitTiming { table: first, index: second },
+            0x15 => Request::Activate { delay: u16::from_le_bytes([first, second]) },
+            0x17 => Request::Store,
+            SELECT..=0x43 => Request::Select(Part::numbered(command - SELECT)?, value),
+            IDENTIFY..=0x4B => Request::Identify(*Bound::ALL.get(usize::from(command - IDENTIFY))?, value),
+            0x4C => Request::IdentifyUnconfigured,
+            0x51 => fastscan(frame)?,
+            INQUIRE..=0x5D => Request::Inquire(Part::numbered(command - INQUIRE)?),
+            0x5E => Request::InquireNodeId,
+            _ => return None,
+        })
+    }
+
+    /// The frame's data.
+    #[must_use]
+    pub const fn encode(self) -> [u8; 8] {
+        match self {
+            Request::SwitchGlobal { configuration } => [0x04, configuration as u8, 0, 0, 0, 0, 0, 0],
+            Request::Select(part, value) => frame_of_word(SELECT + part.number(), value),
+            Request::NodeId(id) => [0x11, id, 0, 0, 0, 0, 0, 0],
+            Request::BitTiming { table, index } => [0x13, table, index, 0, 0, 0, 0, 0],
+            Request::Activate { delay } => frame_of_word(0x15, delay as u32),
+            Request::Store => [0x17, 0, 0, 0, 0, 0, 0, 0],
+            Request::Identify(bound, value) => frame_of_word(IDENTIFY + bound as u8, value),
+            Request::IdentifyUnconfigured => [0x4C, 0, 0, 0, 0, 0, 0, 0],
+            Request::Fastscan { value, bit, part, next } => {
+                let [a, b, c, d] = value.to_le_bytes();
+                [0x51, a, b, c, d, bit, part, next]
+            }
+            Request::Inquire(part) => [INQUIRE + part.number(), 0, 0, 0, 0, 0, 0, 0],
+            Request::InquireNodeId => [0x5E, 0, 0, 0, 0, 0, 0, 0],
+        }
+    }
+}
+
+fn fastscan(frame: [u8; 8]) -> Option<Request> {
+    let [.., bit, part, next] = frame;
+    let is_valid = (bit <= 31 || bit == Request::CONFIRM) && part <= 3 && next <= 3;
+    is_valid.then_some(Request::Fastscan { value: word(frame), bit, part, next })
+}

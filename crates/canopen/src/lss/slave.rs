@@ -1,0 +1,195 @@
+//! The slave: which requests are for this device, and what follows from them.
+
+use super::fastscan::{Fastscan, Step};
+use super::{BitRate, Bound, Identity, Part, Request, Response};
+use crate::{Duration, NodeId};
+
+/// Node-ID and bit rate as the next reset communication, the next activation or the next start brings them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Configuration {
+    /// `None` for a device that waits to be given one.
+    pub node_id: Option<NodeId>,
+    /// The bit rate.
+    pub bit_rate: BitRate,
+}
+
+/// What a request asks of the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Effect {
+    /// A device without a node-ID has got one: it boots.
+    Join,
+    /// The bit rate changes.
+    Switch(Switch),
+    /// The configuration is to be stored; the response waits until it is.
+    Store(Configuration),
+}
+
+/// A change of the bit rate: nothing is sent for a delay before it and for a delay after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Switch {
+    pub(crate) bit_rate: BitRate,
+    pub(crate) delay: Duration,
+}
+
+/// A response, an effect, both or nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Outcome {
+    pub(crate) response: Option<Response>,
+    pub(crate) effect: Option<Effect>,
+}
+
+impl From<Response> for Outcome {
+    fn from(response: Response) -> Outcome {
+        Outcome { response: Some(response), effect: None }
+    }
+}
+
+impl From<Effect> for Outcome {
+    fn from(effect: Effect) -> Outcome {
+        Outcome { response: None, effect: Some(effect) }
+    }
+}
+
+/// The slave of a device.
+#[derive(Debug)]
+pub(crate) struct Slave {
+    /// In the state configuration; waiting otherwise.
+    is_selected: bool,
+    pending: Configuration,
+    /// How many of the four messages of a selection have matched.
+    selected: u8,
+    /// How many of the six messages of an identification have matched.
+    identified: u8,
+    scan: Fastscan,
+}
+
+const OK: u8 = 0;
+/// A value out of range, or a service that is not supported.
+const REFUSED: u8 = 1;
+/// The memory has failed.
+const MEMORY: u8 = 2;
+
+impl Slave {
+    pub(crate) fn new(pending: Configuration) -> Slave {
+        Slave { is_selected: false, pending, selected: 0, identified: 0, scan: Fastscan::default() }
+    }
+
+    /// What the next reset communication brings.
+    pub(crate) fn pending(&self) -> Configuration {
+        self.pending
+    }
+
+    /// A reset of any kind: back to waiting.
+    pub(crate) fn reset(&mut self) {
+        *self = Slave::new(self.pending);
+    }
+
+    /// Takes a request. `node_id` is the one in use.
+    pub(crate) fn take(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
+        match request {
+            Request::SwitchGlobal { configuration } => self.switch(configuration, node_id),
+            Request::Select(part, value) => self.select(part, value, identity),
+            Request::Identify(bound, value) => self.identify(bound, value, identity),
+            Request::IdentifyUnconfigured if self.is_unconfigured(node_id) => Response::Unconfigured.into(),
+            Request::Fastscan { value, bit, part, next } if self.is_scanned(node_id) => {
+                self.fastscan(identity, value, bit, part, next)
+            }
+            _ if self.is_selected => self.configure(request, identity, node_id),
+            _ => Outcome::default(),
+        }
+    }
+
+    /// What the master does with the one slave that it has selected.
+    fn configure(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
+        match request {
+            Request::NodeId(id) => Response::NodeId(self.set_node_id(id)).into(),
+            Request::BitTiming { table, index } => {
+                Response::BitTiming(self.set_bit_rate(table, index)).into()
+            }
+            Request::Activate { delay } => {
+                let delay = Duration::from_millis(delay.into());
+                Effect::Switch(Switch { bit_rate: self.pending.bit_rate, delay }).into()
+            }
+            Request::Store => Effect::Store(self.pending).into(),
+            Request::Inquire(part) => Response::Identity(part, identity.part(part)).into(),
+            Request::InquireNodeId => Response::NodeIdIs(node_id.map_or(u8::MAX, NodeId::get)).into(),
+            _ => Outcome::default(),
+        }
+    }
+
+    /// The answer to a store that has come to its end.
+    pub(crate) fn stored(good: bool) -> Response {
+        Response::Stored(if good { OK } else { MEMORY })
+    }
+
+    /// A device that got its node-ID while it had none uses it from the moment it is left alone.
+    fn switch(&mut self, configuration: bool, node_id: Option<NodeId>) -> Outcome {
+        let is_left = core::mem::replace(&mut self.is_selected, configuration) && !configuration;
+        (self.selected, self.identified) = (0, 0);
+        let joins = is_left && node_id.is_none() && self.pending.node_id.is_some();
+        Outcome { response: None, effect: joins.then_some(Effect::Join) }
+    }
+
+    fn select(&mut self, part: Part, value: u32, identity: &Identity) -> Outcome {
+        let matches = !self.is_selected && value == identity.part(part);
+        self.selected = advance(self.selected, part.number(), matches);
+        if usize::from(self.selected) < Part::ALL.len() {
+            return Outcome::default();
+        }
+        (self.selected, self.is_selected) = (0, true);
+        Response::Selected.into()
+    }
+
+    fn identify(&mut self, bound: Bound, value: u32, identity: &Identity) -> Outcome {
+        let matches = match bound {
+            Bound::Vendor => value == identity.vendor,
+            Bound::Product => value == identity.product,
+            Bound::RevisionLow => value <= identity.revision,
+            Bound::RevisionHigh => value >= identity.revision,
+            Bound::SerialLow => value <= identity.serial,
+            Bound::SerialHigh => value >= identity.serial,
+        };
+        self.identified = advance(self.identified, bound as u8, matches);
+        if usize::from(self.identified) < Bound::ALL.len() {
+            return Outcome::default();
+        }
+        self.identified = 0;
+        Response::Identified.into()
+    }
+
+    fn is_unconfigured(&self, node_id: Option<NodeId>) -> bool {
+        node_id.is_none() && self.pending.node_id.is_none()
+    }
+
+    /// A slave that was found already no longer takes part in the search for the next.
+    fn is_scanned(&self, node_id: Option<NodeId>) -> bool {
+        !self.is_selected && self.is_unconfigured(node_id)
+    }
+
+    fn fastscan(&mut self, identity: &Identity, value: u32, bit: u8, part: u8, next: u8) -> Outcome {
+        let step = self.scan.step(identity, value, bit, part, next);
+        self.is_selected = step == Step::Found;
+        if step == Step::Silent { Outcome::default() } else { Response::Identified.into() }
+    }
+
+    fn set_node_id(&mut self, id: u8) -> u8 {
+        let node_id = NodeId::new(id);
+        if node_id.is_none() && id != u8::MAX {
+            return REFUSED;
+        }
+        self.pending.node_id = node_id;
+        OK
+    }
+
+    fn set_bit_rate(&mut self, table: u8, index: u8) -> u8 {
+        let Some(bit_rate) = BitRate::from_index(index).filter(|_| table == 0) else { return REFUSED };
+        self.pending.bit_rate = bit_rate;
+        OK
+    }
+}
+
+/// One more message of a series in which each must come in its turn and match; the first one always begins anew.
+fn advance(done: u8, number: u8, matches: bool) -> u8 {
+    let is_in_turn = number == 0 || number == done;
+    if is_in_turn && matches { number.saturating_add(1) } else { 0 }
+}

@@ -1,0 +1,215 @@
+//! Storing and loading: 1010h, 1011h, and the packed values.
+
+use crate::bench::{Bench, DICTIONARY, ID};
+use canopen::dictionary::Group;
+use canopen::sdo::Abort;
+use canopen::{Action, Job, NodeId, Selection};
+
+const SAVE: [u8; 4] = *b"save";
+const LOAD: [u8; 4] = *b"load";
+const RESET_COMMUNICATION: u8 = 0x82;
+const RESET_NODE: u8 = 0x81;
+
+/// Writes a signature that the node takes, and gives the job.
+fn begin(bench: &mut Bench, index: u16, sub: u8, signature: [u8; 4]) -> Job {
+    bench.device.take_action();
+    let [low, high] = index.to_le_bytes();
+    let [a, b, c, d] = signature;
+    assert_eq!(bench.ask_raw([0x23, low, high, sub, a, b, c, d]), None, "the response waits");
+    match bench.device.take_action() {
+        Some(Action::Store(job)) => job,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn finish(bench: &mut Bench, result: Result<(), Abort>) -> Vec<u8> {
+    bench.take();
+    bench.device.finish(result, bench.now, &mut bench.out);
+    let sent = bench.sent();
+    assert_eq!(sent.len(), 1);
+    sent[0].1.clone()
+}
+
+/// Does what the memory would do.
+fn save(bench: &mut Bench) {
+    let job = begin(bench, 0x1010, 1, SAVE);
+    assert_eq!(job, Job::Save(Selection::All));
+    for (number, group) in [Group::Communication, Group::Application].into_iter().enumerate() {
+        bench.device.application_mut().stored[number] = packed(bench, group);
+    }
+    assert_eq!(finish(bench, Ok(())), [0x60, 0x10, 0x10, 1, 0, 0, 0, 0]);
+}
+
+fn packed(bench: &Bench, group: Group) -> Vec<u8> {
+    let mut buffer = heapless::Vec::<u8, 2048>::new();
+    let node_id = bench.device.node_id();
+    DICTIONARY.pack(group, node_id, bench.device.image(), &mut buffer).unwrap();
+    buffer.to_vec()
+}
+
+fn reset(bench: &mut Bench, command: u8) {
+    bench.nmt(command);
+    bench.start();
+    bench.take();
+}
+
+#[test]
+fn the_sub_index_says_what_is_stored_and_restored() {
+    let selections = [(1, Selection::All), (2, Selection::Communication), (3, Selection::Application)];
+    for (sub, selection) in selections {
+        let mut bench = Bench::booted();
+        assert_eq!(begin(&mut bench, 0x1010, sub, SAVE), Job::Save(selection));
+        finish(&mut bench, Ok(()));
+        assert_eq!(begin(&mut bench, 0x1011, sub, LOAD), Job::Restore(selection));
+        finish(&mut bench, Ok(()));
+        assert_eq!(bench.read(0x1010, sub), Ok(vec![1, 0, 0, 0]));
+    }
+}
+
+#[test]
+fn a_wrong_signature_stores_nothing() {
+    let mut bench = Bench::booted();
+    bench.device.take_action();
+    for (index, signature) in [(0x1010, LOAD), (0x1011, SAVE), (0x1010, *b"SAVE"), (0x1011, [0; 4])] {
+        assert_eq!(bench.write(index, 1, &signature), Err(0x0800_0020));
+        assert_eq!(bench.device.take_action(), None);
+    }
+    assert_eq!(bench.write(0x1010, 4, &SAVE), Err(0x0609_0011));
+}
+
+#[test]
+fn a_memory_that_fails_is_told_to_the_client() {
+    let mut bench = Bench::booted();
+    begin(&mut bench, 0x1010, 1, SAVE);
+    assert_eq!(finish(&mut bench, Err(Abort::Hardware)), [0x80, 0x10, 0x10, 1, 0, 0, 6, 6]);
+}
+
+#[test]
+fn a_repeated_request_waits_for_the_same_job_and_another_one_is_refused() {
+    let mut bench = Bench::booted();
+    begin(&mut bench, 0x1010, 2, SAVE);
+    assert_eq!(bench.ask_raw([0x23, 0x10, 0x10, 2, b's', b'a', b'v', b'e']), None);
+    assert_eq!(bench.device.take_action(), None);
+    assert_eq!(bench.write(0x1010, 3, &SAVE), Err(0x0800_0022));
+    // The client has gone on to something else: nobody waits for the first job any more.
+    bench.take();
+    bench.device.finish(Ok(()), bench.now, &mut bench.out);
+    assert_eq!(bench.sent(), []);
+}
+
+#[test]
+fn the_client_can_do_something_else_meanwhile() {
+    let mut bench = Bench::booted();
+    begin(&mut bench, 0x1010, 1, SAVE);
+    assert_eq!(bench.read(0x1000, 0), Ok(vec![0x94, 1, 2, 0]));
+}
+
+#[test]
+fn a_memory_that_never_answers_times_out() {
+    let mut bench = Bench::booted();
+    begin(&mut bench, 0x1010, 1, SAVE);
+    bench.run(canopen::Duration::from_millis(1100));
+    let aborts = bench.sent().into_iter().filter(|(id, _)| *id == 0x585);
+    assert_eq!(aborts.map(|(_, data)| data[4..8].to_vec()).collect::<Vec<_>>(), [[0, 0, 4, 5]]);
+}
+
+#[test]
+fn communication_parameters_come_back_with_reset_communication_and_the_others_with_reset_node() {
+    let mut bench = Bench::booted();
+    bench.write(0x1017, 0, &500_u16.to_le_bytes()).unwrap();
+    bench.write(0x6100, 0, &[4, 0]).unwrap();
+    save(&mut bench);
+    bench.write(0x1017, 0, &250_u16.to_le_bytes()).unwrap();
+    bench.write(0x6100, 0, &[5, 0]).unwrap();
+
+    reset(&mut bench, RESET_COMMUNICATION);
+    assert_eq!(bench.read(0x1017, 0), Ok(500_u16.to_le_bytes().to_vec()));
+    assert_eq!(bench.read(0x6100, 0), Ok(vec![5, 0]));
+    reset(&mut bench, RESET_NODE);
+    assert_eq!(bench.read(0x6100, 0), Ok(vec![4, 0]));
+}
+
+#[test]
+fn a_default_cob_id_follows_the_node_id_and_another_one_does_not() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1400, 1, 0x8000_0333).unwrap();
+    save(&mut bench);
+    let stored = std::mem::take(&mut bench.device.application_mut().stored);
+
+    let mut bench = Bench::unconfigured();
+    bench.device.application_mut().stored = stored;
+    for request in [[4, 1, 0, 0, 0, 0, 0, 0], [0x11, ID + 1, 0, 0, 0, 0, 0, 0], [4, 0, 0, 0, 0, 0, 0, 0]] {
+        bench.receive(canopen::Frame::new(0x7E5, &request).unwrap());
+    }
+    bench.start();
+    assert_eq!(bench.device.node_id(), NodeId::new(ID + 1));
+    let word = |index, sub| DICTIONARY.field(index, sub).u32(bench.device.image());
+    assert_eq!((word(0x1014, 0), word(0x1800, 1), word(0x1400, 1)), (0x86, 0x186, 0x8000_0333));
+}
+
+#[test]
+fn values_of_an_older_dictionary_fit_and_new_objects_have_their_defaults() {
+    let mut bench = Bench::booted();
+    // What a firmware that knew only 1017h would have stored.
+    bench.device.application_mut().stored[0] = vec![0x17, 0x10, 0, 1, 2, 0xF4, 0x01];
+    reset(&mut bench, RESET_COMMUNICATION);
+    assert_eq!(bench.read(0x1017, 0), Ok(vec![0xF4, 0x01]));
+    assert_eq!(bench.read(0x1029, 1), Ok(vec![0]));
+    assert_eq!(bench.device.application().loaded.last(), Some(&(Group::Communication, true)));
+}
+
+#[test]
+fn values_that_no_longer_fit_are_refused_as_a_whole_and_reported() {
+    let good = [0x17, 0x10, 0, 1, 2, 0xF4, 0x01];
+    let misfits: &[&[u8]] = &[
+        &[0x18, 0x20, 0, 1, 2, 0, 0],             // no such object
+        &[0x17, 0x10, 1, 1, 2, 0, 0],             // no such sub-index
+        &[0x06, 0x10, 0, 1, 2, 0, 0],             // another size
+        &[0x29, 0x10, 1, 1, 1, 255],              // above its limit
+        &[0x00, 0x61, 0, 1, 2, 0, 0],             // of another group
+        &[0x00, 0x1A, 1, 1, 4, 8, 0, 0xFF, 0x67], // a mapping of what is not there
+        &[0x17, 0x10, 0],                         // cut
+        &[0x17, 0x10, 0, 2, 2, 0, 0],             // cut
+        &[0x17, 0x10, 0, 0, 2],                   // a run of nothing
+        &[0x17, 0x10, 0, 5, 0],
+    ];
+    for misfit in misfits {
+        let mut bench = Bench::booted();
+        bench.device.application_mut().stored[0] = [&good[..], misfit].concat();
+        bench.nmt(RESET_COMMUNICATION);
+        bench.start();
+        let emcy = bench.sent().into_iter().find(|(id, _)| *id == 0x085).expect("an EMCY");
+        assert_eq!(emcy.1[..2], 0x6302_u16.to_le_bytes(), "{misfit:x?}");
+        assert_eq!(bench.read(0x1017, 0), Ok(1000_u16.to_le_bytes().to_vec()), "{misfit:x?}");
+        assert_eq!(bench.device.application().loaded.last(), Some(&(Group::Communication, false)));
+
+        // Stored anew, the next start is a good one.
+        bench.device.application_mut().stored[0].clear();
+        bench.nmt(RESET_COMMUNICATION);
+        bench.start();
+        let emcy = bench.sent().into_iter().rfind(|(id, _)| *id == 0x085).expect("an EMCY");
+        assert_eq!(emcy.1[..2], [0, 0]);
+    }
+}
+
+#[test]
+fn a_memory_that_fell_back_to_older_values_is_reported() {
+    let mut bench = Bench::booted();
+    bench.device.application_mut().is_damaged = true;
+    bench.nmt(RESET_NODE);
+    bench.start();
+    let codes: Vec<_> =
+        bench.sent().into_iter().filter(|(id, _)| *id == 0x085).map(|(_, d)| d[..2].to_vec()).collect();
+    assert_eq!(codes, [0x6302_u16.to_le_bytes(), 0x6303_u16.to_le_bytes()]);
+}
+
+#[test]
+fn the_size_of_a_packed_group_is_known() {
+    let bench = Bench::booted();
+    let rows: Vec<_> = crate::bench::rows().map(|(row, _)| *row).collect();
+    for group in [Group::Communication, Group::Application] {
+        let relative = if group == Group::Communication { 4 * (5 + 4) } else { 0 };
+        let packed = packed(&bench, group);
+        assert_eq!(packed.len() + relative, canopen::dictionary::packed_size(&rows, group));
+    }
+}
