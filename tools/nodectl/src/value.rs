@@ -106,6 +106,7 @@ fn decode_number(bytes: &[u8], class: Class) -> Option<Value> {
     match class {
         Class::Real(32) => Some(Value::Real32(f32::from_le_bytes(bytes.try_into().ok()?))),
         Class::Real(_) => Some(Value::Real64(f64::from_le_bytes(bytes.try_into().ok()?))),
+        Class::Unsigned(1) => Some(Value::Integer((bytes != [0]).into())),
         Class::Signed(_) => Some(Value::Integer(extend(bytes, bytes.last()? & 0x80 != 0))),
         _ => Some(Value::Integer(extend(bytes, false))),
     }

@@ -131,7 +131,7 @@ impl<'n> Master<'n> {
         self.send(Request::Activate { delay })
     }
 
-    /// Finds a slave without a node-ID, and selects it; `None` when there is none.
+    /// Finds a slave without a node-ID, and selects it; `None` when there is none. It takes 133 times the time-out.
     ///
     /// # Errors
     /// The bus is lost, or a slave that answered before does no more.
@@ -139,15 +139,17 @@ impl<'n> Master<'n> {
         fastscan::scan(|request| self.is_answered(request))
     }
 
-    /// Whether some slave matches.
+    /// Whether some slave matches. It takes the whole time, answered or not: all that match answer, one after the other,
+    /// and a late answer would count for the next step.
     fn is_answered(&mut self, request: Request) -> Result<bool, Error> {
-        let answer =
-            self.ask("fastscan", request, |response| (response == Response::Identified).then_some(()));
-        match answer {
-            Ok(()) => Ok(true),
-            Err(Error::NoAnswer { .. }) => Ok(false),
-            Err(error) => Err(error),
-        }
+        self.send(request)?;
+        let until = self.network.now() + self.timeout;
+        let mut is_answered = false;
+        self.network.wait(until, |frame| {
+            is_answered |= response(frame) == Some(Response::Identified);
+            None::<()>
+        })?;
+        Ok(is_answered)
     }
 
     fn command(
@@ -170,10 +172,7 @@ impl<'n> Master<'n> {
     ) -> Result<T, Error> {
         self.send(request)?;
         let until = self.network.now() + self.timeout;
-        let answer = self.network.wait(until, |frame| {
-            let data = frame.data().try_into().ok().filter(|_| frame.id() == RESPONSE)?;
-            Response::parse(data).and_then(&mut fits)
-        })?;
+        let answer = self.network.wait(until, |frame| response(frame).and_then(&mut fits))?;
         answer.ok_or(Error::NoAnswer { service })
     }
 
@@ -181,4 +180,9 @@ impl<'n> Master<'n> {
         let Some(frame) = Frame::new(REQUEST, &request.encode()) else { return Ok(()) };
         Ok(self.network.send(&frame)?)
     }
+}
+
+fn response(frame: &Frame) -> Option<Response> {
+    let data = frame.data().try_into().ok().filter(|_| frame.id() == RESPONSE)?;
+    Response::parse(data)
 }

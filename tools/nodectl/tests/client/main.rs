@@ -2,6 +2,7 @@
 
 mod blocks;
 mod loader;
+mod lss;
 mod pressure;
 mod transfers;
 mod wire;
