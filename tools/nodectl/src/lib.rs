@@ -23,6 +23,7 @@ mod network;
 pub mod nmt;
 pub mod object;
 pub mod sdo;
+pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;

@@ -39,8 +39,7 @@ impl Value {
         let number = |class| decode_number(bytes, class).unwrap_or_else(|| Value::Bytes(bytes.to_vec()));
         match data_type.class() {
             Class::Text if data_type == UNICODE_STRING => Value::Text(decode_utf16(bytes)),
-            // Some devices fill their texts with zeros.
-            Class::Text => Value::Text(String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned()),
+            Class::Text => Value::Text(text(bytes)),
             Class::Bytes => Value::Bytes(bytes.to_vec()),
             class => number(class),
         }
@@ -117,6 +116,12 @@ fn extend(bytes: &[u8], is_negative: bool) -> i128 {
     let mut word = [if is_negative { 0xFF } else { 0 }; 16];
     word[..bytes.len()].copy_from_slice(bytes);
     i128::from_le_bytes(word)
+}
+
+/// The text in the bytes of a `VISIBLE_STRING`. Some devices fill theirs with zeros.
+#[must_use]
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned()
 }
 
 fn decode_utf16(bytes: &[u8]) -> String {

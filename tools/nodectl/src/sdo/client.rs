@@ -12,7 +12,7 @@ use crate::network::Network;
 pub struct Options {
     /// How long the server may take to answer a request.
     pub timeout: Duration,
-    /// How often a transfer that got no answer is begun anew.
+    /// How often a transfer that got no answer, or one that does not fit, is begun anew.
     pub retries: u8,
 }
 
@@ -99,7 +99,9 @@ impl<'n> Client<'n> {
             if let Some(abort) = cause.abort() {
                 channel.give_up(at, abort);
             }
-            if retries == 0 || !matches!(cause, Cause::NoAnswer) {
+            // A server that was left in the middle of a block takes the next request for a segment of it. It has been
+            // told now.
+            if retries == 0 || !matches!(cause, Cause::NoAnswer | Cause::Unexpected) {
                 return Err(Error { node: self.node, at, name: None, cause });
             }
             retries -= 1;

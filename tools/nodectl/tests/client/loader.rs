@@ -149,6 +149,10 @@ impl Loader {
         Loader { id, device: Device::new(&DICTIONARY, id, flash), up: Instant(0), is_started: false }
     }
 
+    pub(crate) fn id(&self) -> NodeId {
+        self.id
+    }
+
     pub(crate) fn flash(&mut self) -> &mut Flash {
         self.device.application_mut()
     }

@@ -5,4 +5,5 @@ mod loader;
 mod lss;
 mod pressure;
 mod transfers;
+mod update;
 mod wire;
