@@ -172,7 +172,6 @@ impl Loader {
     /// Brings the dictionary up to date.
     fn publish(&mut self, now: Instant) {
         let flash = self.flash();
-        flash.now = now;
         let device_type = if flash.runs { 0x0002_0194_u32 } else { 0x424F_4F54 };
         let version = if flash.runs { flash.version().to_vec() } else { b"loader 1".to_vec() };
         let status = if now < flash.busy_until { 1 } else { flash.status };
@@ -213,7 +212,11 @@ impl Station for Loader {
         if now < self.up || frame.id() != 0x600 + u16::from(self.id.get()) {
             return;
         }
-        self.publish(now);
+        self.device.application_mut().now = now;
+        let is_upload = frame.data().first().is_some_and(|byte| byte >> 5 == 2);
+        if is_upload {
+            self.publish(now);
+        }
         let mut answers = Answers::default();
         if self.understands(frame) {
             self.device.on_service_frame(frame, now, &mut answers);
