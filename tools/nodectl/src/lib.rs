@@ -15,14 +15,19 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod acquisition;
 pub mod bus;
 mod catalogue;
+pub mod cli;
 pub mod heartbeat;
 pub mod lss;
 mod network;
 pub mod nmt;
 pub mod object;
+pub mod scan;
 pub mod sdo;
+pub mod tpdo;
+pub mod unit;
 pub mod update;
 pub mod value;
 

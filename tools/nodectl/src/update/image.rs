@@ -31,6 +31,14 @@ pub struct ImageInfo {
 }
 
 impl Image {
+    /// An image of this project.
+    ///
+    /// # Errors
+    /// It is none.
+    pub fn parse(_: Vec<u8>) -> Result<Image, ImageError> {
+        Err(ImageError("no header".to_owned()))
+    }
+
     /// An image of any format: nothing about it can be checked here.
     #[must_use]
     pub fn opaque(bytes: Vec<u8>) -> Image {

@@ -30,7 +30,7 @@ pub struct Options {
 }
 
 /// What has become of a node.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Version before (100Ah), where a program ran.
     pub old_version: Option<String>,

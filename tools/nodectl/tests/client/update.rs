@@ -138,7 +138,7 @@ fn what_would_do_harm_is_refused_before_anything_is_erased() {
     let older = image(Version(0, 9, 0));
     let error = one(&wire, &older, &options(), &mut Diary::default()).unwrap_err();
     assert_eq!(error.to_string(), "node 3: the node runs version 1.0.0, which is newer than 0.9.0");
-    assert_eq!(commands(&wire), []);
+    assert!(commands(&wire).is_empty());
     let force = Options { force: true, ..options() };
     assert_eq!(
         one(&wire, &older, &force, &mut Diary::default()).unwrap().new_version.as_deref(),
@@ -158,9 +158,11 @@ fn a_node_without_blocks_gets_segments() {
 
 #[test]
 fn a_program_that_the_node_does_not_like_is_told_in_words() {
-    for (word, words) in
-        [(0x0006, "format or CRC error"), (0x000E, "the flash is secured"), (0x0005_0080, "error 64 of the manufacturer, detail 5")]
-    {
+    for (word, words) in [
+        (0x0006, "format or CRC error"),
+        (0x000E, "the flash is secured"),
+        (0x0005_0080, "error 64 of the manufacturer, detail 5"),
+    ] {
         let wire = fleet(&[3]);
         wire.station(|loaders| loaders[0].flash().verdict = word);
         let error = one(&wire, &image(NEW), &options(), &mut Diary::default()).unwrap_err();
