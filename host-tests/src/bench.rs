@@ -1,6 +1,6 @@
-//! A node with its parameter store on a bench: frames in and out, an SDO client, and the time under control.
+//! A node with its parameter store on a bench, without a bus: frames in and out, and the time under control.
 
-use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response};
+use canopen::sdo::Multiplexer;
 use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
 use node::{
     BitRate, FactoryCalibration, Measurement, Parcel, Personality, Protocol, RawSample, Request as Demand,
@@ -8,6 +8,8 @@ use node::{
 };
 use std::collections::VecDeque;
 use storage::{Memory, Pages, Store, View};
+
+use crate::sdo::{Channel, Client, Failure};
 
 /// Node-ID of the node on the bench.
 pub const ID: u8 = 0x21;
@@ -47,6 +49,7 @@ pub struct Bench {
 pub type Flash = Store<Memory<Vec<u8>>>;
 
 const PAGES: Pages = Pages::new(0, 4 * 1024);
+const ERASED: [u8; 8 * 1024] = [0xFF; 8 * 1024];
 
 /// A setup with recognisable values.
 #[must_use]
@@ -80,11 +83,29 @@ pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
     }
 }
 
+/// An empty parameter store.
+///
+/// # Panics
+/// When it cannot be prepared.
+#[must_use]
+pub fn empty_store() -> Flash {
+    Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
+}
+
+/// Stores at once what the node asks to be stored.
+pub fn deliver(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
+    let mut parcel = Parcel::new();
+    if protocol.pack(&mut parcel) {
+        let result = parcel.deliver(store);
+        protocol.finish(&parcel, result, now, out);
+    }
+}
+
 impl Bench {
     /// A node that has booted, its boot-up message out of the way.
     #[must_use]
     pub fn booted() -> Bench {
-        Bench::with_flash(vec![0xFF; 8 * 1024])
+        Bench::with_flash(ERASED.to_vec())
     }
 
     /// A node that has booted with this content of its parameter pages.
@@ -127,11 +148,7 @@ impl Bench {
                 self.demands.push_back(demand);
                 continue;
             }
-            let mut parcel = Parcel::new();
-            if self.protocol.pack(&mut parcel) {
-                let result = parcel.deliver(&mut self.store);
-                self.protocol.finish(&parcel, result, self.now, &mut self.out);
-            }
+            deliver(&mut self.protocol, &mut self.store, self.now, &mut self.out);
         }
     }
 
@@ -176,67 +193,26 @@ impl Bench {
         self.poll();
     }
 
-    /// One SDO exchange. Other frames of the node stay in the queue.
-    ///
-    /// # Panics
-    /// Unless there is one valid response.
-    pub fn ask(&mut self, request: Request) -> Response {
-        let before = std::mem::take(&mut self.out.0);
-        self.receive(&Frame::new(0x600 + u16::from(ID), &request.encode()).expect("a frame"));
-        let (responses, others): (Vec<_>, Vec<_>) = std::mem::take(&mut self.out.0)
-            .into_iter()
-            .partition(|frame| frame.id() == 0x580 + u16::from(ID));
-        self.out.0 = before.into_iter().chain(others).collect();
-        let [response] = responses.try_into().expect("one response");
-        Response::parse(response.data().try_into().expect("eight bytes")).expect("a valid response")
-    }
-
     /// Reads a value.
     ///
     /// # Errors
     /// The abort code.
     ///
     /// # Panics
-    /// On a response that answers another question.
+    /// Without a valid response.
     pub fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, u32> {
-        let at = Multiplexer { index, sub };
-        match self.ask(Request::Upload(at)) {
-            Response::Uploaded(of, bytes) if of == at => Ok(bytes.as_slice().to_vec()),
-            Response::UploadSegmented(of, Some(size)) if of == at => Ok(self.read_segments(size)),
-            Response::Abort(of, code) if of == at => Err(code),
-            other => panic!("{other:?}"),
-        }
+        Client::new(self).read(Multiplexer { index, sub }).map_err(abort_code)
     }
 
-    fn read_segments(&mut self, size: u32) -> Vec<u8> {
-        let mut value = vec![];
-        for toggle in [false, true].into_iter().cycle() {
-            let Response::UploadedSegment(segment) = self.ask(Request::UploadSegment { toggle }) else {
-                panic!("no segment");
-            };
-            value.extend_from_slice(segment.data.as_slice());
-            if segment.last {
-                break;
-            }
-        }
-        assert_eq!(value.len(), size as usize);
-        value
-    }
-
-    /// Writes up to four bytes.
+    /// Writes a value.
     ///
     /// # Errors
     /// The abort code.
     ///
     /// # Panics
-    /// On a response that answers another question.
+    /// Without a valid response.
     pub fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) -> Result<(), u32> {
-        let at = Multiplexer { index, sub };
-        match self.ask(Request::Download(at, Initiate::Expedited(Bytes::from_slice(bytes)))) {
-            Response::Downloaded(of) if of == at => Ok(()),
-            Response::Abort(of, code) if of == at => Err(code),
-            other => panic!("{other:?}"),
-        }
+        Client::new(self).write(Multiplexer { index, sub }, bytes).map_err(abort_code)
     }
 
     /// Makes a TPDO invalid and its mapping empty, steps 1 and 2 of the mapping procedure.
@@ -248,5 +224,28 @@ impl Bench {
         let [a, b, c, d] = cob_id.try_into().expect("four bytes");
         self.write(0x1800 + number, 1, &[a, b, c, d | 0x80]).expect("step 1");
         self.write(0x1A00 + number, 0, &[0]).expect("step 2");
+    }
+}
+
+/// The node answers at once or never.
+impl Channel for Bench {
+    fn send(&mut self, request: [u8; 8]) {
+        self.receive(&Frame::new(0x600 + u16::from(ID), &request).expect("a frame"));
+    }
+
+    fn received(&mut self) -> Option<[u8; 8]> {
+        let place = self.out.0.iter().position(|frame| frame.id() == 0x580 + u16::from(ID))?;
+        self.out.0.remove(place).data().try_into().ok()
+    }
+
+    fn wait(&mut self) -> Option<[u8; 8]> {
+        self.received()
+    }
+}
+
+fn abort_code(failure: Failure) -> u32 {
+    match failure {
+        Failure::Refused(code) => code,
+        other => panic!("{other:?}"),
     }
 }

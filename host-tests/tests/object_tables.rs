@@ -36,13 +36,13 @@ impl Row {
         Row { index, sub: sub.parse().unwrap(), name, kind, access, default, mapping }
     }
 
-    /// Bytes of a value; `None` for a string.
+    /// Bytes of a value; `None` for what has any length.
     fn size(&self) -> Option<usize> {
         match self.kind {
             "UNSIGNED8" => Some(1),
             "UNSIGNED16" | "INTEGER16" => Some(2),
             "UNSIGNED32" | "INTEGER32" | "REAL32" => Some(4),
-            "VISIBLE_STRING" => None,
+            "VISIBLE_STRING" | "DOMAIN" => None,
             other => panic!("{other}"),
         }
     }
@@ -105,6 +105,8 @@ fn reading_gives_the_default_in_the_size_of_the_type() {
         let expected = match (row.access, row.index) {
             ("wo", _) => Err(WRITE_ONLY),
             (_, 0x1003) if row.sub > 0 => Err(NO_DATA),
+            // Nothing was written to it yet.
+            (_, 0x2F00) => Err(NO_DATA),
             _ => Ok(row.default().unwrap_or_else(|| vec![0; row.size().unwrap()])),
         };
         assert_eq!(result, expected, "{row:X?}");
@@ -126,6 +128,7 @@ fn writing_is_refused_or_taken_as_the_access_says() {
             0x6125 => b"zero".to_vec(),
             0x1010 => b"save".to_vec(),
             0x1011 => b"load".to_vec(),
+            0x2F00 => vec![1, 2, 3],
             _ => bench.read(row.index, row.sub).unwrap(),
         };
         assert_eq!(bench.write(row.index, row.sub, &value), Ok(()), "{row:X?}");
@@ -136,7 +139,7 @@ fn writing_is_refused_or_taken_as_the_access_says() {
 fn a_value_of_the_wrong_length_is_refused() {
     for row in table().filter(Row::is_writable) {
         let mut bench = Bench::booted();
-        let size = row.size().unwrap();
+        let Some(size) = row.size() else { continue };
         if size < 4 {
             assert_eq!(bench.write(row.index, row.sub, &[0; 4][..=size]), Err(TOO_LONG), "{row:X?}");
         }

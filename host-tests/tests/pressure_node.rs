@@ -205,7 +205,7 @@ fn the_firmware_is_told_what_it_must_do() {
 fn identifiers_are_those_of_the_services_that_exist() {
     let bench = Bench::booted();
     assert_eq!(bench.protocol.process_ids().collect::<Vec<_>>(), [0, 0x80, TPDO1]);
-    assert_eq!(bench.protocol.service_ids().collect::<Vec<_>>(), [0x600 + u16::from(ID)]);
+    assert_eq!(bench.protocol.service_ids().collect::<Vec<_>>(), [0x7E5, 0x600 + u16::from(ID)]);
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod protocol;
 mod setup;
 mod signal;
 mod stored;
+mod transfer_buffer;
 
 pub use canopen::emcy::Fault;
 pub use canopen::lss::BitRate;

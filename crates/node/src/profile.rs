@@ -2,11 +2,12 @@
 
 use crate::flags::Flags;
 use crate::stored::Stored;
+use crate::transfer_buffer::TransferBuffer;
 use crate::{Personality, REVISION, Setup, VENDOR_ID, pressure};
-use canopen::Application;
 use canopen::dictionary::{Dictionary, Entry, Group, packed_size};
 use canopen::emcy::Fault;
 use canopen::sdo::Abort;
+use canopen::{Application, Part};
 
 /// Large enough for the values of every personality.
 pub(crate) const IMAGE_SIZE: usize = pressure::IMAGE_SIZE;
@@ -31,6 +32,7 @@ pub(crate) struct Profile {
     pub(crate) setup: Setup,
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
+    pub(crate) buffer: TransferBuffer,
 }
 
 impl Application for Profile {
@@ -64,6 +66,14 @@ impl Application for Profile {
             Group::Volatile => return,
         };
         self.flags.set(fault, !good);
+    }
+
+    fn read_domain(&self, _number: u8) -> Result<&[u8], Abort> {
+        self.buffer.read()
+    }
+
+    fn write_domain(&mut self, _number: u8, part: Part<'_>) -> Result<(), Abort> {
+        self.buffer.write(part)
     }
 
     fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {

@@ -2,6 +2,7 @@
 
 use crate::profile::{IMAGE_SIZE, Profile};
 use crate::stored::Stored;
+use crate::transfer_buffer::TransferBuffer;
 use crate::{Parameters, Personality, Request, Setup, Snapshot, flags, pressure};
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, Transmit};
@@ -25,7 +26,12 @@ impl Protocol {
     /// A node that has not started: it is silent and hears nothing until `start`.
     #[must_use]
     pub fn new(setup: &Setup) -> Protocol {
-        let profile = Profile { setup: *setup, flags: flags::Flags::default(), stored: Stored::NOTHING };
+        let profile = Profile {
+            setup: *setup,
+            flags: flags::Flags::default(),
+            stored: Stored::NOTHING,
+            buffer: TransferBuffer::EMPTY,
+        };
         let device =
             Device::new(setup.personality.dictionary(), setup.node_id, profile).with_bit_rate(setup.bit_rate);
         Protocol { device, conditions: Conditions::default(), is_bus_off: false, job: None }

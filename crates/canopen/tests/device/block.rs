@@ -102,7 +102,9 @@ impl Client {
     /// A block upload that asks again for what is missing; the data and the end of the transfer.
     fn upload(&mut self, at: Multiplexer, block_size: u8) -> (Vec<u8>, BlockEnd) {
         let request = Request::BlockUpload { at, crc: true, block_size, threshold: 0 };
-        let Some(Response::BlockUpload { crc: true, size: Some(size), .. }) = self.bench.ask(request) else { panic!() };
+        let Some(Response::BlockUpload { crc: true, size: Some(size), .. }) = self.bench.ask(request) else {
+            panic!()
+        };
         let mut data = vec![];
         self.request(Request::BlockUploadStart);
         for _ in 0..3000 {
