@@ -59,26 +59,35 @@ impl Stay {
 ///
 /// `flash` must not be busy.
 pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {
-    let record = Record(target.layout.record());
-    match record.read(flash) {
-        Ok(Commit::Pending) => return Decision::Copy,
-        Ok(Commit::Torn) => {
-            // Should it fail, the next start tries again.
-            let _ = record.revoke(flash);
-        }
-        Ok(Commit::None | Commit::Done) | Err(_) => {}
-    }
+    let commit = commit(flash, target);
     let crashes = start.trial.crashes();
-    if start.stay {
-        Decision::Stay(Stay::Asked)
-    } else if crashes >= Trial::LIMIT {
-        Decision::Stay(Stay::Crashes(crashes))
-    } else {
-        match application(flash, target) {
-            Ok(header) => Decision::Start(header),
-            Err(refusal) => Decision::Stay(Stay::NoProgram(refusal)),
-        }
+    if commit == Commit::Pending {
+        return Decision::Copy;
     }
+    if start.stay {
+        return Decision::Stay(Stay::Asked);
+    }
+    if crashes >= Trial::LIMIT {
+        return Decision::Stay(Stay::Crashes(crashes));
+    }
+    match application(flash, target) {
+        Ok(header) => Decision::Start(header),
+        // The mark that the copy is done may have been cut, read as not programmed, and the copy begun again. Now it
+        // reads as programmed, but the image that it speaks of is still in staging.
+        Err(_) if commit == Commit::Done => Decision::Copy,
+        Err(refusal) => Decision::Stay(Stay::NoProgram(refusal)),
+    }
+}
+
+/// What the commit record says, after a torn one was revoked.
+fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
+    let record = Record(target.layout.record());
+    let commit = record.read(flash).unwrap_or(Commit::None);
+    if commit == Commit::Torn {
+        // Should it fail, the next start tries again.
+        let _ = record.revoke(flash);
+    }
+    commit
 }
 
 /// The header of the application, when all of it is there and it is one of this node.

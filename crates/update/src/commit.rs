@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 0, 1 | magic, programmed when the staged image has passed every check |
 //! | 2 | 0: the magic is whole, not just lucky to read well after a cut. From this word on the image is to be copied |
-//! | 3 | 0: it was copied |
+//! | 3 | 0: it was copied, and need not be again while the application is whole |
 //!
 //! The two words that decide are zeros, because zeros may be programmed once more over a word that a cut left half
 //! programmed, and then hold for good. To revoke is to program zeros over everything: it comes before every erase of
@@ -30,7 +30,7 @@ pub(crate) enum Commit {
     Torn,
     /// The image is to be copied.
     Pending,
-    /// It was copied.
+    /// It was copied, and is still there.
     Done,
 }
 

@@ -179,7 +179,7 @@ impl<F: Flash> Updater<F> {
     /// again then.
     pub fn install(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
-        if self.record().read(&mut self.flash) != Ok(Commit::Pending) {
+        if !matches!(self.record().read(&mut self.flash), Ok(Commit::Pending | Commit::Done)) {
             return Err(Refusal::Unspecified);
         }
         let outcome = match FullCheck::new(&mut self.flash, &self.target) {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Image, SECTORS, flash_with, holds, image_a, image_b, noise, start, update};
+use common::{Image, SECTORS, flash_with, holds, image_a, image_b, install, noise, stage, start, update};
 use update::mock::{MockFlash, Weak};
 use update::{Decision, Refusal, Stay};
 
@@ -18,34 +18,45 @@ enum Runs {
 
 /// A node before an update, and the update.
 struct Case {
-    flash: MockFlash,
+    before: MockFlash,
+    /// The same node with the new image committed and not copied: cuts in the copy begin here, to save time.
+    committed: MockFlash,
     old: Option<Image>,
     new: Image,
 }
 
 impl Case {
+    fn new(before: MockFlash, old: Option<Image>) -> Case {
+        let (mut committed, new) = (before.clone(), image_b());
+        stage(&mut committed, &new.bytes()).unwrap();
+        Case { before, committed, old, new }
+    }
+
     /// A node that runs A, which came by an update.
     fn from_a_to_b() -> Case {
-        Case { flash: flash_with(&image_a(), 1), old: Some(image_a()), new: image_b() }
+        Case::new(flash_with(&image_a(), 1), Some(image_a()))
     }
 
     /// A node that was never programmed.
     fn from_nothing_to_b() -> Case {
-        Case { flash: MockFlash::new(&SECTORS, 1), old: None, new: image_b() }
+        Case::new(MockFlash::new(&SECTORS, 1), None)
     }
 
+    /// Flash operations of the whole update.
     fn operations(&self) -> u32 {
-        let mut flash = self.flash.clone();
-        update(&mut flash, &self.new.bytes()).unwrap();
-        flash.operations() - self.flash.operations()
+        let mut flash = self.committed.clone();
+        install(&mut flash).unwrap();
+        flash.operations() - self.before.operations()
     }
 
     /// The flash after the power was cut in this operation of the update.
     fn cut(&self, operation: u32, weak: Weak) -> MockFlash {
-        let mut flash = self.flash.clone();
-        flash.cut_after(operation, weak);
-        assert!(update(&mut flash, &self.new.bytes()).is_err());
-        assert!(flash.is_down());
+        let commit = self.committed.operations() - self.before.operations();
+        let mut flash = if operation < commit { self.before.clone() } else { self.committed.clone() };
+        flash.cut_after(if operation < commit { operation } else { operation - commit }, weak);
+        let outcome =
+            if operation < commit { stage(&mut flash, &self.new.bytes()) } else { install(&mut flash) };
+        assert!(outcome.is_err() && flash.is_down());
         flash.power_up();
         flash
     }
@@ -80,69 +91,82 @@ impl Case {
     }
 }
 
-#[test]
-fn after_a_cut_anywhere_the_old_or_the_new_image_starts_and_the_next_update_succeeds() {
+/// Every cut of a case, and a second download after every seventh that did not leave the new image.
+fn check_every_cut(case: &Case) -> [u32; 3] {
     let mut count = [0; 3];
-    let mut check = |case: &Case, mut flash: MockFlash| {
+    let mut again = 0;
+    let cuts = case.cut_everywhere(|case, mut flash| {
         let runs = case.settle(&mut flash);
         count[runs as usize] += 1;
-        if runs != Runs::New {
+        again += u32::from(runs != Runs::New);
+        if runs != Runs::New && again % 7 == 0 {
             update(&mut flash, &case.new.bytes()).unwrap();
             assert_eq!(case.settle(&mut flash), Runs::New);
         }
-    };
-    let cuts = Case::from_a_to_b().cut_everywhere(&mut check);
-    let cuts = cuts + Case::from_nothing_to_b().cut_everywhere(&mut check);
-    println!("{cuts} cuts: {count:?} left the old image, the new one, none where there was none");
-    assert_eq!(count.iter().sum::<u32>(), cuts);
-    assert!(count.iter().all(|&count| count > 500));
+    });
+    let [old, new, nothing] = count;
+    println!("{cuts} cuts: {old} left the old image, {new} the new one, {nothing} none where there was none");
+    assert_eq!(old + new + nothing, cuts);
+    count
+}
+
+#[test]
+fn after_a_cut_anywhere_the_old_or_the_new_image_starts() {
+    let [old, new, nothing] = check_every_cut(&Case::from_a_to_b());
+    assert!(old > 500 && new > 500 && nothing == 0);
+}
+
+#[test]
+fn after_a_cut_in_the_first_update_the_image_starts_or_the_node_waits_for_the_next() {
+    let [old, new, nothing] = check_every_cut(&Case::from_nothing_to_b());
+    assert!(old == 0 && new > 500 && nothing > 500);
 }
 
 #[test]
 fn a_second_cut_in_the_recovery_changes_nothing() {
-    let mut cuts = 0;
-    let case = Case::from_a_to_b();
-    case.cut_everywhere(|case, first| {
+    let mut cuts = 0_u32;
+    Case::from_a_to_b().cut_everywhere(|case, first| {
         let mut flash = first.clone();
         let runs = case.start(&mut flash);
         let recovery = flash.operations() - first.operations();
-        for _ in 0..2.min(recovery) {
-            let mut flash = first.clone();
-            let chance = noise(u64::from(cuts), 4);
-            let operation = u32::from_le_bytes(chance.try_into().unwrap()) % recovery;
-            flash.cut_after(operation, WAYS[operation as usize % 3]);
-            start(&mut flash);
-            assert!(flash.is_down());
-            flash.power_up();
-            let again = case.settle(&mut flash);
-            // A torn commit that the cut kept from being revoked may yet read well.
-            assert!(again == runs || recovery <= 4, "{runs:?} became {again:?}");
-            cuts += 1;
+        if recovery == 0 {
+            return;
         }
+        let mut flash = first;
+        let operation = chance(cuts) % recovery;
+        flash.cut_after(operation, WAYS[cuts as usize % 3]);
+        start(&mut flash);
+        assert!(flash.is_down());
+        flash.power_up();
+        let again = case.settle(&mut flash);
+        // A torn commit that was not revoked yet may read well after all.
+        assert!(again == runs || recovery <= 4, "{runs:?} became {again:?}");
+        cuts += 1;
     });
     println!("{cuts} second cuts in the recovery");
     assert!(cuts > 500);
 }
 
+/// A number that looks random and is the same each time.
+fn chance(seed: u32) -> u32 {
+    u32::from_le_bytes(noise(u64::from(seed), 4).try_into().unwrap())
+}
+
 #[test]
 fn a_cut_in_the_update_that_follows_a_cut_loses_nothing() {
-    let mut cuts = 0;
+    let mut cuts = 0_u32;
     let case = Case::from_a_to_b();
     let total = case.operations();
-    for seed in 0..300_u32 {
-        let chance = noise(u64::from(seed) + 1000, 16);
-        let mut flash = case.flash.clone();
-        for at in chance.chunks(4) {
-            let at = u32::from_le_bytes(at.try_into().unwrap()) % total;
+    for seed in 0..150 {
+        let mut flash = case.before.clone();
+        for round in 0..4 {
+            let at = chance(seed * 4 + round) % total;
             flash.cut_after(at, WAYS[at as usize % 3]);
-            if update(&mut flash, &case.new.bytes()).is_ok() {
-                break;
-            }
-            cuts += 1;
+            assert!(update(&mut flash, &case.new.bytes()).is_err());
             flash.power_up();
             case.settle(&mut flash);
+            cuts += 1;
         }
     }
     println!("{cuts} cuts, four updates in a row");
-    assert!(cuts > 500);
 }

@@ -75,7 +75,7 @@ pub(crate) fn image_a() -> Image {
 }
 
 pub(crate) fn image_b() -> Image {
-    Image::new(description(2, 5), 1020)
+    Image::new(description(2, 5), 620)
 }
 
 /// `len` bytes that look random and are the same each time.
@@ -131,8 +131,18 @@ fn pieces(mut image: &[u8]) -> impl Iterator<Item = (&[u8], usize)> {
 
 /// A whole update.
 pub(crate) fn update(flash: &mut MockFlash, image: &[u8]) -> Result<(), Refusal> {
+    stage(flash, image)?;
+    install(flash)
+}
+
+/// The first part of an update, up to the commit.
+pub(crate) fn stage(flash: &mut MockFlash, image: &[u8]) -> Result<(), Refusal> {
+    download(&mut Updater::new(flash, target(), Status::GOOD), image)
+}
+
+/// The second part, the copy.
+pub(crate) fn install(flash: &mut MockFlash) -> Result<(), Refusal> {
     let mut updater = Updater::new(flash, target(), Status::GOOD);
-    download(&mut updater, image)?;
     updater.install()?;
     run(&mut updater)
 }
@@ -140,9 +150,8 @@ pub(crate) fn update(flash: &mut MockFlash, image: &[u8]) -> Result<(), Refusal>
 /// What the bootloader does at a start: the decision, after a copy that was left to do.
 pub(crate) fn start(flash: &mut MockFlash) -> Decision {
     if boot(flash, &target(), Start::default()) == Decision::Copy {
-        let mut updater = Updater::new(&mut *flash, target(), Status::GOOD);
-        // A refusal shows in the decision.
-        let _ = updater.install().and_then(|()| run(&mut updater));
+        // A refusal shows in the next decision.
+        let _ = install(flash);
     }
     boot(flash, &target(), Start::default())
 }
