@@ -51,10 +51,8 @@ impl Receiver {
 
     /// The download is complete: programs the rest.
     pub(crate) fn finish<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<(), Refusal> {
-        let received = self.received();
-        self.flush(flash, target)?;
         match self.expected {
-            Some(expected) if received >= expected => Ok(()),
+            Some(expected) if self.received() >= expected => self.flush(flash, target),
             _ => Err(Refusal::Truncated),
         }
     }

@@ -31,9 +31,24 @@ impl Message {
     /// Whether the signature is one of this message by the owner of the key. Takes 16 million cycles on the target, 0.11 s
     /// at 144 MHz, and cannot be divided.
     pub(crate) fn has_signature(self, signature: &[u8; SIGNATURE_LEN], key: &[u8; KEY_LEN]) -> bool {
+        if !is_reduced(signature) {
+            return false;
+        }
         let hash = self.0.finalize();
         let signature = Signature::from(signature);
         PublicKey::try_from(key)
             .is_ok_and(|key| key.verify_prehashed(&hash, &signature, Some(CONTEXT)).is_ok())
     }
+}
+
+/// The order of the base point, low byte first (RFC 8032, 5.1: L).
+const ORDER: [u8; 32] = [
+    0xED, 0xD3, 0xF5, 0x5C, 0x1A, 0x63, 0x12, 0x58, 0xD6, 0x9C, 0xF7, 0xA2, 0xDE, 0xF9, 0xDE, 0x14, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x10,
+];
+
+/// Whether the second half, the number S, is below the order, as RFC 8032, 5.1.7 wants it and salty does not ask: else
+/// everybody could make another signature of what was signed.
+fn is_reduced(signature: &[u8; SIGNATURE_LEN]) -> bool {
+    signature.iter().rev().take(ORDER.len()).lt(ORDER.iter().rev())
 }

@@ -79,23 +79,21 @@ impl Case {
         runs
     }
 
-    /// Cuts everywhere; returns the number of cuts and how many left the new image.
-    fn cut_everywhere(&self, mut check: impl FnMut(&Case, MockFlash)) -> u32 {
-        let total = self.operations();
-        for operation in 0..total {
-            for weak in WAYS {
-                check(self, self.cut(operation, weak));
+    /// Cuts everywhere, in each of the ways.
+    fn cut_everywhere(&self, ways: &[Weak], mut check: impl FnMut(MockFlash)) {
+        for operation in 0..self.operations() {
+            for weak in ways {
+                check(self.cut(operation, *weak));
             }
         }
-        total * 3
     }
 }
 
 /// Every cut of a case, and a second download after every seventh that did not leave the new image.
-fn check_every_cut(case: &Case) -> [u32; 3] {
+fn check_every_cut(case: &Case, ways: &[Weak]) -> [u32; 3] {
     let mut count = [0; 3];
     let mut again = 0;
-    let cuts = case.cut_everywhere(|case, mut flash| {
+    case.cut_everywhere(ways, |mut flash| {
         let runs = case.settle(&mut flash);
         count[runs as usize] += 1;
         again += u32::from(runs != Runs::New);
@@ -105,27 +103,28 @@ fn check_every_cut(case: &Case) -> [u32; 3] {
         }
     });
     let [old, new, nothing] = count;
+    let cuts = old + new + nothing;
     println!("{cuts} cuts: {old} left the old image, {new} the new one, {nothing} none where there was none");
-    assert_eq!(old + new + nothing, cuts);
     count
 }
 
 #[test]
 fn after_a_cut_anywhere_the_old_or_the_new_image_starts() {
-    let [old, new, nothing] = check_every_cut(&Case::from_a_to_b());
+    let [old, new, nothing] = check_every_cut(&Case::from_a_to_b(), &WAYS);
     assert!(old > 500 && new > 500 && nothing == 0);
 }
 
 #[test]
 fn after_a_cut_in_the_first_update_the_image_starts_or_the_node_waits_for_the_next() {
-    let [old, new, nothing] = check_every_cut(&Case::from_nothing_to_b());
-    assert!(old == 0 && new > 500 && nothing > 500);
+    let [old, new, nothing] = check_every_cut(&Case::from_nothing_to_b(), &[Weak::Random]);
+    assert!(old == 0 && new > 250 && nothing > 250);
 }
 
 #[test]
 fn a_second_cut_in_the_recovery_changes_nothing() {
     let mut cuts = 0_u32;
-    Case::from_a_to_b().cut_everywhere(|case, first| {
+    let case = Case::from_a_to_b();
+    case.cut_everywhere(&[Weak::Random], |first| {
         let mut flash = first.clone();
         let runs = case.start(&mut flash);
         let recovery = flash.operations() - first.operations();
@@ -144,7 +143,7 @@ fn a_second_cut_in_the_recovery_changes_nothing() {
         cuts += 1;
     });
     println!("{cuts} second cuts in the recovery");
-    assert!(cuts > 500);
+    assert!(cuts > 250);
 }
 
 /// A number that looks random and is the same each time.
@@ -157,7 +156,7 @@ fn a_cut_in_the_update_that_follows_a_cut_loses_nothing() {
     let mut cuts = 0_u32;
     let case = Case::from_a_to_b();
     let total = case.operations();
-    for seed in 0..150 {
+    for seed in 0..75 {
         let mut flash = case.before.clone();
         for round in 0..4 {
             let at = chance(seed * 4 + round) % total;
