@@ -189,12 +189,14 @@ impl<F: Flash> Updater<F> {
         self.settle(outcome)
     }
 
-    /// One step of what was begun. Returns what the next one will do.
+    /// One step of what was begun, if anything was. Returns what the next one will do.
     pub fn poll(&mut self) -> Next {
-        let state = mem::replace(&mut self.state, State::Idle);
-        let outcome = self.step(state);
-        // Whoever wants to know reads the status.
-        let _ = self.settle(outcome);
+        if self.is_busy() {
+            let state = mem::replace(&mut self.state, State::Idle);
+            let outcome = self.step(state);
+            // Whoever wants to know reads the status.
+            let _ = self.settle(outcome);
+        }
         self.next()
     }
 

@@ -289,6 +289,7 @@ fn downloads_one_after_the_other_need_no_restart() {
     let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
     let bad = &image_b().bytes()[..800];
     assert!(download(&mut updater, bad).is_err());
+    assert_eq!((updater.poll(), updater.status()), (Next::Nothing, Status::refused(Refusal::Truncated)));
     assert_eq!(updater.begin(None), Err(Refusal::NotCleared));
     download(&mut updater, &image_b().bytes()).unwrap();
     updater.install().unwrap();
