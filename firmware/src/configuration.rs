@@ -1,45 +1,87 @@
 //! Who this node is: what the parameter store and the chip say of it.
 
-use bsp::bit_timing::BitTiming;
+use core::mem::MaybeUninit;
+
+use bsp::flash::ParameterFlash;
 use bsp::reset_cause::ResetCause;
 use bsp::{Sums, board, crash, factory, memory};
-use node::{FactoryCalibration, NodeId, Personality, RawSample, Setup};
-use storage::{DeviceRecord, Memory, Pages, View};
+use node::{BitRate, FactoryCalibration, NodeId, Personality, Protocol, RawSample, Setup};
+use storage::{DeviceRecord, Error, Pages, Store, View};
 
-/// Where the device record has nothing to say: node-ID 1, 250 kbit/s, pressure.
-const DEFAULT_NODE_ID: NodeId = match NodeId::new(1) {
-    Some(id) => id,
-    None => unreachable!(),
-};
+/// Where the store has nothing to say: node-ID 1, 250 kbit/s, pressure.
+const DEFAULT_NODE_ID: Option<NodeId> = NodeId::new(1);
 const DEFAULT_BIT_RATE: u16 = 250;
+const PAGES: Pages = Pages::new(0, memory::PARAMETER_PAGE);
 
-/// The node's set-up and the timing of its bit rate.
-pub(crate) fn load() -> (Setup, BitTiming) {
-    let record = device_record();
-    let stored_rate = record.and_then(|record| BitTiming::of(record.bit_rate_kbit()));
-    let timing = stored_rate.or_else(|| BitTiming::of(DEFAULT_BIT_RATE)).expect("a bit rate of CiA 301");
-    let setup = Setup {
+/// Makes the protocol in its place, with what is stored of it; gives its set-up, and the store ready to save. Without a
+/// store that works, the node runs with its defaults.
+pub(crate) fn load(
+    flash: ParameterFlash,
+    place: &'static mut MaybeUninit<Protocol>,
+) -> (&'static mut Protocol, Setup, Option<Store<ParameterFlash>>) {
+    let mut view = match View::open(flash, PAGES) {
+        Ok(view) => view,
+        Err(error) => {
+            defmt::error!("the parameter store cannot be read: {=str}", reason(&error));
+            let setup = setup(None);
+            return (place.write(Protocol::new(&setup)), setup, None);
+        }
+    };
+    let setup = setup(view.device().ok().flatten());
+    let protocol = place.write(Protocol::new(&setup));
+    protocol.load(&mut view);
+    (protocol, setup, prepare(view))
+}
+
+/// May erase pages: half a second in which the core stands still, so it is done before the node goes on the bus.
+fn prepare(view: View<ParameterFlash>) -> Option<Store<ParameterFlash>> {
+    Store::prepare(view)
+        .inspect_err(|error| defmt::error!("nothing can be stored: {=str}", reason(error)))
+        .ok()
+}
+
+fn reason<E>(error: &Error<E>) -> &'static str {
+    match error {
+        Error::Flash(_) => "the flash controller has signalled an error",
+        Error::Corrupt => "the flash does not hold what was written",
+        _ => "its pages do not fit the flash",
+    }
+}
+
+fn setup(record: Option<DeviceRecord>) -> Setup {
+    let stored_rate = record.and_then(|record| BitRate::from_kbit(record.bit_rate_kbit()));
+    let default_rate = BitRate::from_kbit(DEFAULT_BIT_RATE).unwrap_or(BitRate::FASTEST);
+    Setup {
         personality: record.map_or(Personality::default(), |record| personality(record.personality())),
-        node_id: record.and_then(|record| NodeId::new(record.node_id())).unwrap_or(DEFAULT_NODE_ID),
-        bit_rate: timing.kbit(),
+        node_id: record.map_or(DEFAULT_NODE_ID, |record| NodeId::new(record.node_id())),
+        bit_rate: stored_rate.unwrap_or(default_rate),
         serial_number: factory::serial_number(),
+        program_id: memory::program_id(),
         hardware_version: board::NAME,
         software_version: env!("CARGO_PKG_VERSION"),
-    };
-    (setup, timing)
+    }
+}
+
+fn personality(number: u8) -> Personality {
+    Personality::numbered(number).unwrap_or_else(|| {
+        defmt::warn!("this image has no personality {=u8}", number);
+        Personality::default()
+    })
 }
 
 /// Says who starts, and why the last run ended; true when that was not meant to happen.
 pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
     defmt::info!(
-        "version {=str} on {=str}, serial {=u32:08x}, node {=u8} at {=u16} kbit/s, reset by {=str}",
+        "version {=str} on {=str}, serial {=u32:08x}, reset by {=str}",
         setup.software_version,
         setup.hardware_version,
         setup.serial_number,
-        setup.node_id.get(),
-        setup.bit_rate,
         cause.name()
     );
+    match setup.node_id {
+        Some(node_id) => defmt::info!("node {=u8}", node_id.get()),
+        None => defmt::info!("no node-ID: waiting for LSS"),
+    }
     let crash = crash::take();
     if let Some(crash) = &crash {
         crash::log(crash);
@@ -61,19 +103,4 @@ pub(crate) fn calibration() -> FactoryCalibration {
 pub(crate) fn raw_sample(sums: Sums, factory: FactoryCalibration) -> RawSample {
     let [pressure, supply, temperature, vrefint] = sums.channels;
     RawSample { pressure, supply, temperature, vrefint, count: Sums::COUNT, factory }
-}
-
-fn device_record() -> Option<DeviceRecord> {
-    let pages = Pages::new(0, memory::PARAMETER_PAGE);
-    View::open(Memory(memory::parameters()), pages).and_then(|mut view| view.device()).ok().flatten()
-}
-
-fn personality(number: u8) -> Personality {
-    match number {
-        0 => Personality::Pressure,
-        other => {
-            defmt::warn!("this image has no personality {=u8}", other);
-            Personality::default()
-        }
-    }
 }

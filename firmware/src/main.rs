@@ -8,15 +8,18 @@
 //! | 4 | `transmit` | the mailboxes hold three frames; locking the queue delays no sample |
 //! | 3 | `process` | SYNC, RPDO, TPDO: never behind an SDO transfer |
 //! | 2 | `serve` | SDO, NMT, heartbeat, EMCY, errors of the bus |
+//! | 1 | `keep` | stores parameters: whatever it waits for, nobody waits for it |
 //! | 0 | `idle` | sleeps |
 //!
-//! Priority 1 is kept for what waits for flash. Log lines mask no interrupt, whatever the priority: see the features of
+//! Log lines mask no interrupt, whatever the priority: see the features of
 //! defmt-rtt in the workspace.
 #![no_std]
 #![no_main]
 
+mod bit_rate;
 mod bus;
 mod configuration;
+mod keeper;
 mod process;
 mod services;
 mod shared;
@@ -28,6 +31,8 @@ use canopen::Duration;
 const PROCESS: Interrupt = Interrupt::TIM2;
 /// Pended by whoever has work for the services task.
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
+/// Pended by whoever has something to store. The interrupt is that of the flash controller, which uses none.
+const KEEPER: Interrupt = Interrupt::FLASH;
 /// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
 const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 /// Pended by whoever has put a frame into the transmit queue.
@@ -37,21 +42,25 @@ defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
 
 #[rtic::app(device = bsp::pac, peripherals = true)]
 mod app {
+    use core::mem::MaybeUninit;
+
     use bsp::can::Transmitter;
     use bsp::losses::Losses;
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
     use bsp::{Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
-    use node::{FactoryCalibration, Measurement, Parameters, Protocol, Snapshot};
+    use node::{FactoryCalibration, Measurement, Parameters, Parcel, Protocol, Snapshot};
 
+    use crate::bit_rate::Rate;
+    use crate::keeper::Keeper;
     use crate::process::Process;
-    use crate::services::Services;
+    use crate::services::{Findings, Services};
     use crate::shared::Shared as _;
     use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration};
 
     #[shared]
     struct Shared {
-        protocol: Protocol,
+        protocol: &'static mut Protocol,
         transmit: TransmitQueue,
         /// The latest, until the process data task has taken it.
         snapshot: Option<Snapshot>,
@@ -71,28 +80,34 @@ mod app {
         time: TimeInterrupt,
         process: Process,
         services: Services,
+        keeper: Keeper,
     }
 
     #[init(local = [
         process_queue: ReceiveQueue = ReceiveQueue::new(),
         services_queue: ReceiveQueue = ReceiveQueue::new(),
         lost: Losses = Losses::new(),
+        // Too large to be handed around on the stack.
+        protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
+        parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.device);
-        let (setup, timing) = configuration::load();
+        let (protocol, setup, store) = configuration::load(board.parameters, cx.local.protocol);
+        let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new()));
         let crashed = configuration::report_start(&setup, board.reset_cause);
+        let findings = Findings { crashed, no_store: !keeper.is_working() };
         let lost: &'static Losses = cx.local.lost;
         let (receiver_process, process_frames) = Receiver::new(0, cx.local.process_queue, lost);
         let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
         let [process_alarm, mut services_alarm] = board.alarms;
         services_alarm.set(Clock::now() + FIRST_SAMPLE);
         let shared = Shared {
-            protocol: Protocol::new(&setup),
+            protocol,
             transmit: TransmitQueue::new(),
             snapshot: None,
             parameters: None,
-            watchdog: board.watchdog,
+            watchdog: board.watchdog.supervise(),
         };
         let mut local = Local {
             receiver_process,
@@ -105,13 +120,14 @@ mod app {
             process: Process { frames: process_frames, alarm: process_alarm },
             services: Services::new(
                 board.can,
-                timing,
+                Rate::of(setup.bit_rate),
                 service_frames,
                 lost,
                 services_alarm,
                 board.led,
-                crashed,
+                findings,
             ),
+            keeper,
         };
         local.sampling.start();
         (shared, local)
@@ -180,5 +196,10 @@ mod app {
             cx.shared.parameters.lock(|parameters| *parameters = Some(new));
         }
         cx.shared.watchdog.progress(Part::Services);
+    }
+
+    #[task(binds = FLASH, priority = 1, local = [keeper], shared = [protocol, transmit])]
+    fn keep(cx: keep::Context) {
+        cx.local.keeper.run(&mut (cx.shared.protocol, cx.shared.transmit));
     }
 }

@@ -1,7 +1,7 @@
 //! Services: frames of FIFO 1, heartbeat, SDO and EMCY, errors of the bus, and what the protocol asks of the firmware.
 
-use bsp::bit_timing::BitTiming;
-use bsp::bus_state::BusWatch;
+use bsp::back_off::BackOff;
+use bsp::bus_state::{BusState, BusWatch};
 use bsp::can::Controller;
 use bsp::filters::{self, Banks};
 use bsp::led::Led;
@@ -10,53 +10,78 @@ use bsp::{Alarm, Clock, Frames};
 use canopen::{Duration, Instant};
 use node::{BusEvent, Fault, Request};
 
-use crate::PROCESS;
+use crate::bit_rate::Rate;
 use crate::bus::event_of;
 use crate::shared::Shared;
+use crate::{KEEPER, PROCESS};
 
 /// The task runs at least this often: the watchdog wants a sign of life, and a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
 
 /// What the task owns.
 pub(crate) struct Services {
-    pub(crate) can: Controller,
-    pub(crate) timing: BitTiming,
-    pub(crate) frames: Frames,
-    pub(crate) lost: &'static Losses,
-    pub(crate) alarm: Alarm,
-    pub(crate) led: Led,
+    can: Controller,
+    rate: Rate,
+    frames: Frames,
+    lost: &'static Losses,
+    alarm: Alarm,
+    led: Led,
     watch: BusWatch,
+    back_off: BackOff,
     /// Going on the bus for the first time is a reset of the communication too.
     request: Option<Request>,
-    /// The last run ended in a crash, and the bus has not been told yet.
-    crashed: bool,
+    /// What the start-up has found, until the bus has been told.
+    findings: Findings,
+}
+
+/// Faults that are known before there is a bus to tell.
+#[derive(Clone, Copy)]
+pub(crate) struct Findings {
+    /// The last run ended in a crash.
+    pub(crate) crashed: bool,
+    /// Nothing can be stored.
+    pub(crate) no_store: bool,
 }
 
 impl Services {
     /// Not on the bus yet: the first run goes there.
     pub(crate) fn new(
         can: Controller,
-        timing: BitTiming,
+        rate: Rate,
         frames: Frames,
         lost: &'static Losses,
         alarm: Alarm,
         led: Led,
-        crashed: bool,
+        findings: Findings,
     ) -> Services {
         let request = Some(Request::ResetCommunication);
-        Services { can, timing, frames, lost, alarm, led, watch: BusWatch::default(), request, crashed }
+        let (watch, back_off) = (BusWatch::default(), BackOff::default());
+        Services { can, rate, frames, lost, alarm, led, watch, back_off, request, findings }
     }
 
     /// Does everything that is due and sets the alarm for what comes next.
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
         self.fulfil(node);
-        self.report_bus(node);
-        self.receive(node);
+        if self.rate.is_searched() {
+            self.search(node);
+        } else {
+            self.report_bus(node);
+            self.receive(node);
+        }
         let now = Clock::now();
         let next = node.call(|protocol, out| protocol.poll_services(now, out));
         self.fulfil(node);
         self.led.set(blink(now));
-        self.alarm.set(next.min(now + PERIOD));
+        self.alarm.set(next.min(now + PERIOD).min(self.back_off.due()));
+    }
+
+    /// Listens for the bit rate; goes on the bus when it is found.
+    fn search(&mut self, node: &mut impl Shared) {
+        let has_frame = self.frames.dequeue().is_some();
+        if self.rate.go_on(&mut self.can, has_frame, Clock::now()) {
+            while self.frames.dequeue().is_some() {}
+            self.join(node);
+        }
     }
 
     fn receive(&mut self, node: &mut impl Shared) {
@@ -75,7 +100,14 @@ impl Services {
             defmt::warn!("{=u32} received frames lost", lost);
             node.call(|protocol, out| protocol.bus_event(BusEvent::Overrun, now, out));
         }
-        let change = self.watch.change(self.can.state());
+        let state = self.can.state();
+        if state == BusState::Off {
+            self.back_off.bus_off(now);
+        }
+        if self.back_off.is_over(now) {
+            self.can.recover();
+        }
+        let change = self.watch.change(state);
         if let Some(event) = change.and_then(|(before, after)| event_of(before, after)) {
             node.call(|protocol, out| protocol.bus_event(event, now, out));
         }
@@ -90,42 +122,59 @@ impl Services {
                 Request::ResetNode => restart(),
                 Request::ResetCommunication => self.join(node),
                 Request::Filters => self.filter(node),
-                Request::BitRate(kbit) => self.change_rate(kbit, node),
+                Request::BitRate(bit_rate) => {
+                    self.rate = Rate::of(bit_rate);
+                    self.go_on_bus(node);
+                }
+                Request::Bootloader => restart(),
+                Request::Store => rtic::pend(KEEPER),
             }
         }
     }
 
-    /// Goes on the bus, deaf at first: which identifiers are of interest is known after the start of the protocol.
+    /// Starts the communication on a bus whose bit rate is known; looks for it first where it is not.
     fn join(&mut self, node: &mut impl Shared) {
-        defmt::info!("on the bus at {=u16} kbit/s", self.timing.kbit());
-        node.call(|_, queue| queue.clear());
-        self.can.start(self.timing, &Banks::new());
-        node.call(|protocol, out| protocol.start(Clock::now(), out));
-        if core::mem::take(&mut self.crashed) {
-            node.call(|protocol, out| protocol.set_fault(Fault::UnexpectedReset, true, Clock::now(), out));
+        if self.go_on_bus(node) {
+            node.call(|protocol, out| protocol.start(Clock::now(), out));
+            self.report_findings(node);
+            self.filter(node);
+            rtic::pend(PROCESS);
         }
+    }
+
+    /// Goes on the bus, deaf at first: which identifiers are of interest is known after the start of the protocol. False
+    /// when the bit rate has to be found first.
+    fn go_on_bus(&mut self, node: &mut impl Shared) -> bool {
+        node.call(|_, queue| queue.clear());
+        let Rate::Known(timing) = self.rate else {
+            self.rate.search(&mut self.can, Clock::now());
+            return false;
+        };
+        defmt::info!("on the bus at {=u16} kbit/s", timing.kbit());
+        self.can.start(timing, &Banks::new());
         self.filter(node);
-        rtic::pend(PROCESS);
+        true
+    }
+
+    fn report_findings(&mut self, node: &mut impl Shared) {
+        let Findings { crashed, no_store } = self.findings;
+        self.findings.crashed = false;
+        for (fault, found) in [(Fault::UnexpectedReset, crashed), (Fault::ParameterStore, no_store)] {
+            if found {
+                node.call(|protocol, out| protocol.set_fault(fault, true, Clock::now(), out));
+            }
+        }
     }
 
     fn filter(&mut self, node: &mut impl Shared) {
         let banks = node.call(|protocol, _| filters::pack(protocol.process_ids(), protocol.service_ids()));
         self.can.set_filters(&banks);
     }
-
-    fn change_rate(&mut self, kbit: u16, node: &mut impl Shared) {
-        let Some(timing) = BitTiming::of(kbit) else {
-            return defmt::error!("no timing for {=u16} kbit/s", kbit);
-        };
-        self.timing = timing;
-        self.can.start(timing, &Banks::new());
-        self.filter(node);
-    }
 }
 
-/// NMT reset node: everything begins anew, the bootloader included.
+/// NMT reset node, or the bootloader is asked for: everything begins anew, the bootloader included.
 fn restart() -> ! {
-    defmt::info!("reset node");
+    defmt::info!("restart");
     cortex_m::peripheral::SCB::sys_reset()
 }
 

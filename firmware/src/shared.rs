@@ -12,7 +12,7 @@ pub(crate) trait Shared {
     fn call<R>(&mut self, f: impl FnOnce(&mut Protocol, &mut TransmitQueue) -> R) -> R;
 }
 
-impl<P: Mutex<T = Protocol>, Q: Mutex<T = TransmitQueue>> Shared for (P, Q) {
+impl<P: Mutex<T = &'static mut Protocol>, Q: Mutex<T = TransmitQueue>> Shared for (P, Q) {
     fn call<R>(&mut self, f: impl FnOnce(&mut Protocol, &mut TransmitQueue) -> R) -> R {
         let (protocol, queue) = self;
         (protocol, queue).lock(|protocol, queue| {

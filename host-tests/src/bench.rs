@@ -1,8 +1,15 @@
-//! A node on a bench: frames in and out, an SDO client, and the time under control.
+//! A node with its parameter store on a bench, without a bus: frames in and out, and the time under control.
 
-use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response};
+use canopen::sdo::Multiplexer;
 use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
-use node::{FactoryCalibration, Measurement, Personality, Protocol, RawSample, Setup};
+use node::{
+    BitRate, FactoryCalibration, Measurement, Parcel, Personality, Protocol, RawSample, Request as Demand,
+    Setup,
+};
+use std::collections::VecDeque;
+use storage::{Memory, Pages, Store, View};
+
+use crate::sdo::{Channel, Client, Failure};
 
 /// Node-ID of the node on the bench.
 pub const ID: u8 = 0x21;
@@ -33,15 +40,25 @@ pub struct Bench {
     pub out: Queue,
     /// The time.
     pub now: Instant,
+    /// What it stores.
+    pub store: Flash,
+    demands: VecDeque<Demand>,
 }
+
+/// The parameter store in RAM.
+pub type Flash = Store<Memory<Vec<u8>>>;
+
+const PAGES: Pages = Pages::new(0, 4 * 1024);
+const ERASED: [u8; 8 * 1024] = [0xFF; 8 * 1024];
 
 /// A setup with recognisable values.
 #[must_use]
 pub fn setup() -> Setup {
     Setup {
         personality: Personality::Pressure,
-        node_id: NodeId::new(ID).expect("a node-ID"),
-        bit_rate: 250,
+        node_id: NodeId::new(ID),
+        bit_rate: BitRate::from_kbit(250).expect("a bit rate"),
+        program_id: 0x0BAD_CAFE,
         serial_number: 0x1234_5678,
         hardware_version: "NUCLEO-F446RE",
         software_version: "0.1.0",
@@ -66,19 +83,73 @@ pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
     }
 }
 
+/// An empty parameter store.
+///
+/// # Panics
+/// When it cannot be prepared.
+#[must_use]
+pub fn empty_store() -> Flash {
+    Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
+}
+
+/// Stores at once what the node asks to be stored.
+pub fn deliver(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
+    let mut parcel = Parcel::new();
+    if protocol.pack(&mut parcel) {
+        let result = parcel.deliver(store);
+        protocol.finish(&parcel, result, now, out);
+    }
+}
+
 impl Bench {
     /// A node that has booted, its boot-up message out of the way.
     #[must_use]
     pub fn booted() -> Bench {
+        Bench::with_flash(ERASED.to_vec())
+    }
+
+    /// A node that has booted with this content of its parameter pages.
+    ///
+    /// # Panics
+    /// When the store cannot be prepared.
+    #[must_use]
+    pub fn with_flash(flash: Vec<u8>) -> Bench {
+        let mut view = View::open(Memory(flash), PAGES).expect("pages");
+        let mut protocol = Protocol::new(&setup());
+        protocol.load(&mut view);
         let mut bench = Bench {
-            protocol: Protocol::new(&setup()),
+            protocol,
             measurement: Measurement::new(),
             out: Queue::default(),
             now: Instant(0),
+            store: Store::prepare(view).expect("a store"),
+            demands: VecDeque::new(),
         };
         bench.protocol.start(bench.now, &mut bench.out);
         bench.take();
         bench
+    }
+
+    /// Switches the power off and on.
+    #[must_use]
+    pub fn power_cycled(self) -> Bench {
+        Bench::with_flash(self.store.into_flash().0)
+    }
+
+    /// The next thing that the node asks of its firmware, but for storing, which it has got.
+    pub fn take_request(&mut self) -> Option<Demand> {
+        self.demands.pop_front().or_else(|| self.protocol.take_request())
+    }
+
+    /// Stores what the node asks to be stored.
+    fn serve_store(&mut self) {
+        while let Some(demand) = self.protocol.take_request() {
+            if demand != Demand::Store {
+                self.demands.push_back(demand);
+                continue;
+            }
+            deliver(&mut self.protocol, &mut self.store, self.now, &mut self.out);
+        }
     }
 
     /// All frames sent since the last call, as identifier and data.
@@ -96,6 +167,7 @@ impl Bench {
         if is_service {
             self.protocol.on_service_frame(frame, self.now, &mut self.out);
         }
+        self.serve_store();
         self.poll();
     }
 
@@ -121,67 +193,26 @@ impl Bench {
         self.poll();
     }
 
-    /// One SDO exchange. Other frames of the node stay in the queue.
-    ///
-    /// # Panics
-    /// Unless there is one valid response.
-    pub fn ask(&mut self, request: Request) -> Response {
-        let before = std::mem::take(&mut self.out.0);
-        self.receive(&Frame::new(0x600 + u16::from(ID), &request.encode()).expect("a frame"));
-        let (responses, others): (Vec<_>, Vec<_>) = std::mem::take(&mut self.out.0)
-            .into_iter()
-            .partition(|frame| frame.id() == 0x580 + u16::from(ID));
-        self.out.0 = before.into_iter().chain(others).collect();
-        let [response] = responses.try_into().expect("one response");
-        Response::parse(response.data().try_into().expect("eight bytes")).expect("a valid response")
-    }
-
     /// Reads a value.
     ///
     /// # Errors
     /// The abort code.
     ///
     /// # Panics
-    /// On a response that answers another question.
+    /// Without a valid response.
     pub fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, u32> {
-        let at = Multiplexer { index, sub };
-        match self.ask(Request::Upload(at)) {
-            Response::Uploaded(of, bytes) if of == at => Ok(bytes.as_slice().to_vec()),
-            Response::UploadSegmented(of, size) if of == at => Ok(self.read_segments(size)),
-            Response::Abort(of, code) if of == at => Err(code),
-            other => panic!("{other:?}"),
-        }
+        Client::new(self).read(Multiplexer { index, sub }).map_err(abort_code)
     }
 
-    fn read_segments(&mut self, size: u32) -> Vec<u8> {
-        let mut value = vec![];
-        for toggle in [false, true].into_iter().cycle() {
-            let Response::UploadedSegment(segment) = self.ask(Request::UploadSegment { toggle }) else {
-                panic!("no segment");
-            };
-            value.extend_from_slice(segment.data.as_slice());
-            if segment.last {
-                break;
-            }
-        }
-        assert_eq!(value.len(), size as usize);
-        value
-    }
-
-    /// Writes up to four bytes.
+    /// Writes a value.
     ///
     /// # Errors
     /// The abort code.
     ///
     /// # Panics
-    /// On a response that answers another question.
+    /// Without a valid response.
     pub fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) -> Result<(), u32> {
-        let at = Multiplexer { index, sub };
-        match self.ask(Request::Download(at, Initiate::Expedited(Bytes::from_slice(bytes)))) {
-            Response::Downloaded(of) if of == at => Ok(()),
-            Response::Abort(of, code) if of == at => Err(code),
-            other => panic!("{other:?}"),
-        }
+        Client::new(self).write(Multiplexer { index, sub }, bytes).map_err(abort_code)
     }
 
     /// Makes a TPDO invalid and its mapping empty, steps 1 and 2 of the mapping procedure.
@@ -193,5 +224,28 @@ impl Bench {
         let [a, b, c, d] = cob_id.try_into().expect("four bytes");
         self.write(0x1800 + number, 1, &[a, b, c, d | 0x80]).expect("step 1");
         self.write(0x1A00 + number, 0, &[0]).expect("step 2");
+    }
+}
+
+/// The node answers at once or never.
+impl Channel for Bench {
+    fn send(&mut self, request: [u8; 8]) {
+        self.receive(&Frame::new(0x600 + u16::from(ID), &request).expect("a frame"));
+    }
+
+    fn received(&mut self) -> Option<[u8; 8]> {
+        let place = self.out.0.iter().position(|frame| frame.id() == 0x580 + u16::from(ID))?;
+        self.out.0.remove(place).data().try_into().ok()
+    }
+
+    fn wait(&mut self) -> Option<[u8; 8]> {
+        self.received()
+    }
+}
+
+fn abort_code(failure: Failure) -> u32 {
+    match failure {
+        Failure::Refused(code) => code,
+        other => panic!("{other:?}"),
     }
 }

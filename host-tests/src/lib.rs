@@ -1,3 +1,8 @@
 //! What the tests that cross crates share.
 
 pub mod bench;
+pub mod domain;
+pub mod lss;
+pub mod network;
+pub mod pressure;
+pub mod sdo;

@@ -161,7 +161,7 @@ fn flags_survive_a_reset_as_what_they_report_does() {
     bench.protocol.set_fault(Fault::UnexpectedReset, true, bench.now, &mut bench.out);
     assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
     bench.nmt(0x81);
-    while bench.protocol.take_request().is_some_and(|request| request != Request::ResetNode) {}
+    while bench.take_request().is_some_and(|request| request != Request::ResetNode) {}
     bench.protocol.start(bench.now, &mut bench.out);
     assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
     assert_eq!(bench.read(0x3000, 3), Ok(vec![1 << 6, 0, 0, 0]));
@@ -192,20 +192,20 @@ fn a_warning_says_nothing_and_an_overrun_is_an_event() {
 #[test]
 fn the_firmware_is_told_what_it_must_do() {
     let mut bench = Bench::booted();
-    assert_eq!(bench.protocol.take_request(), Some(Request::Filters));
-    assert_eq!(bench.protocol.take_request(), None);
+    assert_eq!(bench.take_request(), Some(Request::Filters));
+    assert_eq!(bench.take_request(), None);
     bench.write(0x1005, 0, &[0x90, 0, 0, 0]).unwrap();
-    assert_eq!(bench.protocol.take_request(), Some(Request::Filters));
+    assert_eq!(bench.take_request(), Some(Request::Filters));
     bench.nmt(0x82);
-    assert_eq!(bench.protocol.take_request(), Some(Request::ResetCommunication));
-    assert_eq!(bench.protocol.take_request(), None);
+    assert_eq!(bench.take_request(), Some(Request::ResetCommunication));
+    assert_eq!(bench.take_request(), None);
 }
 
 #[test]
 fn identifiers_are_those_of_the_services_that_exist() {
     let bench = Bench::booted();
     assert_eq!(bench.protocol.process_ids().collect::<Vec<_>>(), [0, 0x80, TPDO1]);
-    assert_eq!(bench.protocol.service_ids().collect::<Vec<_>>(), [0x600 + u16::from(ID)]);
+    assert_eq!(bench.protocol.service_ids().collect::<Vec<_>>(), [0x7E5, 0x600 + u16::from(ID)]);
 }
 
 #[test]

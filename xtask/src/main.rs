@@ -1,6 +1,7 @@
 //! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
 
 mod command;
+mod eds;
 mod images;
 mod native;
 mod python;
@@ -33,6 +34,8 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         flags: Vec<OsString>,
     },
+    /// Write eds/*.eds and docs/object-dictionary.md from the dictionary tables
+    Eds,
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
     Test {
         /// Run only the steps whose name contains this text
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Images => images::build().map(|_| ExitCode::SUCCESS),
         Command::Sim { flags } => sim::run(&flags),
+        Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {

@@ -53,12 +53,20 @@ pub fn pack(process: impl Iterator<Item = u16>, services: impl Iterator<Item = u
     let complete = fill(&mut banks, Fifo::Process, process) && fill(&mut banks, Fifo::Services, services);
     if !complete {
         banks.pop();
-        let _ = banks.push(Bank { fifo: Fifo::Services, pairs: [Pair::ANY; 2] });
+        let _ = banks.push(EVERYTHING);
     }
     banks
 }
 
 /// Adds banks for `ids`; false when there is no bank left.
+/// One bank that passes every base frame to FIFO 1.
+#[must_use]
+pub fn everything() -> Banks {
+    Banks::from_iter([EVERYTHING])
+}
+
+const EVERYTHING: Bank = Bank { fifo: Fifo::Services, pairs: [Pair::ANY; 2] };
+
 fn fill(banks: &mut Banks, fifo: Fifo, mut ids: impl Iterator<Item = u16>) -> bool {
     while let Some(first) = ids.next() {
         let second = ids.next().unwrap_or(first);

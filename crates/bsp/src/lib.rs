@@ -8,6 +8,8 @@
 #![cfg_attr(not(target_os = "none"), warn(clippy::pedantic))]
 #![warn(clippy::undocumented_unsafe_blocks)]
 
+pub mod back_off;
+pub mod bit_rate_detection;
 pub mod bit_timing;
 pub mod bus_state;
 pub mod crash_record;
@@ -16,6 +18,7 @@ pub mod filters;
 pub mod losses;
 pub mod mailbox;
 pub mod reset_cause;
+pub mod sectors;
 pub mod serial_number;
 pub mod supervision;
 pub mod transmit_queue;

@@ -1,12 +1,13 @@
 //! Every codec: parse of encode is the identity, and any bytes parse or are refused.
 
 use canopen::emcy::Message;
+use canopen::lss::{self, BitRate, Bound, Part};
 use canopen::nmt::Command;
 use canopen::pdo::{MappedObject, Transmission};
 use canopen::sdo::{
     BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Request, Response, Segment,
 };
-use canopen::{CobId, NodeId};
+use canopen::{CanId, CobId, Frame, NodeId};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -85,6 +86,46 @@ fn response() -> impl Strategy<Value = Response> {
     ]
 }
 
+fn lss_request() -> impl Strategy<Value = lss::Request> {
+    use lss::Request;
+    let part = || prop::sample::select(Part::ALL.to_vec());
+    let bit = prop_oneof![4 => 0..32_u8, 1 => Just(Request::CONFIRM)];
+    prop_oneof![
+        any::<bool>().prop_map(|configuration| Request::SwitchGlobal { configuration }),
+        (part(), any::<u32>()).prop_map(|(part, value)| Request::Select(part, value)),
+        any::<u8>().prop_map(Request::NodeId),
+        any::<(u8, u8)>().prop_map(|(table, index)| Request::BitTiming { table, index }),
+        any::<u16>().prop_map(|delay| Request::Activate { delay }),
+        Just(Request::Store),
+        (prop::sample::select(Bound::ALL.to_vec()), any::<u32>())
+            .prop_map(|(bound, value)| Request::Identify(bound, value)),
+        Just(Request::IdentifyUnconfigured),
+        (any::<u32>(), bit, 0..4_u8, 0..4_u8).prop_map(|(value, bit, part, next)| Request::Fastscan {
+            value,
+            bit,
+            part,
+            next
+        }),
+        part().prop_map(Request::Inquire),
+        Just(Request::InquireNodeId),
+    ]
+}
+
+fn lss_response() -> impl Strategy<Value = lss::Response> {
+    use lss::Response;
+    let part = prop::sample::select(Part::ALL.to_vec());
+    prop_oneof![
+        Just(Response::Selected),
+        any::<u8>().prop_map(Response::NodeId),
+        any::<u8>().prop_map(Response::BitTiming),
+        any::<u8>().prop_map(Response::Stored),
+        Just(Response::Identified),
+        Just(Response::Unconfigured),
+        (part, any::<u32>()).prop_map(|(part, value)| Response::Identity(part, value)),
+        any::<u8>().prop_map(Response::NodeIdIs),
+    ]
+}
+
 proptest! {
     #![proptest_config(repeatable())]
 
@@ -111,7 +152,52 @@ proptest! {
             Some(segment) => prop_assert_eq!(segment.encode(), frame),
             None => prop_assert_eq!(frame[0] & 0x7F, 0),
         }
+        if let Some(request) = lss::Request::parse(frame) {
+            prop_assert_eq!(lss::Request::parse(request.encode()), Some(request));
+        }
+        if let Some(response) = lss::Response::parse(frame) {
+            prop_assert_eq!(lss::Response::parse(response.encode()), Some(response));
+        }
         prop_assert_eq!(Message::parse(frame).encode(), frame);
+    }
+
+    #[test]
+    fn lss_requests(request in lss_request()) {
+        prop_assert_eq!(lss::Request::parse(request.encode()), Some(request));
+    }
+
+    #[test]
+    fn lss_responses(response in lss_response()) {
+        prop_assert_eq!(lss::Response::parse(response.encode()), Some(response));
+    }
+
+    #[test]
+    fn bit_rates(index in 0..12_u8, kbit in any::<u16>()) {
+        if let Some(rate) = BitRate::from_index(index) {
+            prop_assert_eq!((rate.index(), BitRate::from_kbit(rate.kbit())), (index, Some(rate)));
+        }
+        prop_assert!(BitRate::from_kbit(kbit).is_none_or(|rate| rate.kbit() == kbit));
+    }
+
+    #[test]
+    fn block_segments(last in any::<bool>(), sequence in block_size(), data in any::<[u8; 7]>()) {
+        let segment = BlockSegment { last, sequence, data };
+        prop_assert_eq!(BlockSegment::parse(segment.encode()), Some(segment));
+    }
+
+    #[test]
+    fn emcy_messages(code in any::<u16>(), register in any::<u8>(), detail in any::<[u8; 5]>()) {
+        let message = Message { code, register, detail };
+        prop_assert_eq!(Message::parse(message.encode()), message);
+    }
+
+    /// Only base frames of at most eight bytes are frames, and only 11 bits are a CAN-ID.
+    #[test]
+    fn frames(id in 0..0x900_u16, data in prop::collection::vec(any::<u8>(), 0..=9)) {
+        let is_valid = id <= 0x7FF && data.len() <= 8;
+        let frame = Frame::new(id, &data);
+        prop_assert_eq!(frame.map(|frame| (frame.id(), frame.data().to_vec())), is_valid.then_some((id, data)));
+        prop_assert_eq!(CanId::new(id).map(CanId::get), (id <= 0x7FF).then_some(id));
     }
 
     #[test]

@@ -8,17 +8,23 @@
 
 mod faults;
 mod flags;
+mod keeping;
 mod measurement;
+mod parcel;
 pub mod pressure;
 mod profile;
 mod protocol;
 mod setup;
 mod signal;
+mod stored;
+mod transfer_buffer;
 
 pub use canopen::emcy::Fault;
+pub use canopen::lss::BitRate;
 pub use canopen::nmt::State;
 pub use canopen::{Frame, Instant, NodeId, QueueFull, Transmit};
 pub use measurement::{Measurement, Parameters, Snapshot};
+pub use parcel::Parcel;
 pub use profiles::pressure::{FactoryCalibration, RawSample};
 pub use protocol::Protocol;
 pub use setup::{Personality, REVISION, Setup, VENDOR_ID};

@@ -1,9 +1,11 @@
 //! The protocol half: the CANopen device with everything it owns.
 
 use crate::profile::{IMAGE_SIZE, Profile};
+use crate::stored::Stored;
+use crate::transfer_buffer::TransferBuffer;
 use crate::{Parameters, Personality, Request, Setup, Snapshot, flags, pressure};
 use canopen::nmt::State;
-use canopen::{Action, CanId, Device, Frame, Instant, Transmit};
+use canopen::{Action, CanId, Device, Frame, Instant, Job, Transmit};
 use profiles::pressure::Conditions;
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
@@ -16,15 +18,23 @@ pub struct Protocol {
     /// As last published: most samples change nothing.
     pub(crate) conditions: Conditions,
     pub(crate) is_bus_off: bool,
+    /// What `Request::Store` is about.
+    pub(crate) job: Option<Job>,
 }
 
 impl Protocol {
     /// A node that has not started: it is silent and hears nothing until `start`.
     #[must_use]
     pub fn new(setup: &Setup) -> Protocol {
-        let profile = Profile { setup: *setup, flags: flags::Flags::default() };
-        let device = Device::new(setup.personality.dictionary(), setup.node_id, profile);
-        Protocol { device, conditions: Conditions::default(), is_bus_off: false }
+        let profile = Profile {
+            setup: *setup,
+            flags: flags::Flags::default(),
+            stored: Stored::NOTHING,
+            buffer: TransferBuffer::EMPTY,
+        };
+        let device =
+            Device::new(setup.personality.dictionary(), setup.node_id, profile).with_bit_rate(setup.bit_rate);
+        Protocol { device, conditions: Conditions::default(), is_bus_off: false, job: None }
     }
 
     /// Initialises what the pending reset covers, then boots up. To be called once the bus is ready,
@@ -74,6 +84,12 @@ impl Protocol {
             Action::ResetNode => Request::ResetNode,
             Action::ResetCommunication => Request::ResetCommunication,
             Action::Identifiers => Request::Filters,
+            Action::Bootloader => Request::Bootloader,
+            Action::BitRate(bit_rate) => Request::BitRate(bit_rate),
+            Action::Store(job) => {
+                self.job = Some(job);
+                Request::Store
+            }
         })
     }
 

@@ -1,6 +1,7 @@
 //! What a node must know before it starts.
 
 use canopen::NodeId;
+use canopen::lss::BitRate;
 
 /// Vendor-ID of object 1018h:1. 0 is no vendor: put the one CiA assigned to you here.
 pub const VENDOR_ID: u32 = 0;
@@ -16,6 +17,23 @@ pub enum Personality {
 }
 
 impl Personality {
+    /// The personality of a number in the device record; `None` for one that this image does not have.
+    #[must_use]
+    pub const fn numbered(number: u8) -> Option<Personality> {
+        match number {
+            0 => Some(Personality::Pressure),
+            _ => None,
+        }
+    }
+
+    /// Its number in the device record.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        match self {
+            Personality::Pressure => 0,
+        }
+    }
+
     /// Product code of object 1018h:2.
     #[must_use]
     pub const fn product_code(self) -> u32 {
@@ -30,12 +48,14 @@ impl Personality {
 pub struct Setup {
     /// The device to be.
     pub personality: Personality,
-    /// Own node-ID.
-    pub node_id: NodeId,
-    /// Bit rate in kbit/s at which the node runs.
-    pub bit_rate: u16,
+    /// Own node-ID; `None` for a node that LSS must give one.
+    pub node_id: Option<NodeId>,
+    /// Bit rate as configured, which may be to detect it.
+    pub bit_rate: BitRate,
     /// Serial number, object 1018h:4.
     pub serial_number: u32,
+    /// Object 1F56h:1, identification of the program: the CRC-32 of its image.
+    pub program_id: u32,
     /// Object 1009h: at most 32 ASCII characters, the rest is cut off.
     pub hardware_version: &'static str,
     /// Object 100Ah: at most 50 ASCII characters, the rest is cut off.

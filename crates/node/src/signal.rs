@@ -1,5 +1,7 @@
 //! What the protocol asks of the firmware and what the firmware tells the protocol.
 
+use canopen::lss::BitRate;
+
 /// Something only the firmware can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
@@ -9,8 +11,12 @@ pub enum Request {
     ResetCommunication,
     /// The identifiers of interest have changed: read `process_ids` and `service_ids` again.
     Filters,
-    /// Run the bus at this bit rate in kbit/s from now on.
-    BitRate(u16),
+    /// Run the bus at this bit rate from now on, or detect it.
+    BitRate(BitRate),
+    /// 1F51h: restart into the bootloader.
+    Bootloader,
+    /// Something is to be stored: `Protocol::pack`, then `Parcel::deliver`, then `Protocol::finish`.
+    Store,
 }
 
 /// What the CAN controller reports besides frames.

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::format::{CLEAN, FIRST, LEFT_AT, MARK, WORD};
 use crate::group::{Change, Group, Health, Loaded, PerGroup};
 use crate::page::Page;
-use crate::scan::Scan;
+use crate::scan::{Content, Scan};
 use crate::view::View;
 use crate::writer::{Record, Records, Writer, size};
 
@@ -48,7 +48,8 @@ impl<F: NorFlash> Store<F> {
         Ok(store)
     }
 
-    /// Makes all `changes` or none. Of several changes to one group the last counts. Only programs words, about 16 us
+    /// Makes all `changes` or none. Of several changes to one group the last counts; what is stored already is not
+    /// written again. Only programs words, about 16 us
     /// each, and never erases.
     ///
     /// # Errors
@@ -60,11 +61,15 @@ impl<F: NorFlash> Store<F> {
         }
         let too_long =
             |change: &Change<'_>| matches!(change, Change::Set { value, .. } if value.len() > MAX_VALUE);
-        let new = PerGroup::from_fn(|group| last_change(changes, group));
+        let mut new = PerGroup::from_fn(|group| last_change(changes, group));
         let whole = PerGroup::from_fn(|group| new.get(group).or(*self.kept().get(group)));
         // What a page could not hold alone could never be moved, so it is refused while there is still room for it.
         if changes.iter().any(too_long) || size(&whole) > self.current().page.room() {
             return Err(Error::TooLong);
+        }
+        self.drop_unchanged(&mut new)?;
+        if new.iter().all(|(_, record)| record.is_none()) {
+            return Ok(());
         }
         if self.can_append(size(&new)) {
             self.append(&new)
@@ -73,6 +78,29 @@ impl<F: NorFlash> Store<F> {
         } else {
             Err(Error::RestartNeeded)
         }
+    }
+
+    /// What is stored already wears out nothing: a master that saves after every start costs no flash.
+    fn drop_unchanged(&mut self, records: &mut Records<'_>) -> Result<(), F::Error> {
+        for group in Group::ALL {
+            let is_same = match (records.get(group), self.current_content(group)) {
+                (Some(Record::Set { version, value }), Content::Value(slot)) if slot.version == *version => {
+                    self.view.holds(&slot, value)?
+                }
+                (Some(Record::Restored), Content::Restored) => true,
+                _ => false,
+            };
+            if is_same {
+                *records.get_mut(group) = None;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the next start would read of the group. Of a page that is damaged nothing counts: it is written anew.
+    fn current_content(&self, group: Group) -> Content {
+        let entry = self.view.state.groups.get(group);
+        if entry.suspect { Content::Unnamed } else { entry.content }
     }
 
     /// As [`View::load`].

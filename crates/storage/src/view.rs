@@ -90,6 +90,23 @@ impl<F: ReadNorFlash> View<F> {
         }
     }
 
+    /// Whether a stored value is intact and these bytes.
+    pub(crate) fn holds(&mut self, slot: &Slot, value: &[u8]) -> Result<bool, F::Error> {
+        if slot.len as usize != value.len()
+            || slot.page.transaction(&mut self.flash, slot.transaction)?.is_none()
+        {
+            return Ok(false);
+        }
+        let places = (slot.data..).step_by(WORD as usize);
+        for (chunk, at) in value.chunks(WORD as usize).zip(places) {
+            let word = slot.page.word(&mut self.flash, at)?.to_le_bytes();
+            if !word.starts_with(chunk) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
     /// Reads both pages again after one has been written.
     pub(crate) fn refresh(&mut self) -> Result<(), Error<F::Error>> {
         self.state = State::read(&mut self.flash, self.pages)?;

@@ -187,3 +187,19 @@ fn a_worn_out_word_fails_the_save_and_the_next_one_goes_to_the_other_page() {
         }
     }
 }
+
+#[test]
+fn what_is_stored_already_wears_out_nothing() {
+    let mut flash = MockFlash::<512>::new(1024, 0);
+    let both = vec![set(Group::Communication, 1, 7), restore(Group::Application), set(Group::Device, 1, 4)];
+    start(&mut flash, PAGES).unwrap().save(&as_changes(&both)).unwrap();
+    let programmed = flash.programmed();
+    start(&mut flash, PAGES).unwrap().save(&as_changes(&both)).unwrap();
+    assert_eq!(flash.programmed(), programmed);
+
+    let one = vec![set(Group::Communication, 1, 7), set(Group::Device, 1, 5)];
+    start(&mut flash, PAGES).unwrap().save(&as_changes(&one)).unwrap();
+    // Begin, generation, words; the record's head and two words of its value; commit, closed.
+    assert_eq!(flash.programmed() - programmed, 3 + 2 + 2 + 2, "only the group that differs");
+    assert_eq!(read_good(&mut flash, PAGES), after(&after(&EMPTY, &both), &one));
+}

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use crate::bits::encode;
 use crate::faults::{Flip, SeenBy};
 use crate::station::Notice;
-use crate::wire::{Course, Happening, Tap, run};
+use crate::wire::{Course, Happening, Nature, Tap, run};
 use crate::{Attachment, BusError, Controller, ErrorReport, Event, Frame, Time};
 
 /// A participant that begins a frame.
@@ -154,18 +154,18 @@ impl Slot {
     }
 }
 
-/// One tap for each contender and each victim of a bit error; one for all listeners that are alike.
+/// One tap for all participants that are alike: attached in the same way, and sending the same frame or none. One for
+/// each victim of a bit error.
 fn taps(contenders: &[Contender], attachments: &[Attachment], bit: Time, flips: &[Flip]) -> Vec<Tap> {
     let mut taps: Vec<Tap> = Vec::new();
     for (n, attachment) in attachments.iter().enumerate() {
         let Some(own) = attachment.bit().map(|own| locked(own, bit)) else { continue };
         let contender = contenders.iter().find(|contender| contender.participant == n);
-        let unlike = contender.is_some() || flips.iter().any(|flip| flip.seen_by == SeenBy::Participant(n));
-        match taps.iter_mut().find(|tap| !unlike && tap.attachment == Some(*attachment)) {
+        let nature = Nature { attachment: *attachment, frame: contender.map(|contender| contender.frame) };
+        let is_victim = flips.iter().any(|flip| flip.seen_by == SeenBy::Participant(n));
+        match taps.iter_mut().find(|tap| !is_victim && tap.nature == Some(nature)) {
             Some(tap) => tap.members.push(n),
-            None => {
-                taps.push(Tap::new(n, *attachment, own, contender.map(|contender| &contender.frame), unlike))
-            }
+            None => taps.push(Tap::new(n, nature, own, is_victim)),
         }
     }
     taps

@@ -5,12 +5,20 @@ use crate::faults::{Flip, SeenBy};
 use crate::station::{Notice, Station};
 use crate::{Attachment, Frame, Time};
 
+/// What makes participants alike on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Nature {
+    pub(crate) attachment: Attachment,
+    /// What it begins to send.
+    pub(crate) frame: Option<Frame>,
+}
+
 /// A station and its bit clock.
 pub(crate) struct Tap {
     /// The participants that it stands for.
     pub(crate) members: Vec<usize>,
-    /// How its members are attached; `None` for one that is unlike all others.
-    pub(crate) attachment: Option<Attachment>,
+    /// What its members have in common; `None` for one that is unlike all others.
+    pub(crate) nature: Option<Nature>,
     contender: bool,
     station: Station,
     bit: Time,
@@ -22,20 +30,14 @@ pub(crate) struct Tap {
 }
 
 impl Tap {
-    /// A tap for one participant that begins `frame` or listens. An `unlike` one takes no further members.
-    pub(crate) fn new(
-        member: usize,
-        attachment: Attachment,
-        bit: Time,
-        frame: Option<&Frame>,
-        unlike: bool,
-    ) -> Tap {
-        let station = Station::new(attachment, frame);
+    /// A tap for one participant. An `unlike` one takes no further members.
+    pub(crate) fn new(member: usize, nature: Nature, bit: Time, unlike: bool) -> Tap {
+        let station = Station::new(nature.attachment, nature.frame.as_ref());
         let drives = station.drives();
         Tap {
             members: vec![member],
-            attachment: (!unlike).then_some(attachment),
-            contender: frame.is_some(),
+            nature: (!unlike).then_some(nature),
+            contender: nature.frame.is_some(),
             station,
             bit,
             began: Time::ZERO,

@@ -47,7 +47,7 @@ pub fn run(options: Options) -> Result<Summary> {
 
 impl App {
     fn open(options: Options) -> Result<App> {
-        let mut gateway = Gateway::new(setup::bits_per_second(options.bitrate));
+        let mut gateway = Gateway::default();
         let socketcand = gateway.listen(options.socketcand, Protocol::Socketcand)?;
         let slcan = options.slcan.map(|address| gateway.listen(address, Protocol::Slcan)).transpose()?;
         let mut world = setup::world(&options)?;

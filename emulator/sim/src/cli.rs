@@ -24,8 +24,9 @@ pub struct Options {
     #[arg(long, value_name = "PATH", hide = true)]
     pub bootloader: Option<PathBuf>,
 
-    /// A board with this node-ID and personality; may be given up to 127 times.
-    #[arg(long = "node", value_name = "ID:PERSONALITY", default_value = "1:pressure")]
+    /// A board with this node-ID and personality; may be given up to 127 times. 201 to 254 are boards that have no
+    /// node-ID and wait for LSS; @auto is a board that finds the bit rate by listening.
+    #[arg(long = "node", value_name = "ID:PERSONALITY[@auto]", default_value = "1:pressure")]
     pub nodes: Vec<Node>,
 
     /// Serve socketcand here, with the bus name vcan0. Port 0 takes a free one.
@@ -92,20 +93,30 @@ pub struct Options {
 /// A board that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
-    /// Node-ID, 1 to 127.
+    /// Node-ID, 1 to 127, or from [`UNCONFIGURED`] on the number of a board that has none.
     pub id: u8,
     /// What it measures.
     pub personality: Personality,
+    /// Whether it is to detect the bit rate.
+    pub auto: bool,
 }
+
+/// The first number of boards without a node-ID.
+pub const UNCONFIGURED: u8 = 201;
 
 impl FromStr for Node {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Node, String> {
         let (id, personality) = text.split_once(':').unwrap_or((text, "pressure"));
-        let id =
-            node_id(id).ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"))?;
-        Ok(Node { id, personality: personality.parse()? })
+        let id = board_number(id)
+            .ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"))?;
+        let (personality, auto) = match personality.split_once('@') {
+            Some((personality, "auto")) => (personality, true),
+            Some((_, other)) => return Err(format!("{other:?} is no way to get a bit rate; auto is")),
+            None => (personality, false),
+        };
+        Ok(Node { id, personality: personality.parse()?, auto })
     }
 }
 
@@ -135,9 +146,9 @@ pub enum LogLevel {
     Off,
 }
 
-/// A node-ID of CiA 301.
-pub(crate) fn node_id(text: &str) -> Option<u8> {
-    text.parse().ok().filter(|id| (1..=127).contains(id))
+/// A node-ID of CiA 301, or the number of a board that has none.
+pub(crate) fn board_number(text: &str) -> Option<u8> {
+    text.parse().ok().filter(|id| matches!(id, 1..=127 | UNCONFIGURED..=254))
 }
 
 fn bit_rate(text: &str) -> Result<u16, String> {
@@ -178,14 +189,14 @@ mod tests {
     #[test]
     fn the_defaults() {
         let options = read("").unwrap();
-        assert_eq!(options.nodes, [Node { id: 1, personality: Personality::Pressure }]);
+        assert_eq!(options.nodes, [Node { id: 1, personality: Personality::Pressure, auto: false }]);
         assert_eq!(options.socketcand.to_string(), "127.0.0.1:29536");
         assert_eq!((options.bitrate, options.speed, options.duration), (250, Speed::Real, None));
     }
 
     #[test]
     fn every_flag_of_the_manual() {
-        let flags = "--node 1:pressure --node 2:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
+        let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 \
              --shaft 2=rpm:6000 --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
         let options = read(flags).unwrap();
@@ -199,6 +210,8 @@ mod tests {
         let wrong = [
             ("--node 0:pressure", "0"),
             ("--node 128:pressure", "128"),
+            ("--node 1:pressure@fast", "auto"),
+            ("--node 255:pressure", "255"),
             ("--node 1:toaster", "it has: pressure"),
             ("--bitrate 251", "250"),
             ("--for -1", "-1"),

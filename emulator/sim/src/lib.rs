@@ -25,3 +25,4 @@ pub mod world;
 mod figures;
 mod greeting;
 mod pace;
+mod retuning;

@@ -26,6 +26,11 @@ impl Port {
         });
     }
 
+    /// Changes the bit rate of what is attached.
+    pub(crate) fn set_bit(&mut self, bit: Time) {
+        self.tell(|node| node.set_bit(bit));
+    }
+
     /// Queues a frame. Off the bus it is lost, as with an interface that is down.
     pub fn send(&mut self, frame: Frame, now: Time) {
         if let Some(node) = &mut self.node {

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use storage::{DeviceRecord, Memory, Pages, View};
 
 use crate::board::{Board, Images};
-use crate::cli::{Node, Options};
+use crate::cli::{Node, Options, UNCONFIGURED};
 use crate::flash;
 use crate::image::Image;
 use crate::world::World;
@@ -34,7 +34,7 @@ pub fn world(options: &Options) -> Result<World> {
 
 fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
     let twice = options.nodes.iter().filter(|other| other.id == node.id).count() > 1;
-    ensure!(!twice, "node-ID {} is given more than once", node.id);
+    ensure!(!twice, "node {} is given more than once", node.id);
     let kept = options.flash.as_deref().map(|dir| flash::load(dir, node.id)).transpose()?.flatten();
     let mut contents = kept.unwrap_or_else(|| vec![0xFF; flash::SIZE]);
     provision(&mut contents, node, options.bitrate)?;
@@ -47,8 +47,10 @@ fn provision(flash: &mut [u8], node: &Node, bit_rate: u16) -> Result<()> {
     if matches!(known, Ok(Some(_))) {
         return Ok(());
     }
+    let node_id = if node.id < UNCONFIGURED { node.id } else { DeviceRecord::UNCONFIGURED };
+    let bit_rate = if node.auto { DeviceRecord::AUTO } else { bit_rate };
     let record =
-        DeviceRecord::new(node.id, bit_rate, node.personality.number()).context("no such device record")?;
+        DeviceRecord::new(node_id, bit_rate, node.personality.number()).context("no such device record")?;
     let done = storage::provision(Memory(flash), PAGES, &record);
     done.map_err(|error| anyhow::anyhow!("the parameter store takes no device record: {error:?}"))
 }

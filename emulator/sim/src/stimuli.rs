@@ -6,7 +6,7 @@ use std::str::FromStr;
 use canbus::Time;
 use chip::plant::{Fault, Motion, Plant, Signal};
 
-use crate::cli::node_id;
+use crate::cli::board_number;
 
 /// A change of what a board's sensors see.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +79,7 @@ where
         let target = text.split_once('=').filter(|(id, _)| id.bytes().all(|byte| byte.is_ascii_digit()));
         let (node, spec) = match target {
             Some((id, spec)) => {
-                let id = node_id(id)
+                let id = board_number(id)
                     .ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"));
                 (Some(id?), spec)
             }

@@ -10,6 +10,7 @@ use emulator::Machine;
 use crate::board::Board;
 use crate::log::Line;
 use crate::port::Port;
+use crate::retuning::Retuning;
 use crate::status::{Status, share};
 use crate::stimuli::{Stimulus, Targeted};
 use crate::summary::{BusSummary, Summary};
@@ -55,6 +56,7 @@ struct Records {
     log: Vec<Line>,
     /// Nodes whose boot-up was heard since the last look.
     booted: Vec<u8>,
+    retuning: Retuning,
     good: u64,
     bad: u64,
 }
@@ -71,6 +73,11 @@ impl World {
     /// Virtual time.
     pub fn now(&self) -> Time {
         self.now
+    }
+
+    /// The bit rate of the host's adapters in bit/s.
+    pub fn bit_rate(&self) -> u32 {
+        u32::from(self.bit_rate) * 1000
     }
 
     /// The boards, in the order of the command line.
@@ -121,7 +128,7 @@ impl World {
     /// Lets everything up to `end` happen.
     pub fn run_until(&mut self, end: Time) {
         loop {
-            let next = self.step_bus().min(self.start_nodes());
+            let next = self.step_bus().min(self.start_nodes()).min(self.retune());
             if self.now >= end {
                 break;
             }
@@ -158,6 +165,17 @@ impl World {
         }
         booted.iter().for_each(|&node| self.host.send(start_command(node), self.now));
         self.now
+    }
+
+    /// Sets the host's adapters to the bit rate that LSS has activated. Returns when that will be the case.
+    fn retune(&mut self) -> Time {
+        if let Some(kbit) = self.records.retuning.take(self.now) {
+            self.bit_rate = kbit;
+            self.bit = Time::of_cycle(u64::from(kbit) * 1000);
+            self.host.set_bit(self.bit);
+            self.ports.iter_mut().for_each(|place| place.port.set_bit(self.bit));
+        }
+        self.records.retuning.due()
     }
 
     /// The frames since the last call, each with the end of its end of frame.
@@ -201,6 +219,7 @@ impl Records {
             &Event::Frame { end: at, frame, .. } => {
                 self.good += 1;
                 self.booted.extend(self.traffic.on_frame(&frame));
+                self.retuning.on_frame(&frame, at);
                 self.frames.push(Stamped { at, frame });
             }
             Event::Error { .. } => self.bad += 1,

@@ -15,7 +15,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Bench {
-        Bench { world: World::new(Vec::new(), 1000, 0), gateway: Gateway::new(1_000_000) }
+        Bench { world: World::new(Vec::new(), 1000, 0), gateway: Gateway::default() }
     }
 
     fn serve(&self, protocol: Protocol) -> SocketAddr {

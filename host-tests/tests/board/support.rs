@@ -15,6 +15,9 @@ pub(crate) const TPDO1: u16 = 0x181;
 pub(crate) const SDO_REQUEST: u16 = 0x601;
 pub(crate) const SDO_RESPONSE: u16 = 0x581;
 pub(crate) const SYNC: u16 = 0x080;
+/// LSS (CiA 305).
+pub(crate) const LSS_REQUEST: u16 = 0x7E5;
+pub(crate) const LSS_RESPONSE: u16 = 0x7E4;
 pub(crate) const START_ALL: (u16, [u8; 2]) = (0x000, [1, 0]);
 
 /// Where the ELF files are: $NODE_IMAGES, or where cargo puts them.
@@ -47,16 +50,43 @@ pub(crate) fn frame(id: u16, bytes: &[u8]) -> Frame {
     Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
 }
 
-/// A client on the bus at 1 Mbit/s.
+/// A client on the bus, at 1 Mbit/s unless it says otherwise.
 pub(crate) struct Master {
     pub(crate) port: PortId,
 }
 
 impl Master {
     pub(crate) fn join(world: &mut World) -> Master {
+        Master::join_at(world, 1_000_000)
+    }
+
+    /// At a bit rate in bit/s.
+    pub(crate) fn join_at(world: &mut World, bit_rate: u32) -> Master {
         let port = world.open_port();
-        world.port(port).attach(Some(Adapter { bit_rate: 1_000_000, silent: false }));
+        world.port(port).attach(Some(Adapter { bit_rate, silent: false }));
         Master { port }
+    }
+
+    /// One SDO exchange with a node.
+    pub(crate) fn ask(&self, world: &mut World, node: u8, request: &[u8; 8]) -> Vec<u8> {
+        let response = 0x580 + u16::from(node);
+        self.heard(world, response);
+        self.send(world, 0x600 + u16::from(node), request);
+        for _ in 0..200 {
+            world.run_until(world.now() + Time::from_millis(1));
+            if let Some(frame) = self.heard(world, response).first() {
+                return frame.bytes().to_vec();
+            }
+        }
+        panic!("no response to {request:x?}");
+    }
+
+    /// An LSS request and what is answered to it in the next milliseconds.
+    pub(crate) fn lss(&self, world: &mut World, request: &[u8; 8]) -> Vec<Vec<u8>> {
+        self.heard(world, LSS_RESPONSE);
+        self.send(world, LSS_REQUEST, request);
+        world.run_until(world.now() + Time::from_millis(50));
+        self.heard(world, LSS_RESPONSE).iter().map(|frame| frame.bytes().to_vec()).collect()
     }
 
     pub(crate) fn send(&self, world: &mut World, id: u16, bytes: &[u8]) {

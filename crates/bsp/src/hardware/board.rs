@@ -5,10 +5,11 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 
 use super::can::{Controller, Transmitter};
+use super::flash::{Flash, ParameterFlash};
 use super::led::Led;
 use super::sampling::{Parts, Sampling};
 use super::time_base::{self, Alarm, TimeInterrupt};
-use super::watchdog::Watchdog;
+use super::watchdog::StartUpWatchdog;
 use crate::bit_timing::APB1_HZ;
 use crate::reset_cause::ResetCause;
 
@@ -23,8 +24,8 @@ pub const NAME: &str = "STM32F405/407";
 pub struct Board {
     /// Why the chip was reset.
     pub reset_cause: ResetCause,
-    /// Runs already.
-    pub watchdog: Watchdog,
+    /// Runs already, with the patience that the start-up needs.
+    pub watchdog: StartUpWatchdog,
     /// The interrupt of the time base.
     pub time: TimeInterrupt,
     /// The alarms of process data and services.
@@ -33,6 +34,8 @@ pub struct Board {
     pub can: Controller,
     /// Its transmit mailboxes.
     pub transmitter: Transmitter,
+    /// The pages of the parameter store.
+    pub parameters: ParameterFlash,
     /// The front end, ready to start.
     pub sampling: Sampling,
     /// The status LED.
@@ -44,7 +47,7 @@ impl Board {
     /// reset too.
     #[must_use]
     pub fn start(device: Peripherals) -> Board {
-        let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
+        let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
         let reset_cause = reset_cause(&device.RCC);
         keep_debugger(&device.DBGMCU);
         let mut rcc = clocks(device.RCC);
@@ -62,7 +65,8 @@ impl Board {
         };
         let sampling = Sampling::new(front_end, &mut rcc);
         let led = Led::new(gpioa.pa5);
-        Board { reset_cause, watchdog, time, alarms, can, transmitter, sampling, led }
+        let parameters = ParameterFlash::new(Flash::new(device.FLASH));
+        Board { reset_cause, watchdog, time, alarms, can, transmitter, parameters, sampling, led }
     }
 }
 

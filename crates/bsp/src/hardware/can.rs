@@ -8,9 +8,10 @@ use stm32f4xx_hal::gpio::{PB8, PB9};
 use stm32f4xx_hal::pac::{CAN1, can1};
 use stm32f4xx_hal::rcc::Rcc;
 
+use crate::bit_rate_detection::Heard;
 use crate::bit_timing::BitTiming;
 use crate::bus_state::BusState;
-use crate::filters::{BANKS, Bank, Banks, Fifo, Pair};
+use crate::filters::{self, BANKS, Bank, Banks, Fifo, Pair};
 use crate::transmit_queue::{Mailboxes, Offer};
 
 /// The registers as bxcan wants them.
@@ -53,12 +54,52 @@ impl Controller {
     /// Goes on the bus, again when it was there: drops what is in the mailboxes and takes new timing and filters. Error
     /// counters start from zero. It does not wait for the bus: one that is stuck must not keep the node from starting.
     pub fn start(&mut self, timing: BitTiming, banks: &Banks) {
+        self.join(timing, banks, false);
+    }
+
+    /// Goes on the bus without a word: no frame, no acknowledge, no error frame. All frames come to FIFO 1.
+    pub fn listen(&mut self, timing: BitTiming) {
+        self.join(timing, &filters::everything(), true);
+    }
+
+    fn join(&mut self, timing: BitTiming, banks: &Banks, silent: bool) {
         registers().tsr().write(|w| w.abrq0().set_bit().abrq1().set_bit().abrq2().set_bit());
-        self.can.modify_config().set_bit_timing(timing.btr()).leave_disabled();
+        self.can.modify_config().set_bit_timing(timing.btr()).set_silent(silent).leave_disabled();
         self.set_filters(banks);
         self.enable_interrupts();
-        // Clears the sleep request; the controller joins after 11 recessive bits, and also leaves bus-off by itself (ABOM).
+        self.mark_error_code();
+        // Clears the sleep request; the controller joins after 11 recessive bits.
         let _ = self.can.enable_non_blocking();
+        // bxcan has asked for the return from bus-off as soon as the standard allows; `crate::back_off` knows better.
+        registers().mcr().modify(|_, w| w.abom().clear_bit());
+    }
+
+    /// Returns from bus-off: after 128 times 11 recessive bits the controller takes part again (RM0390, 30.7.6). Does
+    /// nothing in any other state. Whoever finds it still off some time later calls it again.
+    pub fn recover(&mut self) {
+        if self.state() == BusState::Off {
+            registers().mcr().modify(|_, w| w.inrq().set_bit());
+            // Off the bus no frame has to end first: it is a matter of a few clocks.
+            let _ = (0..ACKNOWLEDGE_POLLS).find(|_| registers().msr().read().inak().bit_is_set());
+            registers().mcr().modify(|_, w| w.inrq().clear_bit());
+        }
+    }
+
+    /// What has been heard since the last call, but for frames that wait in a FIFO.
+    pub fn heard(&mut self) -> Heard {
+        let code = registers().esr().read().lec().bits();
+        self.mark_error_code();
+        match code {
+            NO_ERROR => Heard::Frame,
+            UNTOUCHED => Heard::Silence,
+            _ => Heard::Error,
+        }
+    }
+
+    /// The hardware never sets the code to this value, so any other one is new (RM0390, 30.9.2, LEC).
+    fn mark_error_code(&mut self) {
+        // SAFETY: LEC takes any value.
+        registers().esr().modify(|_, w| unsafe { w.lec().bits(UNTOUCHED) });
     }
 
     /// Replaces the filters. Frames that end meanwhile, a few microseconds, are not received.
@@ -87,6 +128,13 @@ impl Controller {
         registers().ier().modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit());
     }
 }
+
+/// How often to look for an acknowledge that comes at once, if at all.
+const ACKNOWLEDGE_POLLS: u32 = 1_000;
+
+/// Values of LEC (RM0390, 30.9.2): a frame without an error; set by software.
+const NO_ERROR: u8 = 0;
+const UNTOUCHED: u8 = 7;
 
 fn fifo(fifo: Fifo) -> bxcan::Fifo {
     match fifo {

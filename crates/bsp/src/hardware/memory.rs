@@ -2,6 +2,11 @@
 
 use core::ops::Range;
 
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// In flash: its table is too large for the stack.
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
 unsafe extern "C" {
     static _stack_start: u8;
     static _stack_end: u8;
@@ -10,6 +15,7 @@ unsafe extern "C" {
     static _parameters_end: u8;
     static _application_start: u8;
     static _application_end: u8;
+    static _program_end: u8;
 }
 
 fn region(start: &'static u8, end: &'static u8) -> Range<u32> {
@@ -34,12 +40,20 @@ pub fn application() -> Range<u32> {
     unsafe { region(&_application_start, &_application_end) }
 }
 
-/// What the two pages of the parameter store hold.
-pub fn parameters() -> &'static [u8] {
+/// The two pages of the parameter store.
+pub fn parameters() -> Range<u32> {
     // SAFETY: only the addresses are used.
-    let range = unsafe { region(&_parameters_start, &_parameters_end) };
-    // SAFETY: the region is flash, readable for ever, and this image does not program it.
-    unsafe { core::slice::from_raw_parts(range.start as *const u8, range.len()) }
+    unsafe { region(&_parameters_start, &_parameters_end) }
+}
+
+/// Identifies the program: the CRC-32 of its code and constants.
+pub fn program_id() -> u32 {
+    let start = application().start;
+    let end = (&raw const _program_end) as u32;
+    let len = end.saturating_sub(start) as usize;
+    // SAFETY: the linker puts the program there: flash, readable for ever, and nobody programs it while it runs.
+    let program = unsafe { core::slice::from_raw_parts(start as *const u8, len) };
+    CRC.checksum(program)
 }
 
 /// Size of each of the two pages: a sector (memory.x).

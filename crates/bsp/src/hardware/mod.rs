@@ -6,6 +6,7 @@ pub mod can;
 pub mod crash;
 pub mod factory;
 mod fault;
+pub mod flash;
 pub mod led;
 pub mod memory;
 mod receive;
@@ -18,7 +19,7 @@ pub use receive::{Frames, ReceiveQueue, Received, Receiver};
 pub use sampling::{Sampling, Sums};
 pub use stm32f4xx_hal::pac;
 pub use time_base::{Alarm, Clock, TimeInterrupt};
-pub use watchdog::Watchdog;
+pub use watchdog::{StartUpWatchdog, Watchdog};
 
 // The logger of every image.
 use defmt_rtt as _;

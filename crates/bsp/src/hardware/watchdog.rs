@@ -10,27 +10,43 @@ use crate::supervision::{Part, Supervision};
 /// 136 to 376 ms; the parts report every 20 ms at the latest.
 const TIMEOUT_MS: u32 = 200;
 
+/// The same for the start-up, in which the parameter store may erase two sectors of 16 KiB, 0.8 s each at most: it is 2 to
+/// 6 s.
+const START_UP_MS: u32 = 3_000;
+
 /// What KR takes to start again from the top.
 const RELOAD: u16 = 0xAAAA;
 
-/// The running watchdog. It is fed when all [`Part`]s have made progress.
+/// The watchdog while the node starts: it cannot be fed, but has patience.
+pub struct StartUpWatchdog(IndependentWatchdog);
+
+impl StartUpWatchdog {
+    /// Starts it. A debugger that halts the core halts it too.
+    pub(crate) fn new(iwdg: IWDG, debug: &DBGMCU) -> StartUpWatchdog {
+        let mut watchdog = IndependentWatchdog::new(iwdg);
+        watchdog.stop_on_debug(debug, true);
+        watchdog.start(START_UP_MS.millis());
+        StartUpWatchdog(watchdog)
+    }
+
+    /// The start-up is over: from now on all parts must report.
+    #[must_use]
+    pub fn supervise(mut self) -> Watchdog {
+        self.0.start(TIMEOUT_MS.millis());
+        Watchdog { supervision: Supervision::new() }
+    }
+}
+
+/// The watchdog of the running node. It is fed when all [`Part`]s have made progress.
 pub struct Watchdog {
     supervision: Supervision,
 }
 
 impl Watchdog {
-    /// Starts it. A debugger that halts the core halts it too.
-    pub(crate) fn start(iwdg: IWDG, debug: &DBGMCU) -> Watchdog {
-        let mut watchdog = IndependentWatchdog::new(iwdg);
-        watchdog.stop_on_debug(debug, true);
-        watchdog.start(TIMEOUT_MS.millis());
-        Watchdog { supervision: Supervision::new() }
-    }
-
     /// `part` has done its work once more.
     pub fn progress(&self, part: Part) {
         if self.supervision.progress(part) {
-            // SAFETY: the peripheral was given to `start`. Writing the key is one store, from whatever priority.
+            // SAFETY: the peripheral was given to `StartUpWatchdog`. Writing the key is one store, from whatever priority.
             unsafe { (*IWDG::ptr()).kr().write(|w| w.key().bits(RELOAD)) };
         }
     }

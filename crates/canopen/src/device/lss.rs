@@ -1,6 +1,6 @@
 //! LSS in the device: it works in every NMT state, and without a node-ID it is all there is.
 
-use super::{Application, Core, Device, STALE};
+use super::{Action, Application, Core, Device, STALE};
 use crate::lss::{Effect, Identity, RESPONSE, Request, Response, Switch};
 use crate::transmit::{Gate, RETRY};
 use crate::{Frame, Instant, Transmit};
@@ -62,7 +62,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     pub(super) fn poll_switching(&mut self, now: Instant) {
         self.switching = match self.switching {
             Some(Switching::Before(due, switch)) if now >= due => {
-                self.core.pending.bit_rate = Some(switch.bit_rate);
+                self.core.pending.request = Some(Action::BitRate(switch.bit_rate));
                 Some(Switching::After(now + switch.delay))
             }
             Some(Switching::After(due)) if now >= due => None,

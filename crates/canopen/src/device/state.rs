@@ -21,6 +21,8 @@ pub enum Action {
     Identifiers,
     /// Run the bus at this bit rate from now on.
     BitRate(BitRate),
+    /// Go to the bootloader; the request for it is not answered.
+    Bootloader,
     /// Store something, then call [`Device::finish`].
     Store(Job),
 }
@@ -40,7 +42,8 @@ pub(super) struct Pending {
     reset_untold: bool,
     pub(super) identifiers: bool,
     pub(super) parameters: bool,
-    pub(super) bit_rate: Option<BitRate>,
+    /// Of LSS or of program control.
+    pub(super) request: Option<Action>,
 }
 
 impl Pending {
@@ -50,7 +53,7 @@ impl Pending {
             reset_untold: false,
             identifiers: false,
             parameters: false,
-            bit_rate: None,
+            request: None,
         }
     }
 }
@@ -85,8 +88,8 @@ impl<A: Application, const N: usize> Device<A, N> {
                 Reset::Communication => Action::ResetCommunication,
             });
         }
-        if let Some(bit_rate) = pending.bit_rate.take() {
-            return Some(Action::BitRate(bit_rate));
+        if let Some(request) = pending.request.take() {
+            return Some(request);
         }
         if core::mem::take(&mut pending.identifiers) {
             return Some(Action::Identifiers);

@@ -1,8 +1,8 @@
-//! Storing: objects 1010h and 1011h, the configuration of LSS, and what a start finds stored.
+//! What the memory has to do with: objects 1010h, 1011h and 1F51h, the configuration of LSS, and what a start finds stored.
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
-use super::{Application, Core, Device};
+use super::{Action, Application, Core, Device};
 use crate::dictionary::{Entry, Group, Rule};
 use crate::emcy::Fault;
 use crate::lss::{Configuration, Slave};
@@ -12,6 +12,11 @@ use crate::{Instant, Transmit};
 /// What 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
+
+/// What 1F51h takes (CiA 302-3); to clear a program is a matter of the bootloader.
+const STOP_PROGRAM: u32 = 0;
+const START_PROGRAM: u32 = 1;
+const RESET_PROGRAM: u32 = 2;
 
 /// Storage groups, by the sub-index of 1010h or 1011h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,6 +151,19 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.jobs.begin(job)?;
         self.jobs.is_deferred = true;
         Ok(())
+    }
+
+    /// Stop and reset of the program lead to the bootloader, which is what answers next: nobody else does.
+    pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
+        match value {
+            STOP_PROGRAM | RESET_PROGRAM => {
+                self.pending.request = Some(Action::Bootloader);
+                self.jobs.is_deferred = true;
+                Ok(())
+            }
+            START_PROGRAM => Ok(()),
+            _ => Err(Abort::InvalidValue),
+        }
     }
 
     /// Takes what is stored of a group; where that is damaged or does not fit, the defaults stay as a whole.

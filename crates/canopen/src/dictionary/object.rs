@@ -95,6 +95,8 @@ pub enum Rule {
     HeartbeatTime,
     /// 1019h, synchronous counter overflow value.
     SyncOverflow,
+    /// 1F51h:1, program control of a program that runs (CiA 302-3).
+    ProgramControl,
     /// 1F80h, NMT start-up.
     StartUp,
     /// 1400h.., 1800h..:1, COB-ID of a PDO.
@@ -118,7 +120,7 @@ pub enum Rule {
 impl Rule {
     /// Whether what is written is a command: the value that is read stays.
     pub(crate) const fn is_command(self) -> bool {
-        matches!(self, Rule::Store | Rule::Restore)
+        matches!(self, Rule::Store | Rule::Restore | Rule::ProgramControl)
     }
 
     /// Whether the value lives elsewhere and takes no place in the image.

@@ -14,6 +14,15 @@ const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Objec
     Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Communication)
 }
 
+const fn constant(index: u16, name: &'static str, highest: i64) -> Object {
+    Object::new(index, 0, name, Type::Unsigned8, Access::Const).value(highest)
+}
+
+const fn command(index: u16, sub: u8, name: &'static str, rule: Rule) -> Object {
+    // Reads 1: stores on command, restores defaults.
+    Object::new(index, sub, name, Type::Unsigned32, Access::ReadWrite).value(1).rule(rule)
+}
+
 const fn error(sub: u8) -> Object {
     fixed(0x1003, sub, "Standard error field", Type::Unsigned32).rule(Rule::ErrorEntry)
 }
@@ -44,6 +53,14 @@ pub(super) const OBJECTS: &[Object] = &[
     text(0x1008, "Manufacturer device name", 32).default(DefaultValue::Text("STM32F4 pressure transmitter")),
     text(0x1009, "Manufacturer hardware version", 32),
     text(0x100A, "Manufacturer software version", 50),
+    constant(0x1010, "Store parameters", 3),
+    command(0x1010, 1, "Save all", Rule::Store),
+    command(0x1010, 2, "Save communication", Rule::Store),
+    command(0x1010, 3, "Save application", Rule::Store),
+    constant(0x1011, "Restore default parameters", 3),
+    command(0x1011, 1, "Restore all", Rule::Restore),
+    command(0x1011, 2, "Restore communication", Rule::Restore),
+    command(0x1011, 3, "Restore application", Rule::Restore),
     parameter(0x1014, 0, "COB-ID EMCY", Type::Unsigned32)
         .default(DefaultValue::NodeId(0x80))
         .rule(Rule::EmcyCobId),
@@ -71,6 +88,15 @@ pub(super) const OBJECTS: &[Object] = &[
     parameter(0x1029, 2, "Device error", Type::Unsigned8).limits(0, 2),
 ];
 
-/// What comes after the PDOs (CiA 302-2).
-pub(super) const START_UP: &[Object] =
-    &[parameter(0x1F80, 0, "NMT start-up", Type::Unsigned32).rule(Rule::StartUp)];
+/// What comes after the PDOs (CiA 302-2, CiA 302-3).
+pub(super) const START_UP: &[Object] = &[
+    Object::highest(0x1F51, 1, "Program control"),
+    Object::new(0x1F51, 1, "Program 1 control", Type::Unsigned8, Access::ReadWrite)
+        .value(1)
+        .rule(Rule::ProgramControl),
+    Object::highest(0x1F56, 1, "Program identification"),
+    fixed(0x1F56, 1, "Program 1 identification", Type::Unsigned32),
+    Object::highest(0x1F57, 1, "Flash status"),
+    fixed(0x1F57, 1, "Program 1 flash status", Type::Unsigned32),
+    parameter(0x1F80, 0, "NMT start-up", Type::Unsigned32).rule(Rule::StartUp),
+];

@@ -40,7 +40,6 @@ pub enum Protocol {
 
 /// All clients.
 pub struct Gateway {
-    bit_rate: u32,
     events: Receiver<Event>,
     /// For the threads of further listeners.
     sender: Sender<Event>,
@@ -60,13 +59,15 @@ enum Link {
     Frames(SyncSender<Frame>),
 }
 
-impl Gateway {
-    /// No clients yet; the bus runs at `bit_rate` (bit/s).
-    pub fn new(bit_rate: u32) -> Gateway {
+impl Default for Gateway {
+    /// No clients yet.
+    fn default() -> Gateway {
         let (sender, events) = channel();
-        Gateway { bit_rate, events, sender, counter: Arc::default(), clients: BTreeMap::new(), lost: 0 }
+        Gateway { events, sender, counter: Arc::default(), clients: BTreeMap::new(), lost: 0 }
     }
+}
 
+impl Gateway {
     /// Serves a protocol. Returns the address, which tells the port when 0 was asked for.
     pub fn listen(&self, address: SocketAddr, protocol: Protocol) -> Result<SocketAddr> {
         tcp::listen(address, protocol, self.sender.clone(), Arc::clone(&self.counter))
@@ -80,7 +81,8 @@ impl Gateway {
         let frames = socketcan::open(interface, id, self.sender.clone())
             .with_context(|| format!("cannot open the CAN interface {interface}"))?;
         let port = world.open_port();
-        world.port(port).attach(Some(Adapter { bit_rate: self.bit_rate, silent: false }));
+        let bit_rate = world.bit_rate();
+        world.port(port).attach(Some(Adapter { bit_rate, silent: false }));
         self.clients.insert(id, Client { port, link: Link::Frames(frames) });
         Ok(())
     }
@@ -123,8 +125,8 @@ impl Gateway {
 
     fn connect(&mut self, id: ClientId, protocol: Protocol, output: SyncSender<Output>, world: &mut World) {
         let session: Box<dyn Session> = match protocol {
-            Protocol::Socketcand => Box::new(Socketcand::new(BUS_NAME, self.bit_rate)),
-            Protocol::Slcan => Box::new(Slcan::new(self.bit_rate)),
+            Protocol::Socketcand => Box::new(Socketcand::new(BUS_NAME, world.bit_rate())),
+            Protocol::Slcan => Box::new(Slcan::new(world.bit_rate())),
         };
         let client = Client { port: world.open_port(), link: Link::Text { session, output } };
         self.clients.insert(id, client);

@@ -1,0 +1,122 @@
+//! Finding the bit rate of a bus by listening to it, silently: no frame, no acknowledge, no error frame.
+//!
+//! One rate after the other is listened to until a frame is understood. An error ends the try at once, silence after a
+//! while. That while doubles from round to round up to 1.28 s, so that a bus with a frame in every such span, as one
+//! heartbeat a second, is always understood, and a busy one within some hundredths of a second.
+
+use canopen::{Duration, Instant};
+
+use crate::bit_timing::BitTiming;
+
+/// In the order of their use in the field.
+const RATES: [u16; 8] = [250, 500, 125, 1000, 50, 20, 800, 10];
+/// Longer than the longest frame at 10 kbit/s (14 ms) and the look that comes every 20 ms.
+const FIRST: Duration = Duration::from_millis(40);
+const LONGEST: Duration = Duration::from_millis(1_280);
+
+/// What the controller has heard since the last look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// Nothing at all.
+    Silence,
+    /// A frame without an error.
+    Frame,
+    /// An error.
+    Error,
+}
+
+/// What to do now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Go on listening.
+    Stay,
+    /// Listen at this rate.
+    Listen(BitTiming),
+    /// This is the rate.
+    Found(BitTiming),
+}
+
+/// A search.
+#[derive(Debug)]
+pub struct Detector {
+    rate: usize,
+    patience: Duration,
+    until: Instant,
+}
+
+impl Detector {
+    /// Begins; the first rate to listen to is [`Detector::timing`].
+    #[must_use]
+    pub fn new(now: Instant) -> Detector {
+        Detector { rate: 0, patience: FIRST, until: now + FIRST }
+    }
+
+    /// The rate that is listened to.
+    #[must_use]
+    pub fn timing(&self) -> BitTiming {
+        RATES.get(self.rate).and_then(|&kbit| BitTiming::of(kbit)).unwrap_or(BitTiming::FASTEST)
+    }
+
+    /// Takes what was heard at the present rate.
+    pub fn step(&mut self, heard: Heard, now: Instant) -> Step {
+        match heard {
+            Heard::Frame => Step::Found(self.timing()),
+            Heard::Silence if now < self.until => Step::Stay,
+            Heard::Silence | Heard::Error => self.next(now),
+        }
+    }
+
+    fn next(&mut self, now: Instant) -> Step {
+        self.rate += 1;
+        if self.rate == RATES.len() {
+            self.rate = 0;
+            self.patience = Duration(self.patience.0 * 2).min(LONGEST);
+        }
+        self.until = now + self.patience;
+        Step::Listen(self.timing())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_rate_of_the_table_is_tried() {
+        let mut rates = RATES;
+        rates.sort_unstable();
+        assert_eq!(rates, [10, 20, 50, 125, 250, 500, 800, 1000]);
+        assert!(RATES.iter().all(|&rate| BitTiming::of(rate).is_some()));
+    }
+
+    #[test]
+    fn an_error_moves_on_at_once_and_silence_in_time() {
+        let mut detector = Detector::new(Instant(0));
+        assert_eq!(detector.timing().kbit(), 250);
+        assert_eq!(detector.step(Heard::Silence, Instant(39_999)), Step::Stay);
+        assert_eq!(detector.step(Heard::Silence, Instant(40_000)), Step::Listen(BitTiming::of(500).unwrap()));
+        assert_eq!(detector.step(Heard::Error, Instant(40_001)), Step::Listen(BitTiming::of(125).unwrap()));
+        assert_eq!(detector.step(Heard::Frame, Instant(40_002)), Step::Found(BitTiming::of(125).unwrap()));
+    }
+
+    /// A heartbeat a second and nothing else, at each of the rates, beginning at any time.
+    #[test]
+    fn a_bus_with_a_frame_a_second_is_understood() {
+        for rate in RATES {
+            for offset in (0..1_000_000).step_by(70_000) {
+                let mut detector = Detector::new(Instant(0));
+                let found = (0..).map(|i| Instant(i * 20_000)).find(|&now| {
+                    let is_heard = (now.0 + offset) % 1_000_000 < 20_000;
+                    let heard = match is_heard {
+                        false => Heard::Silence,
+                        true if detector.timing().kbit() == rate => Heard::Frame,
+                        // The worst: what is sent faster or slower is not even seen.
+                        true => Heard::Silence,
+                    };
+                    matches!(detector.step(heard, now), Step::Found(timing) if timing.kbit() == rate)
+                });
+                assert!(found.unwrap().0 < 40_000_000, "{rate} kbit/s from {offset}: {found:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The flash as memory for parameters and programs: words of 32 bits, sectors (RM0390, 3).
+//!
+//! The driver of stm32f4xx-hal programs byte by byte, erases several sectors for one and leaves error flags behind.
+
+use core::ops::Range;
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use stm32f4xx_hal::pac::FLASH;
+
+use super::memory;
+use crate::sectors;
+
+/// What unlocks the control register (RM0390, 3.5.1).
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// The error flags of SR; writing 1 clears one.
+const ERRORS: u32 = 0b1_1111_0010;
+
+/// The flash controller.
+pub struct Flash(FLASH);
+
+/// Why it did not do what it was told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Error {
+    /// Outside of the area, or not on a boundary.
+    Place(NorFlashErrorKind),
+    /// The controller says so: its error flags (RM0390, 3.8.4).
+    Flags(u32),
+}
+
+impl NorFlashError for Error {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Error::Place(kind) => *kind,
+            Error::Flags(_) => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+impl Flash {
+    /// Takes the controller.
+    #[must_use]
+    pub(crate) fn new(flash: FLASH) -> Flash {
+        Flash(flash)
+    }
+
+    /// Programs one word and waits for it: 16 us, at most 100. Code that is fetched from flash stands still meanwhile.
+    ///
+    /// `address` must be in flash, outside of the program, and a multiple of four.
+    fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {
+        self.work(|flash| {
+            flash.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
+            // SAFETY: the callers give addresses of an area that holds no code and no value of this program.
+            unsafe { (address as *mut u32).write_volatile(word) };
+        })
+    }
+
+    fn erase(&mut self, sector: u8) -> Result<(), Error> {
+        self.work(|flash| {
+            // SAFETY: SNB takes any number of a sector.
+            flash.cr().modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
+            flash.cr().modify(|_, w| w.strt().set_bit());
+        })
+    }
+
+    /// Unlocks the controller for one operation and waits for its end.
+    fn work(&mut self, begin: impl FnOnce(&FLASH)) -> Result<(), Error> {
+        self.wait();
+        // SAFETY: SR takes 1 for flags to clear.
+        self.0.sr().write(|w| unsafe { w.bits(ERRORS) });
+        if self.0.cr().read().lock().bit_is_set() {
+            for key in KEYS {
+                // SAFETY: these are the keys.
+                self.0.keyr().write(|w| unsafe { w.bits(key) });
+            }
+        }
+        begin(&self.0);
+        cortex_m::asm::dsb();
+        self.wait();
+        let flags = self.0.sr().read().bits() & ERRORS;
+        self.0.cr().write(|w| w.lock().set_bit());
+        if flags == 0 { Ok(()) } else { Err(Error::Flags(flags)) }
+    }
+
+    fn wait(&self) {
+        while self.0.sr().read().bsy().bit_is_set() {}
+    }
+
+    /// Drops what the data cache holds of the time before (RM0390, 3.4.2). It must be off for that.
+    fn forget_cached(&mut self) {
+        let was_on = self.0.acr().read().dcen().bit_is_set();
+        self.0.acr().modify(|_, w| w.dcen().clear_bit());
+        self.0.acr().modify(|_, w| w.dcrst().set_bit());
+        self.0.acr().modify(|_, w| w.dcrst().clear_bit());
+        self.0.acr().modify(|_, w| w.dcen().bit(was_on));
+    }
+}
+
+/// The two pages of the parameter store as NOR flash; offset 0 is their start.
+pub struct ParameterFlash(Flash);
+
+impl ParameterFlash {
+    /// Takes the controller for the parameter pages.
+    #[must_use]
+    pub(crate) fn new(flash: Flash) -> ParameterFlash {
+        ParameterFlash(flash)
+    }
+
+    fn range() -> Range<u32> {
+        memory::parameters()
+    }
+
+    /// The address of a span of the area that starts and ends on a boundary.
+    fn address(offset: u32, len: usize, boundary: u32) -> Result<u32, Error> {
+        let area = Self::range();
+        let len = u32::try_from(len).map_err(|_| Error::Place(NorFlashErrorKind::OutOfBounds))?;
+        if !offset.is_multiple_of(boundary) || !len.is_multiple_of(boundary) {
+            return Err(Error::Place(NorFlashErrorKind::NotAligned));
+        }
+        let end = offset.checked_add(len).filter(|&end| end <= area.end - area.start);
+        end.map(|_| area.start + offset).ok_or(Error::Place(NorFlashErrorKind::OutOfBounds))
+    }
+}
+
+impl ErrorType for ParameterFlash {
+    type Error = Error;
+}
+
+impl ReadNorFlash for ParameterFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        let address = Self::address(offset, bytes.len(), 1)?;
+        // SAFETY: `address` has checked that all of it lies in the area: flash, readable for ever, and nobody programs it
+        // meanwhile, as that takes this value too.
+        let area = unsafe { core::slice::from_raw_parts(address as *const u8, bytes.len()) };
+        bytes.copy_from_slice(area);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        Self::range().len()
+    }
+}
+
+impl NorFlash for ParameterFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = memory::PARAMETER_PAGE as usize;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
+        let len = to.checked_sub(from).ok_or(Error::Place(NorFlashErrorKind::OutOfBounds))?;
+        let start = Self::address(from, len as usize, memory::PARAMETER_PAGE)?;
+        for address in (start..start + len).step_by(Self::ERASE_SIZE) {
+            let sector = sectors::starting_at(address).ok_or(Error::Place(NorFlashErrorKind::NotAligned))?;
+            self.0.erase(sector.number)?;
+        }
+        self.0.forget_cached();
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        let address = Self::address(offset, bytes.len(), 4)?;
+        let (words, _) = bytes.as_chunks::<4>();
+        for (word, place) in words.iter().zip((address..).step_by(4)) {
+            self.0.program(place, u32::from_le_bytes(*word))?;
+        }
+        self.0.forget_cached();
+        Ok(())
+    }
+}

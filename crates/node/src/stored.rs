@@ -1,0 +1,80 @@
+//! What the parameter store holds of the dictionary, kept in RAM for the resets to come: reset communication must not
+//! wait for the flash.
+
+use crate::profile::{APPLICATION_SIZE, COMMUNICATION_SIZE};
+use canopen::dictionary::Group;
+use embedded_storage::nor_flash::ReadNorFlash;
+use heapless::{Vec, VecView};
+use storage::{Health, View};
+
+/// Version of the packed form (`canopen::dictionary`). The form says itself which objects it holds, so a dictionary
+/// that grows needs no new version.
+pub(crate) const LAYOUT: u16 = 1;
+
+/// The packed values of one group.
+#[derive(Debug)]
+pub(crate) struct Kept<const N: usize> {
+    pub(crate) packed: Vec<u8, N>,
+    pub(crate) is_sound: bool,
+}
+
+impl<const N: usize> Kept<N> {
+    const EMPTY: Kept<N> = Kept { packed: Vec::new(), is_sound: true };
+
+    fn load<F: ReadNorFlash>(&mut self, group: storage::Group, view: &mut View<F>) {
+        self.is_sound = read(group, view, &mut self.packed) && view.health(group) == Health::Good;
+    }
+
+    /// Takes what has just been stored.
+    pub(crate) fn replace(&mut self, packed: &[u8]) {
+        self.packed.clear();
+        self.is_sound = self.packed.extend_from_slice(packed).is_ok();
+    }
+
+    pub(crate) fn get(&self) -> canopen::Stored<'_> {
+        canopen::Stored { packed: &self.packed, is_sound: self.is_sound }
+    }
+}
+
+/// The packed values of the groups that 1010h stores.
+#[derive(Debug)]
+pub(crate) struct Stored {
+    pub(crate) communication: Kept<COMMUNICATION_SIZE>,
+    pub(crate) application: Kept<APPLICATION_SIZE>,
+}
+
+impl Stored {
+    pub(crate) const NOTHING: Stored = Stored { communication: Kept::EMPTY, application: Kept::EMPTY };
+
+    /// Reads both groups. What cannot be read counts as not stored, and as a fault.
+    pub(crate) fn load<F: ReadNorFlash>(&mut self, view: &mut View<F>) {
+        self.communication.load(storage::Group::Communication, view);
+        self.application.load(storage::Group::Application, view);
+    }
+
+    /// 1F57h:1 as the running program gives it (CiA 302-3): 0, or in bits 1 to 7 code 3, format or CRC error.
+    pub(crate) fn flash_status(&self) -> u32 {
+        if self.communication.is_sound && self.application.is_sound { 0 } else { 3 << 1 }
+    }
+
+    pub(crate) fn get(&self, group: Group) -> canopen::Stored<'_> {
+        match group {
+            Group::Communication => self.communication.get(),
+            Group::Application => self.application.get(),
+            Group::Volatile => canopen::Stored { packed: &[], is_sound: true },
+        }
+    }
+}
+
+/// Whether what is stored could be read; nothing stored is good, too.
+fn read<F: ReadNorFlash>(group: storage::Group, view: &mut View<F>, packed: &mut VecView<u8>) -> bool {
+    packed.clear();
+    let _ = packed.resize(packed.capacity(), 0);
+    let loaded = view.load(group, packed);
+    let known = match &loaded {
+        Ok(Some(loaded)) if loaded.version == LAYOUT => loaded.len,
+        _ => 0,
+    };
+    packed.truncate(known);
+    matches!(loaded, Ok(None)) || known > 0
+}

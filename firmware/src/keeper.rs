@@ -1,0 +1,44 @@
+//! The keeper of the parameter store: it does at the lowest priority what the protocol wants stored. The flash stops the
+//! core for 16 us with every word, so everything else runs between two words.
+
+use bsp::Clock;
+use bsp::flash::ParameterFlash;
+use canopen::sdo::Abort;
+use node::Parcel;
+use storage::Store;
+
+use crate::SERVICES;
+use crate::shared::Shared;
+
+/// What the task owns.
+pub(crate) struct Keeper {
+    /// `None` when the flash could not be prepared: then nothing can be stored.
+    store: Option<Store<ParameterFlash>>,
+    parcel: &'static mut Parcel,
+}
+
+impl Keeper {
+    pub(crate) fn new(store: Option<Store<ParameterFlash>>, parcel: &'static mut Parcel) -> Keeper {
+        Keeper { store, parcel }
+    }
+
+    /// Whether it can store anything.
+    pub(crate) fn is_working(&self) -> bool {
+        self.store.is_some()
+    }
+
+    /// Does the job that waits, if one does.
+    pub(crate) fn run(&mut self, node: &mut impl Shared) {
+        let parcel = &mut *self.parcel;
+        if !node.call(|protocol, _| protocol.pack(parcel)) {
+            return;
+        }
+        let result = self.store.as_mut().map_or(Err(Abort::Hardware), |store| parcel.deliver(store));
+        match result {
+            Ok(()) => defmt::info!("stored"),
+            Err(abort) => defmt::error!("not stored: {=u32:#010x}", abort.code()),
+        }
+        node.call(|protocol, out| protocol.finish(parcel, result, Clock::now(), out));
+        rtic::pend(SERVICES);
+    }
+}

@@ -1,0 +1,139 @@
+//! A small device with what the pressure node has not: an object of several KiB, for long transfers.
+
+use canopen::dictionary::{self, Access, Dictionary, Entry, Object, Rule, Type};
+use canopen::sdo::{Abort, Multiplexer};
+use canopen::{Action, Application, CanId, Device, Frame, Instant, NodeId, Part, Transmit};
+use node::Request;
+
+use crate::network::Unit;
+
+/// Node-ID of the device.
+pub const ID: u8 = 9;
+/// Its object of up to [`CAPACITY`] bytes.
+pub const DOMAIN: Multiplexer = Multiplexer { index: 0x2000, sub: 0 };
+/// A text of up to [`TEXT_CAPACITY`] bytes, which lives in the image.
+pub const TEXT: Multiplexer = Multiplexer { index: 0x2001, sub: 0 };
+/// A plain UNSIGNED32.
+pub const WORD: Multiplexer = Multiplexer { index: 0x2002, sub: 0 };
+/// Most bytes of the domain.
+pub const CAPACITY: usize = 8192;
+/// Most bytes of the text.
+pub const TEXT_CAPACITY: u8 = 60;
+
+const fn parameter(at: Multiplexer, kind: Type) -> Object {
+    Object::new(at.index, at.sub, "", kind, Access::ReadWrite)
+}
+
+const ROWS: &[Object] = &[
+    Object::new(0x1001, 0, "", Type::Unsigned8, Access::ReadOnly),
+    parameter(DOMAIN, Type::Domain).rule(Rule::Application(0)),
+    parameter(TEXT, Type::VisibleString(TEXT_CAPACITY)),
+    parameter(WORD, Type::Unsigned32),
+];
+const SIZE: usize = dictionary::image_size(ROWS);
+const ENTRIES: [Entry; ROWS.len()] = dictionary::compile(&dictionary::gather::<{ ROWS.len() }>(&[ROWS]));
+const DEFAULTS: [u8; SIZE] = dictionary::default_image(ROWS);
+const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+
+/// The content of the domain. A download replaces it when it is complete.
+#[derive(Debug, Default)]
+pub struct Store {
+    /// What a client can read.
+    pub content: Vec<u8>,
+    incoming: Vec<u8>,
+}
+
+impl Application for Store {
+    fn initialise(&mut self, _image: &mut [u8]) {}
+
+    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        Err(Abort::Access)
+    }
+
+    fn read_domain(&self, _number: u8) -> Result<&[u8], Abort> {
+        Ok(&self.content)
+    }
+
+    fn write_domain(&mut self, _number: u8, part: Part<'_>) -> Result<(), Abort> {
+        match part {
+            Part::Begin(size) if size.is_some_and(|size| size > CAPACITY) => return Err(Abort::TooLong),
+            Part::Begin(_) => self.incoming.clear(),
+            Part::Data(offset, bytes) if offset == self.incoming.len() => {
+                self.incoming.extend_from_slice(bytes);
+            }
+            Part::End(len) if len == self.incoming.len() => self.content = std::mem::take(&mut self.incoming),
+            Part::Data(..) | Part::End(_) => return Err(Abort::General),
+        }
+        if self.incoming.len() > CAPACITY { Err(Abort::TooLong) } else { Ok(()) }
+    }
+}
+
+/// The device.
+#[derive(Debug)]
+pub struct DomainDevice {
+    device: Device<Store, SIZE>,
+}
+
+impl DomainDevice {
+    /// A device with an empty domain.
+    ///
+    /// # Panics
+    /// Never.
+    #[must_use]
+    pub fn new() -> DomainDevice {
+        let node_id = NodeId::new(ID).expect("a node-ID");
+        DomainDevice { device: Device::new(&DICTIONARY, node_id, Store::default()) }
+    }
+
+    /// What is stored.
+    #[must_use]
+    pub fn content(&self) -> &[u8] {
+        &self.device.application().content
+    }
+
+    /// Stores something.
+    pub fn set_content(&mut self, content: &[u8]) {
+        self.device.application_mut().content = content.to_vec();
+    }
+}
+
+impl Default for DomainDevice {
+    fn default() -> DomainDevice {
+        DomainDevice::new()
+    }
+}
+
+impl Unit for DomainDevice {
+    fn start(&mut self, now: Instant, out: &mut impl Transmit) {
+        self.device.start(now, out);
+    }
+
+    fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        self.device.on_process_frame(frame, now, out);
+    }
+
+    fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        self.device.on_service_frame(frame, now, out);
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        self.device.poll_process(now, out).min(self.device.poll_services(now, out))
+    }
+
+    fn take_request(&mut self) -> Option<Request> {
+        self.device.take_action().map(|action| match action {
+            Action::ResetNode => Request::ResetNode,
+            Action::ResetCommunication => Request::ResetCommunication,
+            Action::Identifiers => Request::Filters,
+            other => panic!("{other:?}: the dictionary has nothing that leads to it"),
+        })
+    }
+
+    fn process_ids(&self) -> Vec<u16> {
+        self.device.process_ids().map(CanId::get).collect()
+    }
+
+    fn service_ids(&self) -> Vec<u16> {
+        self.device.service_ids().map(CanId::get).collect()
+    }
+}

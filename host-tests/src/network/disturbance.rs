@@ -1,0 +1,82 @@
+//! What can happen to a frame: it is destroyed and sent again, it arrives twice, it is held up.
+
+use canbus::{Bus, Fault, Frame, HostNode, Position, SeenBy, StandardId, Time};
+use fastrand::Rng;
+
+/// Frames of more urgent traffic that hold up everything else, some 2.5 ms at 1 Mbit/s.
+const BURST: u32 = 20;
+/// Their identifier, which CANopen does not use.
+const URGENT: StandardId = StandardId::new(0x001).expect("11 bits");
+
+/// How often each of it has happened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// A bit error that destroys the frame: its transmitter sends it again.
+    pub destroyed: u32,
+    /// A bit error at its very end, which only the transmitter sees: the receivers get the frame twice.
+    pub repeated: u32,
+    /// Urgent traffic that holds up what comes next.
+    pub delayed: u32,
+}
+
+/// Draws the fate of every frame, the same for the same seed.
+#[derive(Debug)]
+pub struct Disturbance {
+    rng: Rng,
+    percent: u32,
+    /// Frames whose fate is drawn.
+    drawn: u64,
+    pub(super) burst: HostNode,
+    tally: Tally,
+}
+
+impl Disturbance {
+    /// Each of the three happens to so many frames in a hundred.
+    #[must_use]
+    pub fn new(seed: u64, percent: u32) -> Disturbance {
+        let rng = Rng::with_seed(seed);
+        Disturbance { rng, percent, drawn: 0, burst: HostNode::new(super::BIT), tally: Tally::default() }
+    }
+
+    pub(super) fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// Prepares the faults of the frames that can begin next. The participants are the stations and a master.
+    pub(super) fn prepare(&mut self, bus: &mut Bus, stations: usize, now: Time) {
+        while self.drawn <= bus.frames() {
+            let fate = self.rng.u32(..100) / self.percent;
+            match fate {
+                0 => self.destroy(bus, stations),
+                1 => self.repeat(bus),
+                2 => self.delay(now),
+                _ => (),
+            }
+            self.drawn += 1;
+        }
+    }
+
+    fn destroy(&mut self, bus: &mut Bus, stations: usize) {
+        let seen_by = match self.rng.u8(..3) {
+            0 => SeenBy::Everyone,
+            1 => SeenBy::Transmitters,
+            _ => SeenBy::Participant(self.rng.usize(..=stations)),
+        };
+        // The shortest frame of eight bytes has 108 bits up to its ACK delimiter.
+        let position = Position::Bit(self.rng.usize(1..100));
+        bus.faults.schedule(Fault { frame: self.drawn, position, seen_by });
+        self.tally.destroyed += 1;
+    }
+
+    fn repeat(&mut self, bus: &mut Bus) {
+        let (position, seen_by) = (Position::LastBit, SeenBy::Transmitters);
+        bus.faults.schedule(Fault { frame: self.drawn, position, seen_by });
+        self.tally.repeated += 1;
+    }
+
+    fn delay(&mut self, now: Time) {
+        let urgent = Frame::data(URGENT, &[0; 8]).expect("eight bytes");
+        (0..BURST).for_each(|_| self.burst.send(urgent, now));
+        self.tally.delayed += 1;
+    }
+}

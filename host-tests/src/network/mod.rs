@@ -1,0 +1,207 @@
+//! Stations and one master on one bus, in virtual time: every run of a test takes the same course.
+
+mod disturbance;
+mod port;
+mod station;
+
+use std::collections::VecDeque;
+
+use canbus::{Bus, Controller, Event, HostNode, Id, Stamped, StandardId, Time};
+use canopen::{Duration, Frame, Instant};
+
+use crate::sdo::Channel;
+
+pub use disturbance::{Disturbance, Tally};
+pub use port::{Port, from_bus, to_bus};
+pub use station::{Station, Unit};
+
+/// A bit at 1 Mbit/s.
+const BIT: Time = Time::from_micros(1);
+/// How long the master waits for an SDO response.
+const TIME_OUT: Duration = Duration::from_millis(500);
+
+/// What a bus analyser would count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Frames that somebody has received.
+    pub frames: u64,
+    /// Error frames.
+    pub errors: u64,
+}
+
+/// A bus at 1 Mbit/s with stations and a master.
+#[derive(Debug)]
+pub struct Network<U> {
+    bus: Bus,
+    now: Time,
+    /// The stations.
+    pub stations: Vec<Station<U>>,
+    master: HostNode,
+    /// What the master has received and nobody has taken.
+    heard: VecDeque<Stamped>,
+    disturbance: Option<Disturbance>,
+    traffic: Traffic,
+}
+
+impl<U: Unit> Network<U> {
+    /// A bus with these units, all silent until [`start`](Network::start).
+    pub fn new(units: impl IntoIterator<Item = U>) -> Network<U> {
+        Network {
+            bus: Bus::new(),
+            now: Time::ZERO,
+            stations: units.into_iter().map(|unit| Station::new(unit, Port::new(BIT))).collect(),
+            master: HostNode::new(BIT),
+            heard: VecDeque::new(),
+            disturbance: None,
+            traffic: Traffic::default(),
+        }
+    }
+
+    /// A bus on which frames are destroyed, repeated and delayed.
+    #[must_use]
+    pub fn disturbed(mut self, disturbance: Disturbance) -> Network<U> {
+        self.disturbance = Some(disturbance);
+        self
+    }
+
+    /// Power-on, for all stations at once.
+    pub fn start(&mut self) {
+        let now = self.instant();
+        self.stations.iter_mut().for_each(|station| station.start(now));
+    }
+
+    /// The time on the bus.
+    #[must_use]
+    pub fn now(&self) -> Time {
+        self.now
+    }
+
+    fn instant(&self) -> Instant {
+        Instant(self.now.as_micros())
+    }
+
+    /// The counters.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
+    /// What has been done to the frames so far.
+    #[must_use]
+    pub fn tally(&self) -> Tally {
+        self.disturbance.as_ref().map(Disturbance::tally).unwrap_or_default()
+    }
+
+    /// The time in which the bus was not idle.
+    #[must_use]
+    pub fn busy(&self) -> Time {
+        self.bus.busy(self.now)
+    }
+
+    /// Lets the master send a frame.
+    pub fn send(&mut self, frame: &Frame) {
+        self.master.send(to_bus(frame), self.now);
+    }
+
+    /// Lets the master send and waits until the frame has left.
+    ///
+    /// # Panics
+    /// When the bus does not take it within a second.
+    pub fn transmit(&mut self, frame: &Frame) {
+        self.send(frame);
+        let end = self.now + Time::from_millis(1000);
+        while self.master.backlog() > 0 {
+            assert!(self.now < end, "the bus is stuck");
+            self.step(end);
+        }
+    }
+
+    /// The oldest frame that the master has received and nobody has taken.
+    pub fn hear(&mut self) -> Option<Stamped> {
+        self.heard.pop_front()
+    }
+
+    /// As [`hear`](Network::hear), for one identifier. Others stay.
+    pub fn hear_id(&mut self, id: u16) -> Option<Frame> {
+        let id = StandardId::new(id).map(Id::from);
+        let place = self.heard.iter().position(|heard| Some(heard.frame.id()) == id)?;
+        self.heard.remove(place).and_then(|heard| from_bus(&heard.frame))
+    }
+
+    /// Waits for a frame with this identifier, at most so long.
+    pub fn await_id(&mut self, id: u16, span: Duration) -> Option<Frame> {
+        let end = self.now + Time::from_micros(span.0);
+        loop {
+            let frame = self.hear_id(id);
+            if frame.is_some() || self.now >= end {
+                return frame;
+            }
+            self.step(end);
+        }
+    }
+
+    /// Lets time pass.
+    pub fn run(&mut self, span: Duration) {
+        let end = self.now + Time::from_micros(span.0);
+        while self.now < end {
+            self.step(end);
+        }
+    }
+
+    /// Does all that happens now and goes on to the next instant at which something will, at most to `end`.
+    pub fn step(&mut self, end: Time) {
+        let now = self.instant();
+        for station in self.stations.iter_mut().filter(|station| station.due() <= now) {
+            station.run(now);
+            station.port.pump(self.now);
+        }
+        let next = self.step_bus();
+        let due = self.stations.iter().map(Station::due).min().unwrap_or(Instant::NEVER);
+        let due = if due == Instant::NEVER { Time::NEVER } else { Time::from_micros(due.0) };
+        self.now = next.min(due).max(self.now).min(end);
+    }
+
+    fn step_bus(&mut self) -> Time {
+        if let Some(disturbance) = &mut self.disturbance {
+            disturbance.prepare(&mut self.bus, self.stations.len(), self.now);
+        }
+        let ports = self.stations.iter_mut().map(|station| &mut station.port as &mut dyn Controller);
+        let others = [&mut self.master as &mut dyn Controller];
+        let burst =
+            self.disturbance.as_mut().map(|disturbance| &mut disturbance.burst as &mut dyn Controller);
+        let mut participants: Vec<&mut dyn Controller> = ports.chain(others).chain(burst).collect();
+        let traffic = &mut self.traffic;
+        let next = self.bus.step(&mut participants, self.now, &mut |event| match event {
+            Event::Frame { .. } => traffic.frames += 1,
+            Event::Error { .. } => traffic.errors += 1,
+        });
+        self.heard.extend(std::iter::from_fn(|| self.master.receive()));
+        next
+    }
+
+    /// The SDO channel to a server.
+    pub fn server(&mut self, node_id: u8) -> Link<'_, U> {
+        Link { network: self, node_id: node_id.into() }
+    }
+}
+
+/// The way from the master to one SDO server.
+#[derive(Debug)]
+pub struct Link<'a, U> {
+    network: &'a mut Network<U>,
+    node_id: u16,
+}
+
+impl<U: Unit> Channel for Link<'_, U> {
+    fn send(&mut self, request: [u8; 8]) {
+        self.network.transmit(&Frame::new(0x600 + self.node_id, &request).expect("a frame"));
+    }
+
+    fn received(&mut self) -> Option<[u8; 8]> {
+        self.network.hear_id(0x580 + self.node_id)?.data().try_into().ok()
+    }
+
+    fn wait(&mut self) -> Option<[u8; 8]> {
+        self.network.await_id(0x580 + self.node_id, TIME_OUT)?.data().try_into().ok()
+    }
+}

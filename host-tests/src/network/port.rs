@@ -1,0 +1,181 @@
+//! How a station is connected: the firmware's transmit queue, mailboxes that behave as those of bxCAN, a receive queue.
+
+use std::collections::VecDeque;
+
+use bsp::transmit_queue::{Mailboxes, Offer, TransmitQueue};
+use canbus::{Attachment, Confinement, Controller, ErrorReport, ErrorState, Id, StandardId, Time};
+use canopen::{Frame, QueueFull, Transmit};
+
+/// Transmit mailboxes of bxCAN.
+const MAILBOXES: usize = 3;
+
+/// A station's connection to the bus.
+#[derive(Debug)]
+pub struct Port {
+    bit: Time,
+    queue: TransmitQueue,
+    mailboxes: Boxes,
+    /// Since when a mailbox has been waiting.
+    since: Time,
+    inbox: VecDeque<Frame>,
+    confinement: Confinement,
+    /// Frames sent so far.
+    pub sent: u64,
+    /// Frames received so far.
+    pub received: u64,
+}
+
+/// Only a frame that is more urgent than all in the mailboxes is taken, so the most urgent one is the last.
+#[derive(Debug, Default)]
+struct Boxes {
+    frames: Vec<Frame>,
+    on_wire: Option<u16>,
+}
+
+impl Mailboxes for Boxes {
+    fn offer(&mut self, frame: &Frame) -> Offer {
+        if self.frames.last().is_some_and(|other| other.id() <= frame.id()) {
+            return Offer::Refused;
+        }
+        self.frames.push(*frame);
+        if self.frames.len() <= MAILBOXES {
+            return Offer::Taken;
+        }
+        // The least urgent one gives way, but for one that is being sent.
+        let is_sending = self.frames.first().is_some_and(|first| self.on_wire == Some(first.id()));
+        Offer::Replaced(self.frames.remove(usize::from(is_sending)))
+    }
+}
+
+impl Port {
+    /// A port with bits of this length.
+    #[must_use]
+    pub fn new(bit: Time) -> Port {
+        Port {
+            bit,
+            queue: TransmitQueue::new(),
+            mailboxes: Boxes::default(),
+            since: Time::ZERO,
+            inbox: VecDeque::new(),
+            confinement: Confinement::default(),
+            sent: 0,
+            received: 0,
+        }
+    }
+
+    /// The oldest frame received and not taken yet.
+    pub fn receive(&mut self) -> Option<Frame> {
+        self.inbox.pop_front()
+    }
+
+    /// Whether a received frame waits.
+    #[must_use]
+    pub fn has_mail(&self) -> bool {
+        !self.inbox.is_empty()
+    }
+
+    /// Whether a frame waits to be sent.
+    #[must_use]
+    pub fn is_sending(&self) -> bool {
+        !self.mailboxes.frames.is_empty()
+    }
+
+    /// Drops what waits to be sent, as the start of the communication does.
+    pub fn clear(&mut self) {
+        self.queue.clear();
+        let on_wire = self.mailboxes.on_wire;
+        self.mailboxes.frames.retain(|frame| on_wire == Some(frame.id()));
+    }
+
+    /// Moves frames from the queue into the mailboxes.
+    pub fn pump(&mut self, now: Time) {
+        if !self.is_sending() {
+            self.since = now;
+        }
+        self.queue.pump(&mut self.mailboxes);
+    }
+}
+
+impl Transmit for Port {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.queue.send(frame)
+    }
+
+    fn room(&self) -> usize {
+        self.queue.room()
+    }
+}
+
+impl Controller for Port {
+    fn attachment(&mut self, _at: Time) -> Attachment {
+        let bit = self.bit;
+        match self.confinement.state() {
+            ErrorState::Active => Attachment::Active { bit },
+            ErrorState::Passive => Attachment::Passive { bit },
+            ErrorState::BusOff => Attachment::Off,
+        }
+    }
+
+    fn requested(&self) -> Option<Time> {
+        self.is_sending().then_some(self.since)
+    }
+
+    fn pending(&mut self, _at: Time) -> Option<canbus::Frame> {
+        self.mailboxes.frames.last().map(to_bus)
+    }
+
+    fn start_of_frame(&mut self, transmitting: bool, _at: Time) {
+        self.mailboxes.on_wire = self.mailboxes.frames.last().map(Frame::id).filter(|_| transmitting);
+    }
+
+    fn lost(&mut self, _at: Time) {
+        self.mailboxes.on_wire = None;
+    }
+
+    fn sent(&mut self, at: Time) {
+        self.confinement.sent();
+        self.sent += 1;
+        let sent = self.mailboxes.on_wire.take();
+        self.mailboxes.frames.retain(|frame| sent != Some(frame.id()));
+        self.pump(at);
+    }
+
+    fn received(&mut self, frame: &canbus::Frame, _at: Time) {
+        self.confinement.received();
+        self.received += 1;
+        self.inbox.extend(from_bus(frame));
+    }
+
+    fn error(&mut self, report: &ErrorReport, _at: Time) {
+        self.mailboxes.on_wire = None;
+        self.confinement.error(report);
+    }
+
+    fn idle(&mut self, _since: Time) {}
+}
+
+/// The frame as the bus knows it.
+///
+/// # Panics
+/// Never: a CANopen frame is a valid one.
+#[must_use]
+pub fn to_bus(frame: &Frame) -> canbus::Frame {
+    let id = StandardId::new(frame.id()).expect("11 bits");
+    if frame.is_remote() {
+        canbus::Frame::remote(id, u8::try_from(frame.len()).expect("a DLC"))
+    } else {
+        canbus::Frame::data(id, frame.data())
+    }
+    .expect("at most eight bytes")
+}
+
+/// The frame as a node knows it; `None` for an extended identifier, which no filter of a node lets pass.
+#[must_use]
+pub fn from_bus(frame: &canbus::Frame) -> Option<Frame> {
+    let Id::Standard(id) = frame.id() else { return None };
+    if frame.is_remote() {
+        Frame::remote(id.as_raw(), frame.dlc())
+    } else {
+        Frame::new(id.as_raw(), frame.bytes())
+    }
+}

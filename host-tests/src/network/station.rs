@@ -1,0 +1,100 @@
+//! A station: what the firmware's tasks are around a node, in one function.
+
+use canopen::{Frame, Instant, Transmit};
+use node::Request;
+
+use super::port::Port;
+
+/// What a station runs: a node, or a device of a test's own.
+pub trait Unit {
+    /// Boots, or boots again after a reset.
+    fn start(&mut self, now: Instant, out: &mut impl Transmit);
+    /// A frame of FIFO 0.
+    fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit);
+    /// A frame of FIFO 1.
+    fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit);
+    /// Does what is due and gives the instant of the next call.
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant;
+    /// The next thing that only the firmware can do.
+    fn take_request(&mut self) -> Option<Request>;
+    /// Stores what it has asked to be stored.
+    fn store(&mut self, _now: Instant, _out: &mut impl Transmit) {}
+    /// Identifiers for FIFO 0.
+    fn process_ids(&self) -> Vec<u16>;
+    /// Identifiers for FIFO 1.
+    fn service_ids(&self) -> Vec<u16>;
+}
+
+/// A unit, its port and its acceptance filters.
+#[derive(Debug)]
+pub struct Station<U> {
+    /// What it runs.
+    pub unit: U,
+    /// Its connection.
+    pub port: Port,
+    filters: [Vec<u16>; 2],
+    due: Instant,
+}
+
+impl<U: Unit> Station<U> {
+    /// A station that is silent and deaf until it is started.
+    pub(super) fn new(unit: U, port: Port) -> Station<U> {
+        Station { unit, port, filters: [vec![], vec![]], due: Instant::NEVER }
+    }
+
+    /// Power-on.
+    pub(super) fn start(&mut self, now: Instant) {
+        self.unit.start(now, &mut self.port);
+        self.poll(now);
+    }
+
+    /// When it wants to run, if nothing arrives before.
+    pub(super) fn due(&self) -> Instant {
+        if self.port.has_mail() { Instant(0) } else { self.due }
+    }
+
+    /// Takes what has arrived and does what is due.
+    pub(super) fn run(&mut self, now: Instant) {
+        while let Some(frame) = self.port.receive() {
+            self.filter(&frame, now);
+        }
+        if now >= self.due {
+            self.poll(now);
+        }
+    }
+
+    fn filter(&mut self, frame: &Frame, now: Instant) {
+        let [process, services] = [0, 1].map(|fifo: usize| self.filters[fifo].contains(&frame.id()));
+        if process {
+            self.unit.on_process_frame(frame, now, &mut self.port);
+        }
+        if services {
+            self.unit.on_service_frame(frame, now, &mut self.port);
+        }
+        if process || services {
+            self.poll(now);
+        }
+    }
+
+    fn poll(&mut self, now: Instant) {
+        self.fulfil(now);
+        // Whoever is due is so at least a microsecond later: a deadline that has passed must not stop the time.
+        self.due = self.unit.poll(now, &mut self.port).max(Instant(now.0 + 1));
+        self.fulfil(now);
+    }
+
+    fn fulfil(&mut self, now: Instant) {
+        while let Some(request) = self.unit.take_request() {
+            match request {
+                Request::ResetNode | Request::ResetCommunication => {
+                    self.port.clear();
+                    self.unit.start(now, &mut self.port);
+                    self.due = now;
+                }
+                Request::Filters => self.filters = [self.unit.process_ids(), self.unit.service_ids()],
+                Request::Store => self.unit.store(now, &mut self.port),
+                other => panic!("{other:?}: the network has one bit rate and no bootloader"),
+            }
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! The devices that the project builds, one for each personality.
+
+use canopen::dictionary::Object as Row;
+use node::{Personality, pressure};
+
+/// A device: what its data sheet is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Device {
+    /// File name of its data sheet.
+    pub file_name: &'static str,
+    /// What it is, in one line.
+    pub description: &'static str,
+    /// What the node is told to be.
+    pub personality: Personality,
+    /// Its dictionary.
+    pub rows: &'static [Row],
+}
+
+/// All of them.
+pub static DEVICES: [Device; 1] = [Device {
+    file_name: "pressure.eds",
+    description: "Pressure and temperature transmitter, CiA 404",
+    personality: Personality::Pressure,
+    rows: &pressure::OBJECTS,
+}];

@@ -1,0 +1,51 @@
+//! What can be wrong with a data sheet.
+
+use thiserror::Error;
+
+/// What is wrong, and where.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}{problem}", self.place())]
+pub struct Error {
+    /// The section, in lower case; empty where the text is no INI file at all.
+    pub section: String,
+    /// The key; empty where the whole section is meant.
+    pub key: &'static str,
+    /// The line, from 1, where it is known.
+    pub line: Option<usize>,
+    /// What is wrong.
+    pub problem: Problem,
+}
+
+/// What is wrong.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum Problem {
+    /// The text is not made of sections and keys.
+    #[error("{0}")]
+    Syntax(String),
+    /// A key that must be there is not.
+    #[error("is missing")]
+    Missing,
+    /// A value that is not of its type.
+    #[error("\"{text}\" is not {expected}")]
+    Value {
+        /// The value.
+        text: String,
+        /// What it should be.
+        expected: String,
+    },
+    /// A sub-index whose index has no section.
+    #[error("the object has no section of its own")]
+    Orphan,
+}
+
+impl Error {
+    fn place(&self) -> String {
+        let Error { section, key, line, .. } = self;
+        let line = line.map(|line| format!("line {line}: ")).unwrap_or_default();
+        match (section.is_empty(), key.is_empty()) {
+            (true, _) => line,
+            (false, true) => format!("{line}[{section}]: "),
+            (false, false) => format!("{line}[{section}] {key}: "),
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Finding an entry by what a person types.
+
+use canopen::sdo::Multiplexer;
+use thiserror::Error;
+
+use crate::{Eds, Entry};
+
+/// Why nothing, or not one thing, was found.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum LookupError {
+    /// No entry has this address.
+    #[error("the data sheet has no object {:04X}h:{}", .0.index, .0.sub)]
+    Address(Multiplexer),
+    /// No entry has this name.
+    #[error("the data sheet has no object called \"{name}\"{}", list(" (it has ", similar, ")"))]
+    Name {
+        /// What was looked for.
+        name: String,
+        /// Names that contain it.
+        similar: Vec<String>,
+    },
+    /// Several entries have this name.
+    #[error("\"{name}\" is the name of several objects{}", list(": ", candidates, ""))]
+    Ambiguous {
+        /// What was looked for.
+        name: String,
+        /// All that have it.
+        candidates: Vec<String>,
+    },
+}
+
+/// How many names an error lists.
+const LISTED: usize = 5;
+
+fn list(before: &str, names: &[String], after: &str) -> String {
+    if names.is_empty() { String::new() } else { format!("{before}{}{after}", names.join(", ")) }
+}
+
+impl Eds {
+    /// The entry that a person means: an [`address`], `Error register`, `Identity/Vendor-ID`, or only `Vendor-ID`
+    /// where no other entry is called so. The name of a record or an array is its sub-index 0. Case does not matter.
+    ///
+    /// # Errors
+    /// When there is none, or more than one.
+    pub fn find(&self, query: &str) -> Result<&Entry, LookupError> {
+        let name = query.trim().to_lowercase();
+        let by_path =
+            self.named(|entry| self.path(entry).to_lowercase() == name || self.is_head(entry, &name));
+        let by_name = || self.named(|entry| entry.name.to_lowercase() == name);
+        let found = if by_path.is_empty() { by_name() } else { by_path };
+        match (&found[..], address(query)) {
+            ([entry], _) => Ok(entry),
+            ([], Some(at)) => self.get(at.index, at.sub).ok_or(LookupError::Address(at)),
+            ([], None) => Err(LookupError::Name { name: query.into(), similar: self.similar(&name) }),
+            _ => Err(LookupError::Ambiguous { name: query.into(), candidates: self.addresses(&found) }),
+        }
+    }
+
+    /// The name by which [`Eds::find`] finds an entry: `Error register`, `Identity/Vendor-ID`.
+    #[must_use]
+    pub fn path(&self, entry: &Entry) -> String {
+        match self.objects.get(&entry.index) {
+            Some(object) if object.object_type.has_subs() => format!("{}/{}", object.name, entry.name),
+            _ => entry.name.clone(),
+        }
+    }
+
+    fn named(&self, is_meant: impl Fn(&Entry) -> bool) -> Vec<&Entry> {
+        self.entries().filter(|entry| is_meant(entry)).collect()
+    }
+
+    /// Whether it is sub-index 0 of an object of this name.
+    fn is_head(&self, entry: &Entry, name: &str) -> bool {
+        let object = self.objects.get(&entry.index);
+        entry.sub == 0 && object.is_some_and(|object| object.name.to_lowercase() == name)
+    }
+
+    fn similar(&self, name: &str) -> Vec<String> {
+        let paths = self.entries().map(|entry| self.path(entry));
+        paths.filter(|path| path.to_lowercase().contains(name)).take(LISTED).collect()
+    }
+
+    fn addresses(&self, entries: &[&Entry]) -> Vec<String> {
+        let line = |entry: &&Entry| format!("{:04X}h:{} {}", entry.index, entry.sub, self.path(entry));
+        entries.iter().take(LISTED).map(line).collect()
+    }
+}
+
+/// An index and a sub-index: `1018`, `0x1018`, `1018h`, each with `:1` (decimal, or `:0x1`) or `sub1` (hexadecimal, as
+/// in a data sheet). Without sub-index it is 0.
+#[must_use]
+pub fn address(text: &str) -> Option<Multiplexer> {
+    let text = text.trim().to_ascii_lowercase();
+    let digits = text.strip_prefix("0x").unwrap_or(&text);
+    let (index, rest) = digits.split_at_checked(4)?;
+    let rest = rest.strip_prefix('h').unwrap_or(rest);
+    let sub = match (rest.strip_prefix("sub"), rest.strip_prefix(':')) {
+        (Some(sub), _) => hex(sub)?,
+        (_, Some(sub)) => sub.strip_prefix("0x").map_or_else(|| decimal(sub), hex)?,
+        _ if rest.is_empty() => 0,
+        _ => return None,
+    };
+    Some(Multiplexer { index: hex(index)?, sub: u8::try_from(sub).ok()? })
+}
+
+fn hex(digits: &str) -> Option<u16> {
+    let is_plain = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if is_plain { u16::from_str_radix(digits, 16).ok() } else { None }
+}
+
+fn decimal(digits: &str) -> Option<u16> {
+    let is_plain = digits.bytes().all(|byte| byte.is_ascii_digit());
+    if is_plain { digits.parse().ok() } else { None }
+}

@@ -1,0 +1,119 @@
+//! The text as sections of keys, and where in the text they are.
+
+use configparser::ini::{Ini as Parser, IniDefault};
+
+use crate::value::number;
+use crate::{Error, Problem};
+
+/// A parsed text. Names of sections and keys do not depend on case.
+pub(crate) struct Ini<'a> {
+    text: &'a str,
+    parser: Parser,
+}
+
+impl<'a> Ini<'a> {
+    pub(crate) fn parse(text: &'a str) -> Result<Ini<'a>, Error> {
+        let text = text.trim_start_matches('\u{FEFF}');
+        let mut parser = Parser::new_from_defaults(syntax());
+        match parser.read(text.into()) {
+            Ok(_) => Ok(Ini { text, parser }),
+            Err(message) => {
+                Err(Error { section: String::new(), key: "", line: None, problem: Problem::Syntax(message) })
+            }
+        }
+    }
+
+    /// All sections, in the order of the file.
+    pub(crate) fn sections(&self) -> impl Iterator<Item = Section<'_>> {
+        self.parser.get_map_ref().keys().map(|name| Section { ini: self, name })
+    }
+
+    /// A section by its name in lower case.
+    pub(crate) fn section(&self, name: &str) -> Option<Section<'_>> {
+        let (name, _) = self.parser.get_map_ref().get_key_value(name)?;
+        Some(Section { ini: self, name })
+    }
+
+    /// The line of a key, else that of its section. What is there twice counts the last time.
+    fn line(&self, section: &str, key: &str) -> Option<usize> {
+        let (mut inside, mut header, mut value) = (false, None, None);
+        for (number, line) in (1..).zip(self.text.lines()) {
+            let line = line.trim().to_lowercase();
+            if let Some(rest) = line.strip_prefix('[') {
+                inside = rest.rsplit_once(']').is_some_and(|(name, _)| name.trim() == section);
+                header = if inside { Some(number) } else { header };
+            } else if inside && line.split_once('=').is_some_and(|(name, _)| name.trim() == key) {
+                value = Some(number);
+            }
+        }
+        value.or(header)
+    }
+}
+
+/// A comment is a line of its own; what follows a value is for [`without_comment`].
+fn syntax() -> IniDefault {
+    let mut syntax = IniDefault::default();
+    syntax.comment_symbols = vec![';'];
+    syntax.inline_comment_symbols = Some(Vec::new());
+    syntax.delimiters = vec!['='];
+    syntax
+}
+
+/// One section.
+#[derive(Clone, Copy)]
+pub(crate) struct Section<'a> {
+    ini: &'a Ini<'a>,
+    name: &'a str,
+}
+
+impl<'a> Section<'a> {
+    /// Its name, in lower case.
+    pub(crate) fn name(self) -> &'a str {
+        self.name
+    }
+
+    /// All keys, in lower case, that have a value.
+    pub(crate) fn keys(self) -> impl Iterator<Item = (&'a str, &'a str)> {
+        let keys = self.ini.parser.get_map_ref().get(self.name).into_iter().flatten();
+        keys.filter_map(|(key, value)| Some((key.as_str(), without_comment(value.as_deref()?)?)))
+    }
+
+    /// The value of a key; an empty one is none.
+    pub(crate) fn get(self, key: &str) -> Option<&'a str> {
+        let keys = self.ini.parser.get_map_ref().get(self.name)?;
+        without_comment(keys.get(&key.to_ascii_lowercase())?.as_deref()?)
+    }
+
+    /// The value of a key that must be there.
+    pub(crate) fn required(self, key: &'static str) -> Result<&'a str, Error> {
+        self.get(key).ok_or_else(|| self.error(key, Problem::Missing))
+    }
+
+    /// The number of a key, 0 where there is none.
+    pub(crate) fn number<T: TryFrom<i128> + Default>(self, key: &'static str) -> Result<T, Error> {
+        let Some(text) = self.get(key) else { return Ok(T::default()) };
+        let value = number(text).and_then(|value| T::try_from(value).ok());
+        value.ok_or_else(|| {
+            self.wrong(key, text, format!("a number of at most {} bits", 8 * std::mem::size_of::<T>()))
+        })
+    }
+
+    /// A key whose value is not what it should be.
+    pub(crate) fn wrong(self, key: &'static str, text: &str, expected: impl Into<String>) -> Error {
+        self.error(key, Problem::Value { text: text.into(), expected: expected.into() })
+    }
+
+    /// Something wrong with a key, or with the section where the key is empty.
+    pub(crate) fn error(self, key: &'static str, problem: Problem) -> Error {
+        let line = self.ini.line(self.name, &key.to_ascii_lowercase());
+        Error { section: self.name.into(), key, line, problem }
+    }
+}
+
+/// Cuts off what vendors write after a value, `0 ; off`. A semicolon inside a word is part of the word.
+fn without_comment(value: &str) -> Option<&str> {
+    let at =
+        value.match_indices(';').map(|(at, _)| at).find(|&at| value[..at].ends_with([' ', '\t']) || at == 0);
+    let value = value[..at.unwrap_or(value.len())].trim();
+    (!value.is_empty()).then_some(value)
+}

@@ -1,0 +1,28 @@
+//! Electronic data sheets (CiA 306).
+//!
+//! [`Eds`] is a data sheet as a value. [`Device::eds`] makes one from the dictionary table of a personality and
+//! [`Device::sheet`] its text; [`Eds::parse`] reads the text of any vendor. [`files`] is everything the project
+//! keeps in its tree of this: the data sheets and the reference page, written by `cargo xtask eds`.
+#![forbid(unsafe_code)]
+
+mod compact;
+mod device;
+mod error;
+mod find;
+mod generated;
+mod ini;
+mod model;
+mod page;
+mod read;
+mod rows;
+mod types;
+mod value;
+mod write;
+
+pub use device::{DEVICES, Device};
+pub use error::{Error, Problem};
+pub use find::{LookupError, address};
+pub use generated::{File, files};
+pub use model::{DeviceInfo, Eds, Entry, Object};
+pub use types::{Access, Class, DataType, ObjectType};
+pub use value::{Formula, Value};

@@ -1,0 +1,152 @@
+//! From the dictionary table of a device to the objects of its data sheet.
+
+use std::collections::BTreeMap;
+
+use canopen::dictionary::{Access as RowAccess, DefaultValue, Mapping, Object as Row};
+use node::{REVISION, VENDOR_ID};
+
+use crate::read::BIT_RATES;
+use crate::{Access, DataType, Device, DeviceInfo, Eds, Entry, Formula, Object, ObjectType, Value};
+
+/// Vendor and order code: CiA has assigned no vendor-ID to the project, and an entry must not be empty.
+const NONE: &str = "none";
+
+/// Every data type of the dictionary is made of whole bytes.
+const GRANULARITY: u8 = 8;
+
+impl Device {
+    /// The data sheet as a value.
+    #[must_use]
+    pub fn eds(&self) -> Eds {
+        let objects = self.objects().map(|rows| self.object(rows)).map(|object| (object.index, object));
+        Eds { device: self.info(), objects: objects.collect() }
+    }
+
+    /// The rows of each object.
+    pub(crate) fn objects(&self) -> impl Iterator<Item = &'static [Row]> {
+        self.rows.chunk_by(|row, next| row.index == next.index)
+    }
+
+    fn info(&self) -> DeviceInfo {
+        let count = |first: u16| self.objects().filter(|rows| rows[0].index & 0xFE00 == first).count();
+        DeviceInfo {
+            vendor_name: NONE.into(),
+            vendor_number: VENDOR_ID,
+            product_name: self.product_name().into(),
+            product_number: self.personality.product_code(),
+            revision_number: REVISION,
+            order_code: NONE.into(),
+            bit_rates: BIT_RATES.iter().map(|(rate, _)| *rate).collect(),
+            granularity: GRANULARITY,
+            group_messaging: self.rows.iter().any(is_mpdo),
+            rpdos: u16::try_from(count(0x1400)).unwrap_or(u16::MAX),
+            tpdos: u16::try_from(count(0x1800)).unwrap_or(u16::MAX),
+            lss: true,
+        }
+    }
+
+    /// Object 1008h.
+    fn product_name(&self) -> &'static str {
+        match self.rows.iter().find(|row| row.index == 0x1008).map(|row| row.default) {
+            Some(DefaultValue::Text(name)) => name,
+            _ => self.description,
+        }
+    }
+
+    fn object(&self, rows: &[Row]) -> Object {
+        let object_type = object_type(rows);
+        let entry = |row: &Row| (row.sub, self.entry(row, entry_name(row, rows, object_type)));
+        let entries: BTreeMap<u8, Entry> = rows.iter().map(entry).collect();
+        Object { index: rows[0].index, name: rows[0].name.into(), object_type, entries }
+    }
+
+    fn entry(&self, row: &Row, name: String) -> Entry {
+        let constant = |value: i64| Formula::Constant(Value::Integer(value.into()));
+        Entry {
+            index: row.index,
+            sub: row.sub,
+            name,
+            data_type: DataType(row.kind.code()),
+            access: access(row),
+            default: self.default(row),
+            low: row.limits.map(|(low, _)| constant(low)),
+            high: row.limits.map(|(_, high)| constant(high)),
+            mappable: row.mapping != Mapping::No,
+            unit: row.unit.into(),
+        }
+    }
+
+    /// The default of a row. The node itself fills in the identity, which is not in the table; the serial number is
+    /// another one in each device.
+    fn default(&self, row: &Row) -> Option<Formula> {
+        let number = |value: u32| Some(Formula::Constant(Value::Integer(value.into())));
+        match (row.index, row.sub) {
+            (0x1018, 1) => number(VENDOR_ID),
+            (0x1018, 2) => number(self.personality.product_code()),
+            (0x1018, 3) => number(REVISION),
+            (0x1018, 4) => None,
+            _ => default(row.default),
+        }
+    }
+}
+
+/// A mapping parameter whose number of objects stands for a multiplexed PDO (CiA 301, 7.5.2.36 and 7.5.2.38).
+fn is_mpdo(row: &Row) -> bool {
+    let is_count = row.sub == 0 && matches!(row.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF);
+    is_count && matches!(row.default, DefaultValue::Integer(254..=255))
+}
+
+/// A string that is empty in the table is filled in by the node, too.
+fn default(value: DefaultValue) -> Option<Formula> {
+    Some(match value {
+        DefaultValue::Integer(value) => Formula::Constant(Value::Integer(value.into())),
+        DefaultValue::Real(value) => Formula::Constant(Value::Real(value.into())),
+        DefaultValue::NodeId(base) => Formula::NodeId(base.into()),
+        DefaultValue::Text("") | DefaultValue::None => return None,
+        DefaultValue::Text(text) => Formula::Constant(Value::Text(text.into())),
+    })
+}
+
+/// A parameter that a PDO carries has its direction in the access type, as CiA 306 has no other place for it.
+fn access(row: &Row) -> Access {
+    match (row.access, row.mapping) {
+        (RowAccess::Const, _) => Access::Const,
+        (RowAccess::ReadOnly, _) => Access::ReadOnly,
+        (RowAccess::WriteOnly, _) => Access::WriteOnly,
+        (RowAccess::ReadWrite, Mapping::No) => Access::ReadWrite,
+        (RowAccess::ReadWrite, Mapping::Tpdo) => Access::ReadWriteInput,
+        (RowAccess::ReadWrite, Mapping::Rpdo) => Access::ReadWriteOutput,
+    }
+}
+
+/// An object of one row is a variable or a domain. Of several, it is an array when all rows beyond sub-index 0 have
+/// the same type, unless CiA 301 says that it is a record.
+pub(crate) fn object_type(rows: &[Row]) -> ObjectType {
+    let type_of = |row: &Row| DataType(row.kind.code());
+    match rows {
+        [row] if type_of(row) == DataType::DOMAIN => ObjectType::Domain,
+        [_] => ObjectType::Var,
+        [head, ..] if is_record(head.index) => ObjectType::Record,
+        [_, subs @ ..] if subs.windows(2).all(|pair| type_of(&pair[0]) == type_of(&pair[1])) => {
+            ObjectType::Array
+        }
+        _ => ObjectType::Record,
+    }
+}
+
+/// The records of CiA 301 (7.5.2): identity, OS command, SDO and PDO parameters.
+fn is_record(index: u16) -> bool {
+    matches!(index, 0x1018 | 0x1023 | 0x1025 | 0x1200..=0x12FF | 0x1400..=0x1BFF)
+}
+
+/// The table gives an object and its sub-index 0 one name. Sub-index 0 that can be written counts what is in use
+/// (1003h, 1600h, 1A00h), any other is fixed. Sub-indices of the same name are told apart by their number.
+fn entry_name(row: &Row, rows: &[Row], object_type: ObjectType) -> String {
+    let is_repeated = rows.iter().filter(|other| other.sub != 0 && other.name == row.name).count() > 1;
+    match row.sub {
+        0 if object_type.has_subs() && row.access.is_writable() => "Number of entries".into(),
+        0 if object_type.has_subs() => "Highest sub-index supported".into(),
+        sub if is_repeated => format!("{} {sub}", row.name),
+        _ => row.name.into(),
+    }
+}

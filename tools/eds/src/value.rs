@@ -1,0 +1,198 @@
+//! Values as a data sheet writes them: numbers, text, and formulas with the node-ID.
+
+use canopen::NodeId;
+
+use crate::{Class, DataType};
+
+/// A value of any data type.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Of an integer type or BOOLEAN.
+    Integer(i128),
+    /// Of REAL32 or REAL64.
+    Real(f64),
+    /// Of any other type, as the file writes it.
+    Text(String),
+}
+
+/// A value that may count from the node-ID (CiA 306, `$NODEID`).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Formula {
+    /// The same for every node-ID.
+    Constant(Value),
+    /// This plus the node-ID.
+    NodeId(i128),
+}
+
+impl Formula {
+    /// The value for a node.
+    #[must_use]
+    pub fn evaluate(&self, node_id: NodeId) -> Value {
+        match self {
+            Formula::Constant(value) => value.clone(),
+            Formula::NodeId(base) => Value::Integer(base.saturating_add(node_id.get().into())),
+        }
+    }
+
+    /// Reads a value of a type; `None` for what is no such value.
+    pub(crate) fn parse(text: &str, data_type: DataType) -> Option<Formula> {
+        match data_type.class() {
+            Class::Signed(bits) => integer(text, |value| signed(value, bits)),
+            Class::Unsigned(bits) => integer(text, |value| unsigned(value, bits)),
+            Class::Real(bits) => real(text, bits).map(|value| Formula::Constant(Value::Real(value))),
+            Class::Text | Class::Bytes => Some(Formula::Constant(Value::Text(text.into()))),
+        }
+    }
+
+    /// The text of a value of a type. A real number has a point: python-canopen and the CANopenNode editor read it
+    /// so, and Lely, which wants the bits, refuses it instead of taking `10` for them.
+    pub(crate) fn text(&self, data_type: DataType) -> String {
+        match (self, data_type.class()) {
+            (Formula::NodeId(base), _) => format!("$NODEID+0x{base:X}"),
+            (Formula::Constant(Value::Text(text)), _) => text.clone(),
+            (Formula::Constant(Value::Real(value)), Class::Real(32)) => format!("{:?}", *value as f32),
+            (Formula::Constant(Value::Real(value)), _) => format!("{value:?}"),
+            // Identifiers, mapped objects and units are read digit by digit, short numbers as a whole.
+            (Formula::Constant(Value::Integer(value)), Class::Unsigned(bits @ 32..)) => {
+                format!("0x{value:0width$X}", width = usize::from(bits / 4))
+            }
+            (Formula::Constant(Value::Integer(value)), _) => value.to_string(),
+        }
+    }
+}
+
+/// A sum of numbers, with `$NODEID` at most once, in any order: CiA 306 puts it first, vendors do not.
+fn integer(text: &str, fit: impl Fn(i128) -> Option<i128>) -> Option<Formula> {
+    let (mut sum, mut is_relative) = (0_i128, false);
+    for term in text.split('+').map(str::trim) {
+        if !term.eq_ignore_ascii_case("$NODEID") {
+            sum = sum.checked_add(number(term)?)?;
+        } else if std::mem::replace(&mut is_relative, true) {
+            return None;
+        }
+    }
+    let sum = fit(sum)?;
+    Some(if is_relative { Formula::NodeId(sum) } else { Formula::Constant(Value::Integer(sum)) })
+}
+
+/// A number as CiA 306 writes it: hexadecimal after `0x`, octal after `0`, else decimal.
+pub(crate) fn number(text: &str) -> Option<i128> {
+    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));
+    let lower = digits.to_ascii_lowercase();
+    let (digits, radix) = match lower.strip_prefix("0x") {
+        Some(digits) => (digits, 16),
+        None if lower.len() > 1 && lower.starts_with('0') => (lower.as_str(), 8),
+        None => (lower.as_str(), 10),
+    };
+    // `from_str_radix` takes a sign of its own.
+    let is_plain = digits.bytes().all(|byte| byte.is_ascii_alphanumeric());
+    let value = if is_plain { i128::from_str_radix(digits, radix).ok()? } else { return None };
+    Some(sign * value)
+}
+
+/// Vendors write negative numbers as what they look like in memory, too.
+fn signed(value: i128, bits: u8) -> Option<i128> {
+    let half = 1_i128 << (bits - 1);
+    match value {
+        _ if value >= 2 * half || value < -half => None,
+        _ if value >= half => Some(value - 2 * half),
+        _ => Some(value),
+    }
+}
+
+/// Vendors write the largest number as -1, too.
+fn unsigned(value: i128, bits: u8) -> Option<i128> {
+    let end = 1_i128 << bits;
+    match value {
+        _ if value >= end || value < -(end / 2) => None,
+        _ if value < 0 => Some(value + end),
+        _ => Some(value),
+    }
+}
+
+/// A number with a point, or after `0x` its bits.
+fn real(text: &str, bits: u8) -> Option<f64> {
+    if !text.to_ascii_lowercase().starts_with("0x") {
+        // Each width is rounded once.
+        return if bits == 32 { text.parse::<f32>().ok().map(f64::from) } else { text.parse().ok() };
+    }
+    let value = number(text)?;
+    match bits {
+        32 => u32::try_from(value).ok().map(|bits| f32::from_bits(bits).into()),
+        _ => u64::try_from(value).ok().map(f64::from_bits),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNSIGNED32: DataType = DataType(7);
+    const INTEGER8: DataType = DataType(2);
+    const REAL32: DataType = DataType(8);
+
+    fn constant(value: i128) -> Option<Formula> {
+        Some(Formula::Constant(Value::Integer(value)))
+    }
+
+    #[test]
+    fn a_formula_counts_from_the_node_id_in_every_spelling() {
+        for text in
+            ["$NODEID+0x180", "0x180+$NODEID", " $nodeid + 0x180", "384+$NodeId", "0x100+$NODEID+0x80"]
+        {
+            let formula = Formula::parse(text, UNSIGNED32).expect(text);
+            assert_eq!(formula.evaluate(NodeId::new(5).unwrap()), Value::Integer(0x185), "{text}");
+        }
+        assert_eq!(Formula::parse("$NODEID", UNSIGNED32), Some(Formula::NodeId(0)));
+        for text in ["$NODEID+", "$NODEID+$NODEID", "$NODE+1", "0x180-$NODEID", "", "+"] {
+            assert_eq!(Formula::parse(text, UNSIGNED32), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_hexadecimal_octal_or_decimal() {
+        for (text, value) in [("0x1f", 31), ("0X1F", 31), ("017", 15), ("17", 17), ("0", 0), ("-5", -5)] {
+            assert_eq!(number(text), Some(value), "{text}");
+        }
+        for text in ["", "-", "0x", "08", "--1", "1 2", "0x-1", "0x+1", "1.5", "ff"] {
+            assert_eq!(number(text), None, "{text}");
+        }
+        assert_eq!(number(&format!("0x{}", "f".repeat(40))), None);
+    }
+
+    #[test]
+    fn an_integer_fits_its_type() {
+        for (text, data_type, value) in
+            [("0xFF", INTEGER8, -1), ("-128", INTEGER8, -128), ("-1", UNSIGNED32, 0xFFFF_FFFF)]
+        {
+            assert_eq!(Formula::parse(text, data_type), constant(value), "{text}");
+        }
+        for (text, data_type) in [("256", INTEGER8), ("-129", INTEGER8), ("0x100000000", UNSIGNED32)] {
+            assert_eq!(Formula::parse(text, data_type), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_real_is_a_number_or_its_bits() {
+        for (text, value) in
+            [("0.1", f64::from(0.1_f32)), ("-40", -40.0), ("1e3", 1000.0), ("0x3F800000", 1.0)]
+        {
+            assert_eq!(Formula::parse(text, REAL32), Some(Formula::Constant(Value::Real(value))), "{text}");
+        }
+        assert_eq!(Formula::parse("0,5", REAL32), None);
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        for (text, data_type) in [
+            ("$NODEID+0x180", UNSIGNED32),
+            ("0x004E0000", UNSIGNED32),
+            ("0x0000000000000001", DataType(0x1B)),
+            ("-7", INTEGER8),
+            ("0.1", REAL32),
+            ("1e38", REAL32),
+        ] {
+            assert_eq!(Formula::parse(text, data_type).unwrap().text(data_type), text);
+        }
+    }
+}

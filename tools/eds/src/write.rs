@@ -1,0 +1,173 @@
+//! From [`Eds`] to text (CiA 306), the same on every run.
+
+use std::fmt::{self, Display, Write};
+
+use node::REVISION;
+
+use crate::read::BIT_RATES;
+use crate::{Device, DeviceInfo, Eds, Entry, Object};
+
+/// Day of the release, month first as CiA 306 asks. A constant, so that every run writes the same; it moves with `REVISION`.
+const RELEASE_DATE: &str = "11-21-2026";
+const RELEASE_TIME: &str = "12:00AM";
+const AUTHOR: &str = "cargo xtask eds";
+
+const COMMENTS: [&str; 2] = [
+    "Generated from the dictionary table of the firmware by cargo xtask eds. Do not edit.",
+    "The comment above a section is the physical unit; an index there is the object that selects the unit.",
+];
+
+/// What an RPDO skips: the integer types (CiA 301, 7.4.7.1). BOOLEAN is no whole byte.
+const DUMMIES: [(&str, u8); 7] = [
+    ("Dummy0001", 0),
+    ("Dummy0002", 1),
+    ("Dummy0003", 1),
+    ("Dummy0004", 1),
+    ("Dummy0005", 1),
+    ("Dummy0006", 1),
+    ("Dummy0007", 1),
+];
+
+impl Device {
+    /// The text of the data sheet.
+    #[must_use]
+    pub fn sheet(&self) -> String {
+        let mut text = String::new();
+        // A string takes everything.
+        let _ = self.write(&mut Sections { out: &mut text });
+        text
+    }
+
+    fn write(&self, out: &mut Sections) -> fmt::Result {
+        let eds = self.eds();
+        self.file_info(out)?;
+        device_info(&eds.device, out)?;
+        out.section("DummyUsage", "")?;
+        DUMMIES.into_iter().try_for_each(|(key, used)| out.key(key, used))?;
+        comments(out)?;
+        eds.objects("MandatoryObjects", is_mandatory, out)?;
+        eds.objects("OptionalObjects", |index| !is_mandatory(index) && !is_manufacturer(index), out)?;
+        eds.objects("ManufacturerObjects", is_manufacturer, out)
+    }
+
+    fn file_info(&self, out: &mut Sections) -> fmt::Result {
+        out.section("FileInfo", "")?;
+        out.key("FileName", self.file_name)?;
+        out.key("FileVersion", REVISION >> 16)?;
+        out.key("FileRevision", REVISION & 0xFFFF)?;
+        out.key("EDSVersion", "4.0")?;
+        out.key("Description", self.description)?;
+        out.key("CreationTime", RELEASE_TIME)?;
+        out.key("CreationDate", RELEASE_DATE)?;
+        out.key("CreatedBy", AUTHOR)?;
+        out.key("ModificationTime", RELEASE_TIME)?;
+        out.key("ModificationDate", RELEASE_DATE)?;
+        out.key("ModifiedBy", AUTHOR)
+    }
+}
+
+fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Result {
+    out.section("DeviceInfo", "")?;
+    out.key("VendorName", &device.vendor_name)?;
+    out.key("VendorNumber", hex32(device.vendor_number))?;
+    out.key("ProductName", &device.product_name)?;
+    out.key("ProductNumber", hex32(device.product_number))?;
+    out.key("RevisionNumber", hex32(device.revision_number))?;
+    out.key("OrderCode", &device.order_code)?;
+    for (rate, key) in BIT_RATES {
+        out.key(key, u8::from(device.bit_rates.contains(&rate)))?;
+    }
+    out.key("SimpleBootUpMaster", 0)?;
+    out.key("SimpleBootUpSlave", 1)?;
+    out.key("Granularity", device.granularity)?;
+    out.key("DynamicChannelsSupported", 0)?;
+    out.key("GroupMessaging", u8::from(device.group_messaging))?;
+    out.key("NrOfRXPDO", device.rpdos)?;
+    out.key("NrOfTXPDO", device.tpdos)?;
+    out.key("LSS_Supported", u8::from(device.lss))
+}
+
+fn comments(out: &mut Sections) -> fmt::Result {
+    out.section("Comments", "")?;
+    out.key("Lines", COMMENTS.len())?;
+    (1..).zip(COMMENTS).try_for_each(|(i, line)| out.key(&format!("Line{i}"), line))
+}
+
+/// What CiA 301 asks of every device.
+fn is_mandatory(index: u16) -> bool {
+    matches!(index, 0x1000 | 0x1001 | 0x1018)
+}
+
+fn is_manufacturer(index: u16) -> bool {
+    (0x2000..0x6000).contains(&index)
+}
+
+fn hex32(value: u32) -> String {
+    format!("0x{value:08X}")
+}
+
+impl Eds {
+    /// A list of objects, then each of them.
+    fn objects(&self, list: &str, belongs: impl Fn(u16) -> bool, out: &mut Sections) -> fmt::Result {
+        let objects: Vec<&Object> = self.objects.values().filter(|object| belongs(object.index)).collect();
+        out.section(list, "")?;
+        out.key("SupportedObjects", objects.len())?;
+        for (i, object) in (1..).zip(&objects) {
+            out.key(&format!("{i}"), format_args!("0x{:04X}", object.index))?;
+        }
+        objects.into_iter().try_for_each(|object| write_object(object, out))
+    }
+}
+
+fn write_object(object: &Object, out: &mut Sections) -> fmt::Result {
+    let section = format!("{:04X}", object.index);
+    if !object.object_type.has_subs() {
+        return object.entries.values().try_for_each(|entry| write_entry(entry, &section, out));
+    }
+    out.section(&section, "")?;
+    out.key("ParameterName", &object.name)?;
+    out.key("ObjectType", format_args!("0x{:X}", object.object_type.code()))?;
+    out.key("SubNumber", object.entries.len())?;
+    object
+        .entries
+        .values()
+        .try_for_each(|entry| write_entry(entry, &format!("{section}sub{:X}", entry.sub), out))
+}
+
+fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result {
+    out.section(section, &entry.unit)?;
+    out.key("ParameterName", &entry.name)?;
+    out.key("ObjectType", format_args!("0x{:X}", entry.object_type().code()))?;
+    out.key("DataType", format_args!("0x{:04X}", entry.data_type.0))?;
+    out.key("AccessType", entry.access.text())?;
+    for (key, value) in
+        [("DefaultValue", &entry.default), ("LowLimit", &entry.low), ("HighLimit", &entry.high)]
+    {
+        if let Some(value) = value {
+            out.key(key, value.text(entry.data_type))?;
+        }
+    }
+    out.key("PDOMapping", u8::from(entry.mappable))
+}
+
+/// Sections of keys, with the line ends that CiA 306 asks for.
+struct Sections<'a> {
+    out: &'a mut String,
+}
+
+impl Sections<'_> {
+    /// Begins a section. The unit stands above it: there every reader takes a comment.
+    fn section(&mut self, name: &str, unit: &str) -> fmt::Result {
+        if !self.out.is_empty() {
+            self.out.write_str("\r\n")?;
+        }
+        if !unit.is_empty() {
+            write!(self.out, "; Unit: {unit}\r\n")?;
+        }
+        write!(self.out, "[{name}]\r\n")
+    }
+
+    fn key(&mut self, key: &str, value: impl Display) -> fmt::Result {
+        write!(self.out, "{key}={value}\r\n")
+    }
+}

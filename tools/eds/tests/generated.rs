@@ -1,0 +1,28 @@
+//! The generated files in the tree are what the tables say now.
+
+use eds::{DEVICES, files};
+
+#[test]
+fn the_generated_files_are_up_to_date() {
+    for file in files() {
+        let text = std::fs::read_to_string(&file.path).unwrap_or_default();
+        let path = file.path.display();
+        if let Some((line, (old, new))) =
+            (1..).zip(text.lines().zip(file.text.lines())).find(|(_, (old, new))| old != new)
+        {
+            println!("{path}:{line} has \"{old}\" for \"{new}\"");
+        }
+        assert!(text == file.text, "{path} is out of date: run `cargo xtask eds` and commit what it writes");
+    }
+}
+
+#[test]
+fn the_page_has_every_object_once_for_each_device_that_has_it() {
+    let files = files();
+    let page = files.iter().find(|file| file.path.extension().is_some_and(|name| name == "md")).unwrap();
+    let indices: Vec<u16> = DEVICES.iter().flat_map(|device| device.eds().objects.into_keys()).collect();
+    for index in &indices {
+        let times = indices.iter().filter(|other| *other == index).count();
+        assert_eq!(page.text.matches(&format!("| {index:04X}h | 0 ")).count(), times, "{index:04X}h");
+    }
+}

@@ -1,0 +1,102 @@
+//! What is written is read again, and it is what the table says.
+
+use eds::{Access, DEVICES, Eds, Formula, ObjectType, Value};
+use node::{NodeId, Personality, REVISION, VENDOR_ID};
+
+fn pressure() -> Eds {
+    Eds::parse(&DEVICES[0].sheet()).unwrap()
+}
+
+fn default(eds: &Eds, index: u16, sub: u8) -> Value {
+    let formula = eds.get(index, sub).and_then(|entry| entry.default.clone());
+    formula.unwrap().evaluate(NodeId::new(5).unwrap())
+}
+
+#[test]
+fn every_device_is_read_as_it_was_written() {
+    for device in &DEVICES {
+        let mut written = device.eds();
+        // A unit is a comment.
+        for entry in written.objects.values_mut().flat_map(|object| object.entries.values_mut()) {
+            entry.unit.clear();
+        }
+        assert_eq!(Eds::parse(&device.sheet()).unwrap(), written, "{}", device.file_name);
+    }
+}
+
+#[test]
+fn every_row_has_its_entry() {
+    for device in &DEVICES {
+        let eds = device.eds();
+        let keys: Vec<_> = eds.entries().map(|entry| (entry.index, entry.sub)).collect();
+        let rows: Vec<_> = device.rows.iter().map(|row| (row.index, row.sub)).collect();
+        assert_eq!(keys, rows, "{}", device.file_name);
+    }
+}
+
+#[test]
+fn the_identity_is_that_of_the_node() {
+    let eds = pressure();
+    let product = Personality::Pressure.product_code();
+    for (sub, value) in [(1, VENDOR_ID), (2, product), (3, REVISION)] {
+        assert_eq!(default(&eds, 0x1018, sub), Value::Integer(value.into()), "1018h:{sub}");
+    }
+    assert_eq!(eds.get(0x1018, 4).unwrap().default, None);
+    assert_eq!((eds.device.vendor_number, eds.device.product_number), (VENDOR_ID, product));
+    assert_eq!(eds.device.revision_number, REVISION);
+}
+
+#[test]
+fn the_device_has_eight_pdos_each_way_and_every_bit_rate() {
+    let device = pressure().device;
+    assert_eq!((device.rpdos, device.tpdos, device.granularity), (8, 8, 8));
+    assert_eq!(device.bit_rates.into_iter().collect::<Vec<_>>(), [10, 20, 50, 125, 250, 500, 800, 1000]);
+    assert!(device.lss && !device.group_messaging);
+}
+
+#[test]
+fn identifiers_count_from_the_node_id() {
+    let eds = pressure();
+    assert_eq!(default(&eds, 0x1014, 0), Value::Integer(0x85));
+    assert_eq!(default(&eds, 0x1800, 1), Value::Integer(0x185));
+    assert_eq!(default(&eds, 0x1801, 1), Value::Integer(0x8000_0285));
+    assert_eq!(default(&eds, 0x1005, 0), Value::Integer(0x80));
+}
+
+#[test]
+fn object_types_follow_the_rule() {
+    let eds = pressure();
+    for (index, object_type) in [
+        (0x1000, ObjectType::Var),
+        (0x1003, ObjectType::Array),
+        (0x1018, ObjectType::Record),
+        (0x1800, ObjectType::Record),
+        (0x1A00, ObjectType::Record),
+        (0x6130, ObjectType::Array),
+    ] {
+        assert_eq!(eds.objects[&index].object_type, object_type, "{index:04X}h");
+    }
+}
+
+#[test]
+fn an_entry_has_the_attributes_of_its_row() {
+    let eds = pressure();
+    let entry = eds.get(0x1019, 0).unwrap();
+    assert_eq!((&entry.name[..], entry.access), ("Synchronous counter overflow value", Access::ReadWrite));
+    assert_eq!((entry.data_type.0, entry.mappable), (5, false));
+    let limit = |value| Some(Formula::Constant(Value::Integer(value)));
+    assert_eq!((&entry.low, &entry.high), (&limit(0), &limit(240)));
+    let entry = eds.get(0x6130, 1).unwrap();
+    assert!(entry.is_tpdo_mappable() && !entry.is_rpdo_mappable());
+    assert_eq!(default(&eds, 0x6148, 2), Value::Real(-40.0));
+}
+
+#[test]
+fn the_text_is_ascii_with_dos_line_ends() {
+    for device in &DEVICES {
+        let sheet = device.sheet();
+        assert!(sheet.is_ascii() && sheet.ends_with("\r\n"));
+        assert_eq!(sheet.matches('\n').count(), sheet.matches("\r\n").count());
+        assert!(sheet.lines().all(|line| line.len() < 255), "CiA 306 allows 255 characters");
+    }
+}

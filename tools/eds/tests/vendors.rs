@@ -1,0 +1,174 @@
+//! Data sheets as vendors write them.
+
+use eds::{Access, DataType, Eds, Entry, Error, Formula, ObjectType, Problem, Value};
+use node::NodeId;
+
+/// Everything odd that the reader takes.
+const ODD: &str = "\u{FEFF}; a comment\r
+[deviceinfo]\r
+VendorNumber = 0x0000abcd ; lower case, spaces, a comment behind\r
+ProductName=Drive ; 3 # 4\r
+BaudRate_125=0x1\r
+BaudRate_250=0\r
+not a key\r
+\r
+[1000]\r
+PARAMETERNAME=Device type\r
+DataType=0x7\r
+AccessType=RO\r
+DefaultValue=0x000f0191\r
+\r
+[0005]\r
+ParameterName=A data type\r
+\r
+[1800SUB1]\r
+ParameterName=COB-ID\r
+DataType=7\r
+AccessType=rw\r
+DefaultValue=0x180+$NodeID\r
+\r
+[ 1800 ]\r
+ParameterName=TPDO\r
+SubNumber=2\r
+\r
+[1003]\r
+ParameterName=Error field\r
+ObjectType=0x8\r
+DataType=0x0007\r
+AccessType=ro\r
+PDOMapping=0\r
+DefaultValue=7\r
+CompactSubObj=3\r
+[1003Name]\r
+NrOfEntries=1\r
+2=Second error\r
+[1003Value]\r
+NrOfEntries=2\r
+3=$NODEID + 0x10\r
+9=1\r
+\r
+[1f50]\r
+ParameterName=Program\r
+ObjectType=2\r
+AccessType=wo\r
+\r
+[2000]\r
+ParameterName=Offset\r
+DataType=0x2\r
+AccessType=rww\r
+PDOMapping=1\r
+LowLimit=0x80\r
+HighLimit=\r
+DefaultValue=0xFF\r
+";
+
+fn get(eds: &Eds, index: u16, sub: u8) -> &Entry {
+    eds.get(index, sub).unwrap_or_else(|| panic!("{index:04X}h:{sub}"))
+}
+
+fn integer(value: i128) -> Option<Formula> {
+    Some(Formula::Constant(Value::Integer(value)))
+}
+
+#[test]
+fn odd_spelling_is_read() {
+    let eds = Eds::parse(ODD).unwrap();
+    assert_eq!((eds.device.vendor_number, &eds.device.product_name[..]), (0xABCD, "Drive"));
+    assert_eq!(eds.device.bit_rates.iter().collect::<Vec<_>>(), [&125]);
+    assert_eq!(eds.objects.keys().collect::<Vec<_>>(), [&0x1000, &0x1003, &0x1800, &0x1F50, &0x2000]);
+    assert_eq!(get(&eds, 0x1000, 0).default, integer(0xF_0191));
+    assert_eq!(get(&eds, 0x1000, 0).access, Access::ReadOnly);
+    assert_eq!(get(&eds, 0x1800, 1).default, Some(Formula::NodeId(0x180)));
+    assert_eq!(eds.objects[&0x1800].object_type, ObjectType::Record);
+    assert_eq!(get(&eds, 0x1F50, 0).data_type, DataType::DOMAIN);
+}
+
+#[test]
+fn limits_are_in_the_type_of_the_object() {
+    let eds = Eds::parse(ODD).unwrap();
+    let entry = get(&eds, 0x2000, 0);
+    assert_eq!((&entry.default, &entry.low, &entry.high), (&integer(-1), &integer(-128), &None));
+    assert!(entry.is_rpdo_mappable() && !entry.is_tpdo_mappable());
+}
+
+#[test]
+fn compact_storage_is_unfolded() {
+    let eds = Eds::parse(ODD).unwrap();
+    let names: Vec<_> = eds.objects[&0x1003].entries.values().map(|entry| &entry.name[..]).collect();
+    assert_eq!(names, ["NrOfObjects", "Error field1", "Second error", "Error field3"]);
+    let defaults: Vec<_> = (0..=3).map(|sub| get(&eds, 0x1003, sub).default.clone()).collect();
+    assert_eq!(defaults, [integer(3), integer(7), integer(7), Some(Formula::NodeId(0x10))]);
+    assert_eq!(get(&eds, 0x1003, 0).data_type, DataType::UNSIGNED8);
+    assert_eq!(get(&eds, 0x1003, 3).sub, 3);
+}
+
+#[test]
+fn characters_may_be_latin_1() {
+    let eds = Eds::from_bytes(b"[DeviceInfo]\r\nVendorName=M\xFCller\r\n").unwrap();
+    assert_eq!(eds.device.vendor_name, "Müller");
+    assert_eq!(Eds::from_bytes("[DeviceInfo]\nVendorName=Müller".as_bytes()).unwrap(), eds);
+}
+
+#[test]
+fn an_empty_file_has_no_objects() {
+    assert_eq!(Eds::parse("").unwrap(), Eds::default());
+}
+
+fn object(lines: &str) -> Error {
+    Eds::parse(&format!("[DeviceInfo]\nVendorNumber=1\n[2001]\n{lines}")).unwrap_err()
+}
+
+#[test]
+fn an_error_says_where_it_is() {
+    let error = object("ParameterName=X\nDataType=0xZZ\nAccessType=rw\n");
+    assert_eq!((&error.section[..], error.key, error.line), ("2001", "DataType", Some(5)));
+    let text = "line 5: [2001] DataType: \"0xZZ\" is not a number of at most 16 bits";
+    assert_eq!(error.to_string(), text);
+}
+
+#[test]
+fn what_is_missing_is_named_with_the_line_of_its_section() {
+    let error = object("ParameterName=X\nDataType=5\n");
+    assert_eq!(error.to_string(), "line 3: [2001] AccessType: is missing");
+    assert_eq!(error.problem, Problem::Missing);
+}
+
+#[test]
+fn values_are_checked_against_their_type() {
+    let error = object("ParameterName=X\nDataType=5\nAccessType=rw\nDefaultValue=256\n");
+    assert_eq!(error.to_string(), "line 7: [2001] DefaultValue: \"256\" is not a value of UNSIGNED8");
+    let error = object("ParameterName=X\nDataType=5\nAccessType=wr\n");
+    assert!(error.to_string().ends_with("\"wr\" is not one of ro, wo, rw, rwr, rww and const"), "{error}");
+    let error = object("ParameterName=X\nObjectType=4\nDataType=5\nAccessType=rw\n");
+    assert_eq!((error.key, error.line), ("ObjectType", Some(5)));
+}
+
+#[test]
+fn a_compact_value_is_checked_in_its_own_section() {
+    let lines = "ParameterName=X\nDataType=5\nAccessType=rw\nCompactSubObj=2\n[2001Value]\n1=300\n";
+    let error = object(lines);
+    assert_eq!(error.to_string(), "line 8: [2001value]: \"300\" is not a value of UNSIGNED8");
+}
+
+#[test]
+fn a_sub_index_needs_its_object() {
+    let error = Eds::parse("[2002sub1]\nParameterName=X\nDataType=5\nAccessType=rw").unwrap_err();
+    assert_eq!(error.to_string(), "line 1: [2002sub1]: the object has no section of its own");
+}
+
+#[test]
+fn a_text_that_is_no_ini_file_is_refused() {
+    let error = Eds::parse("[2000\nParameterName=X").unwrap_err();
+    assert!(matches!(error.problem, Problem::Syntax(_)));
+    assert!(error.to_string().contains("line 1"), "{error}");
+}
+
+#[test]
+fn a_default_is_evaluated_for_a_node() {
+    let eds = Eds::parse(ODD).unwrap();
+    let formula = get(&eds, 0x1800, 1).default.clone().unwrap();
+    for id in [1, 127] {
+        let node_id = NodeId::new(id).unwrap();
+        assert_eq!(formula.evaluate(node_id), Value::Integer(0x180 + i128::from(id)));
+    }
+}

@@ -1,0 +1,10 @@
+//! `cargo xtask eds`: what is generated from the dictionary tables.
+
+use anyhow::Result;
+
+use crate::command::{cargo, run};
+
+/// Writes the data sheets and the reference page.
+pub(crate) fn write() -> Result<()> {
+    run(cargo().args(["run", "--quiet", "-p", "eds", "--bin", "generate"]))
+}
