@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use canopen::nmt::Command;
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
 use eds::DataType;
@@ -12,7 +13,7 @@ use crate::object::at;
 use crate::sdo::{self, Client, Options};
 use crate::tpdo::{self, Tpdo};
 use crate::value::{Value, guess};
-use crate::{Catalogue, Network, unit};
+use crate::{Catalogue, Network, nmt, unit};
 
 /// Something whose value is followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,6 +49,8 @@ pub struct Setup {
     pub options: Options,
     /// How often what is in no TPDO is read.
     pub period: Duration,
+    /// Whether to start the node once it is known what it sends: TPDOs come in the state operational only.
+    pub start: bool,
 }
 
 /// Why there are no more values.
@@ -76,13 +79,13 @@ impl<'n> Acquisition<'n> {
     /// Follows these objects; all that are in TPDOs when there are none.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// Those of SDO, and a bus that is lost.
     pub fn open(
         network: &'n mut Network,
         setup: Setup,
         catalogue: &Catalogue,
         objects: &[Multiplexer],
-    ) -> Result<Acquisition<'n>, sdo::Error> {
+    ) -> Result<Acquisition<'n>, Interruption> {
         let mut client = Client::new(network, setup.node, setup.options);
         let tpdos = tpdo::read(&mut client)?;
         let mapped = tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|mapped| at(mapped.index, mapped.sub));
@@ -92,6 +95,9 @@ impl<'n> Acquisition<'n> {
             signals.push(signal(&mut client, catalogue, &tpdos, at)?);
         }
         network.forget();
+        if setup.start {
+            nmt::send(network, Command::Start, Some(setup.node))?;
+        }
         let due = network.now();
         Ok(Acquisition { network, setup, tpdos, signals, ready: VecDeque::new(), due })
     }
@@ -166,6 +172,12 @@ impl<'n> Acquisition<'n> {
 }
 
 impl Signal {
+    /// A signal that is read and not in a TPDO.
+    #[must_use]
+    pub fn polled(at: Multiplexer, name: &str, unit: &str) -> Signal {
+        Signal { at, name: name.to_owned(), unit: unit.to_owned(), tpdo: None, data_type: None }
+    }
+
     fn decode(&self, bytes: &[u8]) -> Value {
         Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes)))
     }

@@ -77,8 +77,10 @@ impl<S: Station> Bus for Simulated<S> {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let mut out = Out(&mut self.queue);
+        self.station.poll(self.now, &mut out);
         self.now = self.now + FRAME_TIME;
-        self.station.receive(frame, self.now, &mut Out(&mut self.queue));
+        self.station.receive(frame, self.now, &mut out);
         Ok(())
     }
 

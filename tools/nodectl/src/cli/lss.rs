@@ -144,7 +144,10 @@ fn scan(session: &mut Session, step: u32, assign: Option<u8>) -> Result<(), Fail
     let mut ids = assign.map(|first| (first..=127).filter_map(NodeId::new)).into_iter().flatten();
     loop {
         let mut master = Master::new(&mut session.network, timeout);
-        let Some(identity) = master.fastscan()? else { return Ok(()) };
+        let Some(identity) = master.fastscan()? else {
+            eprintln!("no node without a node-ID (any more)");
+            return Ok(());
+        };
         let id = ids.next();
         if id.is_some() {
             master.set_node_id(id)?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use canopen::sdo::Multiplexer;
 use clap::Args;
 use eds::{Class, DataType};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::{Failure, Session};
 use crate::object::Place;
@@ -43,8 +43,8 @@ pub(super) fn parse_type(name: &str) -> Result<DataType, String> {
 #[derive(Serialize)]
 pub(super) struct Reading {
     node: u8,
-    index: u16,
-    sub: u8,
+    #[serde(rename = "object", serialize_with = "place")]
+    at: Multiplexer,
     name: Option<String>,
     #[serde(rename = "type")]
     data_type: String,
@@ -76,7 +76,11 @@ impl Read {
     fn reading(&self, session: &mut Session, at: Multiplexer, bytes: &[u8]) -> Result<Reading, Failure> {
         let node = session.options.node.one()?;
         let catalogue = session.catalogue(node)?;
-        let unit = unit::of(&mut session.client(node), &catalogue, at)?;
+        // The unit is that of the type of the data sheet.
+        let unit = match self.data_type {
+            Some(_) => String::new(),
+            None => unit::of(&mut session.client(node), &catalogue, at)?,
+        };
         Ok(Reading::new(node.get(), at, bytes, &catalogue, unit, self.data_type))
     }
 }
@@ -93,8 +97,7 @@ impl Reading {
         let data_type = data_type.or_else(|| catalogue.data_type(at)).unwrap_or_else(|| guess(bytes));
         Reading {
             node,
-            index: at.index,
-            sub: at.sub,
+            at,
             name: catalogue.name(at),
             data_type: data_type.to_string(),
             value: Value::decode(bytes, data_type),
@@ -111,10 +114,15 @@ fn write_out(session: &mut Session, path: &PathBuf, bytes: &[u8]) -> Result<(), 
     fs::write(path, bytes).map_err(|error| Failure::file(path, error))
 }
 
+/// As a person writes it.
+pub(super) fn place<S: Serializer>(at: &Multiplexer, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&Place(*at))
+}
+
 /// `1017h:0 Producer heartbeat time = 1000 ms`
 impl fmt::Display for Reading {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} ", Place(Multiplexer { index: self.index, sub: self.sub }))?;
+        write!(f, "{} ", Place(self.at))?;
         if let Some(name) = &self.name {
             write!(f, "{name} ")?;
         }

@@ -61,7 +61,9 @@ impl Write {
         let data_type = data_type.ok_or_else(|| {
             Failure::Usage(format!("no data sheet tells the type of {}: give it with --type", Place(at)))
         })?;
-        let value = Value::parse(text, data_type).map_err(|error| Failure::Usage(error.to_string()))?;
-        Ok(value.encode(data_type))
+        match Value::parse(text, data_type) {
+            Ok(value) => Ok(value.encode(data_type)),
+            Err(error) => Err(Failure::Usage(format!("{}: {error}", Place(at)))),
+        }
     }
 }

@@ -3,7 +3,8 @@
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
 
-use super::{Command, Error, Image, Program, Status, Step, Version, Watcher};
+use super::image::version;
+use super::{Command, Error, Image, Program, Status, Step, Watcher};
 use crate::bus::BusError;
 use crate::object::at;
 use crate::sdo::{self, Client};
@@ -129,7 +130,7 @@ impl<'a> Job<'a> {
         if device != info.product {
             return Err(Error::Product { node: self.node, image: info.product, device });
         }
-        let running = now.version.as_deref().and_then(|version| version.parse::<Version>().ok());
+        let running = now.version.as_deref().and_then(version);
         match &now.version {
             Some(device) if running > Some(info.version) && !self.options.force => {
                 Err(Error::Older { node: self.node, image: info.version.to_string(), device: device.clone() })
@@ -154,7 +155,7 @@ impl<'a> Job<'a> {
         self.clear(network, watcher)?;
         self.download(network, watcher)?;
         watcher.step(self.node, Step::Verify);
-        self.wait_for_flash(network, Status::is_good)?;
+        self.wait_for_flash(network, is_good)?;
         self.compare(network)?;
         self.progress = Progress::Complete;
         Ok(())
@@ -180,7 +181,7 @@ impl<'a> Job<'a> {
             }
             network.pause(POLL)?;
         }
-        self.wait_for_flash(network, Status::is_cleared)
+        self.wait_for_flash(network, is_cleared)
     }
 
     /// In blocks; in segments where the node does not know those.
@@ -256,7 +257,7 @@ impl<'a> Job<'a> {
         let identification = self.program(network).identification()?;
         // The version of a loader is not that of the program.
         let version = if is_running { self.text(network, at(0x100A, 0))? } else { None };
-        let is_valid = is_running || self.program(network).status()?.is_none_or(Status::is_good);
+        let is_valid = is_running || self.program(network).status()?.is_none_or(is_good);
         Ok(State { is_running, version, identification, is_valid })
     }
 
@@ -306,4 +307,14 @@ fn reopen(network: &mut Network) {
     if network.reopen().is_err() {
         std::thread::sleep(std::time::Duration::from_micros(POLL.0));
     }
+}
+
+/// Whether there is a program that can be started.
+fn is_good(status: Status) -> bool {
+    status == Status::GOOD
+}
+
+/// Whether it is that of a flash without a program: nothing wrong, or no valid program.
+fn is_cleared(status: Status) -> bool {
+    !status.busy && status.code <= 1
 }

@@ -9,13 +9,12 @@ mod fleet;
 mod image;
 mod job;
 mod program;
-mod status;
 mod watcher;
 
+pub use ::update::{Status, Version};
 pub use error::Error;
 pub use fleet::update;
-pub use image::{Image, ImageError, ImageInfo, Version};
+pub use image::{Image, ImageError, ImageInfo};
 pub use job::{Options, Outcome};
 pub use program::{Command, Program};
-pub use status::Status;
 pub use watcher::{Step, Watcher};

@@ -31,6 +31,8 @@ impl Diary {
     }
 }
 
+type Results = Vec<(NodeId, Result<Outcome, Error>)>;
+
 const ALL: [Step; 6] = [Step::Identify, Step::Stop, Step::Clear, Step::Download, Step::Verify, Step::Start];
 
 /// A program of this version.
@@ -46,8 +48,8 @@ fn image(version: Version) -> Image {
     Image { bytes, info: Some(info) }
 }
 
-const OLD: Version = Version(1, 0, 0);
-const NEW: Version = Version(1, 1, 0);
+const OLD: Version = Version { major: 1, minor: 0, patch: 0 };
+const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
 
 fn options() -> Options {
     let sdo = sdo::Options { timeout: Duration::from_millis(500), retries: 1 };
@@ -62,13 +64,7 @@ fn fleet(ids: &[u8]) -> Wire<Vec<Loader>> {
     Wire::new(ids.iter().map(|&id| Loader::new(id, &program("1.0.0"))).collect())
 }
 
-fn run(
-    wire: &Wire<Vec<Loader>>,
-    ids: &[u8],
-    image: &Image,
-    options: &Options,
-    diary: &mut Diary,
-) -> Vec<(NodeId, Result<Outcome, Error>)> {
+fn run(wire: &Wire<Vec<Loader>>, ids: &[u8], image: &Image, options: &Options, diary: &mut Diary) -> Results {
     update(&mut wire.network(), &nodes(ids), image, options, diary)
 }
 
@@ -135,7 +131,7 @@ fn what_would_do_harm_is_refused_before_anything_is_erased() {
         error.to_string(),
         "node 3: the image is for product 0000002Bh, the node is product 0000002Ah"
     );
-    let older = image(Version(0, 9, 0));
+    let older = image(Version { major: 0, minor: 9, patch: 0 });
     let error = one(&wire, &older, &options(), &mut Diary::default()).unwrap_err();
     assert_eq!(error.to_string(), "node 3: the node runs version 1.0.0, which is newer than 0.9.0");
     assert!(commands(&wire).is_empty());
@@ -161,7 +157,7 @@ fn a_program_that_the_node_does_not_like_is_told_in_words() {
     for (word, words) in [
         (0x0006, "format or CRC error"),
         (0x000E, "the flash is secured"),
-        (0x0005_0080, "error 64 of the manufacturer, detail 5"),
+        (0x0005_0080, "the image is for another product"),
     ] {
         let wire = fleet(&[3]);
         wire.station(|loaders| loaders[0].flash().verdict = word);
@@ -235,7 +231,7 @@ impl Watcher for Switch<'_> {
     }
 }
 
-fn switched_off(until: Instant) -> (Diary, Vec<(NodeId, Result<Outcome, Error>)>) {
+fn switched_off(until: Instant) -> (Diary, Results) {
     let wire = fleet(&[3, 4, 5, 6]);
     let mut switch = Switch { wire: &wire, diary: Diary::default(), node: 4, until, is_done: false };
     let results = update(&mut wire.network(), &nodes(&[3, 4, 5, 6]), &image(NEW), &options(), &mut switch);

@@ -5,14 +5,15 @@ mod view;
 
 use std::fmt;
 
-use canopen::{Duration, Instant, nmt};
+use canopen::sdo::Multiplexer;
+use canopen::{Duration, Instant};
 use clap::Args;
 use serde::Serialize;
 
 use self::view::View;
+use super::read::place;
 use super::{Failure, Output, Session};
 use crate::acquisition::{Acquisition, Sample, Setup, Signal};
-use crate::nmt::send;
 use crate::object::Place;
 use crate::value::Value;
 
@@ -57,11 +58,8 @@ impl Source {
         let catalogue = session.catalogue(node)?;
         let objects: Result<Vec<_>, Failure> =
             self.objects.iter().map(|query| session.find(node, query)).collect();
-        if self.start {
-            send(&mut session.network, nmt::Command::Start, Some(node))?;
-        }
         let period = Duration::from_millis(self.period.max(1).into());
-        let setup = Setup { node, options: session.options.sdo(), period };
+        let setup = Setup { node, options: session.options.sdo(), period, start: self.start };
         let acquisition = Acquisition::open(&mut session.network, setup, &catalogue, &objects?)?;
         if acquisition.signals().is_empty() {
             let message = "the node has no TPDO that is switched on: name the objects";
@@ -75,8 +73,8 @@ impl Source {
 #[derive(Serialize)]
 struct Line<'a> {
     time: f64,
-    index: u16,
-    sub: u8,
+    #[serde(rename = "object", serialize_with = "place")]
+    at: Multiplexer,
     name: &'a str,
     value: &'a Value,
     unit: &'a str,
@@ -108,8 +106,7 @@ impl Monitor {
 fn line<'a>(signal: &'a Signal, sample: &'a Sample, start: Instant) -> Line<'a> {
     Line {
         time: super::record::seconds_between(start, sample.at),
-        index: signal.at.index,
-        sub: signal.at.sub,
+        at: signal.at,
         name: &signal.name,
         value: &sample.value,
         unit: &signal.unit,
@@ -118,7 +115,7 @@ fn line<'a>(signal: &'a Signal, sample: &'a Sample, start: Instant) -> Line<'a> 
 
 impl fmt::Display for Line<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Line { time, index, sub, name, value, unit } = self;
-        write!(f, "{time:10.6} {} {name} = {value} {unit}", Place(crate::object::at(*index, *sub)))
+        let Line { time, at, name, value, unit } = self;
+        write!(f, "{time:10.6} {} {name} = {value} {unit}", Place(*at))
     }
 }

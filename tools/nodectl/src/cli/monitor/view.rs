@@ -19,8 +19,8 @@ struct Track {
     signal: Signal,
     newest: String,
     count: usize,
-    low: f64,
-    high: f64,
+    least: Option<(f64, String)>,
+    greatest: Option<(f64, String)>,
     /// Seconds since the start, and values.
     points: VecDeque<(f64, f64)>,
 }
@@ -43,8 +43,8 @@ impl View {
             signal: signal.clone(),
             newest: "-".to_owned(),
             count: 0,
-            low: f64::INFINITY,
-            high: f64::NEG_INFINITY,
+            least: None,
+            greatest: None,
             points: VecDeque::new(),
         };
         let tracks = signals.iter().map(track).collect();
@@ -121,8 +121,9 @@ impl Track {
         self.newest = sample.value.to_string();
         self.count += 1;
         if let Some(value) = sample.value.as_f64().filter(|value| value.is_finite()) {
-            (self.low, self.high) = (self.low.min(value), self.high.max(value));
             self.points.push_back((now, value));
+            keep(&mut self.least, value, &self.newest, |value, least| value < least);
+            keep(&mut self.greatest, value, &self.newest, |value, greatest| value > greatest);
         }
         while self.points.front().is_some_and(|point| point.0 < oldest) {
             self.points.pop_front();
@@ -130,15 +131,106 @@ impl Track {
     }
 
     fn row(&self) -> Row<'_> {
-        let bound = |value: f64| if value.is_finite() { value.to_string() } else { "-".to_owned() };
+        let text = |bound: &Option<(f64, String)>| {
+            bound.as_ref().map_or_else(|| "-".to_owned(), |(_, text)| text.clone())
+        };
         Row::new([
             Place(self.signal.at).to_string(),
             self.signal.name.clone(),
             self.newest.clone(),
             self.signal.unit.clone(),
-            bound(self.low),
-            bound(self.high),
+            text(&self.least),
+            text(&self.greatest),
             self.count.to_string(),
         ])
+    }
+}
+
+/// Keeps a value and its text if it is further out than the one before.
+fn keep(bound: &mut Option<(f64, String)>, value: f64, text: &str, is_further: impl Fn(f64, f64) -> bool) {
+    if bound.as_ref().is_none_or(|(kept, _)| is_further(value, *kept)) {
+        *bound = Some((value, text.to_owned()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+
+    use super::*;
+    use crate::object::at;
+    use crate::value::Value;
+
+    fn view() -> View {
+        let signals =
+            [Signal::polled(at(0x6130, 1), "Pressure", "bar"), Signal::polled(at(0x1008, 0), "Name", "")];
+        View::new(&signals, 10.0)
+    }
+
+    fn take(view: &mut View, second: u64, value: f32) {
+        view.take(&Sample { at: Instant(second * 1_000_000), signal: 0, value: Value::Real32(value) });
+    }
+
+    fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| view.draw(frame)).unwrap();
+        let cells = terminal.backend().buffer().content().chunks(usize::from(width));
+        cells.map(|row| row.iter().map(ratatui::buffer::Cell::symbol).collect()).collect()
+    }
+
+    #[test]
+    fn the_table_has_newest_least_and_greatest() {
+        let mut view = view();
+        for (second, value) in [(5, 1.5), (6, 0.1), (7, 2.25)] {
+            take(&mut view, second, value);
+        }
+        view.take(&Sample { at: Instant(7), signal: 1, value: Value::Text("node".into()) });
+        let screen = screen(&view, 110, 30);
+        let row = screen[2].split_whitespace().collect::<Vec<_>>();
+        assert_eq!(row, ["\u{2502}6130h:1", "Pressure", "2.25", "bar", "0.1", "2.25", "3", "\u{2502}"]);
+        let row = screen[3].split_whitespace().collect::<Vec<_>>();
+        assert_eq!(row, ["\u{2502}1008h:0", "Name", "node", "-", "-", "1", "\u{2502}"]);
+    }
+
+    #[test]
+    fn the_plot_shows_the_window_and_forgets_the_rest() {
+        let mut view = view();
+        for second in 0..100 {
+            take(&mut view, second, second as f32);
+        }
+        assert_eq!(view.tracks[0].points.len(), 11);
+        let screen = screen(&view, 110, 30).join("\n");
+        for label in ["89.0", "94.0", "99.0"] {
+            assert!(screen.contains(label), "{screen}");
+        }
+    }
+
+    #[test]
+    fn what_is_held_does_not_change() {
+        let mut view = view();
+        take(&mut view, 1, 1.0);
+        view.hold();
+        let before = screen(&view, 110, 30);
+        take(&mut view, 2, 2.0);
+        assert_eq!(screen(&view, 110, 30), before);
+        view.hold();
+        take(&mut view, 3, 3.0);
+        assert_ne!(screen(&view, 110, 30), before);
+    }
+
+    #[test]
+    fn no_terminal_is_too_small_and_no_choice_out_of_range() {
+        let mut view = view();
+        take(&mut view, 1, f32::NAN);
+        for step in [-1, 1, 1, 1, isize::MAX, isize::MIN] {
+            view.choose(step);
+            for (width, height) in [(1, 1), (10, 3), (40, 10), (200, 80)] {
+                screen(&view, width, height);
+            }
+        }
+        let mut empty = View::new(&[], 10.0);
+        empty.choose(1);
+        screen(&empty, 80, 25);
     }
 }

@@ -62,14 +62,14 @@ fn charts(signals: &[Signal], samples: &[Sample]) -> Vec<Chart> {
 impl Chart {
     fn draw(&self, area: &DrawingArea<SVGBackend, Shift>) -> Result<(), Box<dyn Error>> {
         let points = || self.lines.iter().flat_map(|line| &line.points);
-        let mut chart = ChartBuilder::on(area)
-            .margin(10)
-            .x_label_area_size(40)
-            .y_label_area_size(70)
-            .build_cartesian_2d(
-                range(points().map(|point| point.0), 0.0),
-                range(points().map(|point| point.1), 0.05),
-            )?;
+        let times = range(points().map(|point| point.0), 0.0);
+        let values = range(points().map(|point| point.1), 0.05);
+        let mut builder = ChartBuilder::on(area);
+        builder.margin(10).x_label_area_size(40).y_label_area_size(70);
+        if let [line] = &self.lines[..] {
+            builder.caption(&line.title, ("sans-serif", 16));
+        }
+        let mut chart = builder.build_cartesian_2d(times, values)?;
         chart.configure_mesh().x_desc("time s").y_desc(&self.unit).light_line_style(WHITE).draw()?;
         for (number, line) in self.lines.iter().enumerate() {
             let color = Palette99::pick(number).to_rgba();
@@ -78,7 +78,10 @@ impl Chart {
                 .label(&line.title)
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color));
         }
-        chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK).draw()?;
+        if self.lines.len() > 1 {
+            let mut legend = chart.configure_series_labels();
+            legend.background_style(WHITE.mix(0.8)).border_style(BLACK).draw()?;
+        }
         Ok(())
     }
 }

@@ -74,3 +74,41 @@ pub(super) fn title(signal: &Signal) -> String {
 pub(in crate::cli) fn seconds(start: Instant, at: Instant) -> f64 {
     at.0.saturating_sub(start.0) as f64 / 1e6
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+    use std::io;
+    use std::rc::Rc;
+
+    use super::*;
+    use crate::object::at;
+    use crate::value::Value;
+
+    struct Paper(Rc<RefCell<Vec<u8>>>);
+
+    impl Write for Paper {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.borrow_mut().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn values_of_one_time_share_a_row() {
+        let paper = Rc::default();
+        let mut table = Table::new(Box::new(Paper(Rc::clone(&paper))));
+        table
+            .head(&[Signal::polled(at(0x6130, 1), "a, b", "bar"), Signal::polled(at(0x1001, 0), "", "")])
+            .unwrap();
+        for (micros, signal, value) in [(500, 0, 1), (500, 1, 2), (2_000_500, 1, 3), (3_000_501, 0, 4)] {
+            table.take(&Sample { at: Instant(micros), signal, value: Value::Integer(value) }).unwrap();
+        }
+        table.finish().unwrap();
+        let expected = "time s,\"6130h:1 a, b [bar]\",1001h:0\n0.000000,1,2\n2.000000,,3\n3.000001,4,\n";
+        assert_eq!(String::from_utf8(paper.take()).unwrap(), expected);
+    }
+}
