@@ -2,13 +2,14 @@
 
 use std::collections::VecDeque;
 
-use canopen::nmt::Command;
+use canopen::nmt::{Command, State};
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
 use eds::DataType;
 use thiserror::Error;
 
 use crate::bus::{BusError, Received};
+use crate::heartbeat::{self, Heartbeat};
 use crate::object::at;
 use crate::sdo::{self, Client, Options};
 use crate::tpdo::{self, Tpdo};
@@ -73,6 +74,8 @@ pub struct Acquisition<'n> {
     ready: VecDeque<Sample>,
     /// When the polled signals are read next.
     due: Instant,
+    /// Of the node, once a heartbeat has told it.
+    state: Option<State>,
 }
 
 impl<'n> Acquisition<'n> {
@@ -99,13 +102,22 @@ impl<'n> Acquisition<'n> {
             nmt::send(network, Command::Start, Some(setup.node))?;
         }
         let due = network.now();
-        Ok(Acquisition { network, setup, tpdos, signals, ready: VecDeque::new(), due })
+        Ok(Acquisition { network, setup, tpdos, signals, ready: VecDeque::new(), due, state: None })
     }
 
     /// What is followed.
     #[must_use]
     pub fn signals(&self) -> &[Signal] {
         &self.signals
+    }
+
+    /// Why there may be no values: the node sends no TPDOs in its state. `None` where nothing speaks against them.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        let state = self.state.filter(|state| !state.has_pdos())?;
+        let has_mapped = self.signals.iter().any(|signal| signal.tpdo.is_some());
+        let (node, state) = (self.setup.node.get(), heartbeat::words(state));
+        has_mapped.then(|| format!("node {node} is {state} and sends no TPDOs; --start starts it"))
     }
 
     /// The time of this side, for [`next`](Acquisition::next).
@@ -144,6 +156,9 @@ impl<'n> Acquisition<'n> {
     /// Takes the values that a frame has.
     fn take(&mut self, received: &Received) {
         let frame = &received.frame;
+        if let Some(heard) = Heartbeat::parse(frame).filter(|heard| heard.node == self.setup.node) {
+            self.state = Some(heard.state);
+        }
         for tpdo in self.tpdos.iter().filter(|tpdo| tpdo.id == frame.id()) {
             for (at, bytes) in tpdo.values(frame.data()) {
                 let is_it = |signal: &Signal| signal.at == at && signal.tpdo == Some(tpdo.number);

@@ -12,7 +12,7 @@ use crate::sdo;
 /// The options of every command.
 #[derive(Clone, Debug, Args)]
 pub struct Options {
-    /// The bus: socketcan:IFACE, socketcand://HOST[:PORT]/BUS, slcan:DEVICE or slcan://HOST:PORT.
+    /// The bus: socketcan:IFACE, socketcand://HOST:PORT/BUS, slcan:DEVICE or slcan://HOST:PORT.
     #[arg(long, global = true, env = "NODECTL_BUS", default_value = "socketcand://127.0.0.1:29536/vcan0")]
     pub bus: Address,
 

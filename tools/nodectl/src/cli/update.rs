@@ -57,7 +57,8 @@ impl Update {
             force: self.force,
         };
         let results = update(&mut session.network, &nodes, &image, &options, &mut Bar::new());
-        for (node, result) in &results {
+        // The error of the only node is that of the command.
+        for (node, result) in results.iter().filter(|(_, result)| result.is_ok() || nodes.len() > 1) {
             session.print(&Report::new(*node, result))?;
         }
         verdict(results)

@@ -12,8 +12,10 @@ use crate::{Network, value};
 
 /// Between two questions to a node that is busy.
 const POLL: Duration = Duration::from_millis(100);
-/// How long a node may take to restart, to erase or to check.
-const LONGEST: Duration = Duration::from_millis(60_000);
+/// How long a node may take to restart.
+const RESTART: Duration = Duration::from_millis(15_000);
+/// How long it may take to erase, or to check.
+const FLASH: Duration = Duration::from_millis(60_000);
 /// How often clearing is tried.
 const CLEARS: usize = 3;
 /// How often one run goes on with a node that was lost.
@@ -207,7 +209,7 @@ impl<'a> Job<'a> {
 
     /// Waits until the flash is no longer busy, and then for nothing but a status that `is_fine`.
     fn wait_for_flash(&self, network: &mut Network, is_fine: impl Fn(Status) -> bool) -> Result<(), Error> {
-        let until = network.now() + LONGEST;
+        let until = network.now() + FLASH;
         while network.now() < until {
             match self.program(network).status()? {
                 Some(status) if status.busy => network.pause(POLL)?,
@@ -225,7 +227,7 @@ impl<'a> Job<'a> {
         wanted: bool,
         what: &'static str,
     ) -> Result<(), Error> {
-        let until = network.now() + LONGEST;
+        let until = network.now() + RESTART;
         while network.now() < until {
             match self.program(network).is_running() {
                 Ok(is_running) if is_running == wanted => return Ok(()),

@@ -17,6 +17,9 @@ use crate::acquisition::{Acquisition, Sample, Setup, Signal};
 use crate::object::Place;
 use crate::value::Value;
 
+/// After so long without a value somebody wonders.
+const SILENCE: Duration = Duration::from_millis(2000);
+
 /// Shows live values, with a plot where the output is a terminal; else one line for each value.
 #[derive(Debug, Args)]
 pub(super) struct Monitor {
@@ -93,11 +96,17 @@ impl Monitor {
     fn print_lines(&self, session: &mut Session) -> Result<(), Failure> {
         let (mut acquisition, output) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
-        let mut start = None;
-        for _ in 0..self.count.unwrap_or(usize::MAX) {
-            let Some(sample) = acquisition.next(Instant::NEVER)? else { break };
+        let (mut start, mut left, mut hinted) = (None, self.count.unwrap_or(usize::MAX), false);
+        while left > 0 {
+            let until = acquisition.now() + SILENCE;
+            let Some(sample) = acquisition.next(until)? else {
+                let hint = acquisition.hint().filter(|_| !std::mem::replace(&mut hinted, true));
+                hint.iter().for_each(|hint| eprintln!("{hint}"));
+                continue;
+            };
             let start = *start.get_or_insert(sample.at);
             output.print(&line(&signals[sample.signal], &sample, start))?;
+            left -= 1;
         }
         Ok(())
     }

@@ -34,7 +34,8 @@ pub(super) fn run(
     while left > 0 {
         let due = acquisition.now() + REFRESH;
         left = left.saturating_sub(acquire(acquisition, &mut view, due, left)?);
-        terminal.0.draw(|frame| view.draw(frame))?;
+        let hint = acquisition.hint();
+        terminal.0.draw(|frame| view.draw(frame, hint.as_deref()))?;
         if is_over(&mut view)? {
             break;
         }

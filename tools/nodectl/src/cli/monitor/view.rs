@@ -73,14 +73,16 @@ impl View {
         self.is_held = !self.is_held;
     }
 
-    pub(super) fn draw(&self, frame: &mut Frame) {
+    /// `hint` says why there may be no values.
+    pub(super) fn draw(&self, frame: &mut Frame, hint: Option<&str>) {
         let rows = u16::try_from(self.tracks.len()).unwrap_or(u16::MAX).saturating_add(3);
         let areas = [Constraint::Max(rows), Constraint::Min(8), Constraint::Length(1)];
         let [table, plot, help] = Layout::vertical(areas).areas(frame.area());
         frame.render_widget(self.table(), table);
         self.draw_plot(frame, plot);
-        let held = if self.is_held { "HELD  " } else { "" };
-        let keys = format!("{held}up/down: choose   space: hold   q: quit");
+        let held = if self.is_held { "HELD   " } else { "" };
+        let hint = hint.map(|hint| format!("   {hint}")).unwrap_or_default();
+        let keys = format!("{held}up/down: choose   space: hold   q: quit{hint}");
         frame.render_widget(Paragraph::new(Line::from(keys).dim()), help);
     }
 
@@ -174,7 +176,7 @@ mod tests {
 
     fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| view.draw(frame)).unwrap();
+        terminal.draw(|frame| view.draw(frame, None)).unwrap();
         let cells = terminal.backend().buffer().content().chunks(usize::from(width));
         cells.map(|row| row.iter().map(ratatui::buffer::Cell::symbol).collect()).collect()
     }

@@ -70,6 +70,7 @@ impl Record {
         if let Some(table) = table {
             table.finish()?;
         }
+        acquisition.hint().iter().for_each(|hint| eprintln!("{hint}"));
         match &self.svg {
             Some(path) => plot::draw(path, &signals, &samples).map_err(|error| Failure::file(path, error)),
             None => Ok(()),
