@@ -30,6 +30,14 @@ pub enum Weak {
     After,
     /// Each by chance, drawn again at every power-up.
     Random,
+    /// All of a word by chance as before or as after, drawn again at every power-up: what makes a word that was cut once
+    /// look whole and once not.
+    Either,
+}
+
+impl Weak {
+    /// All of them.
+    pub const ALL: [Weak; 4] = [Weak::Before, Weak::After, Weak::Random, Weak::Either];
 }
 
 /// What may be programmed.
@@ -120,6 +128,8 @@ impl MockFlash {
                 Weak::Before => word.before,
                 Weak::After => word.after,
                 Weak::Random => random,
+                Weak::Either if random & 1 == 0 => word.before,
+                Weak::Either => word.after,
             };
             word.value = (word.value & !word.weak) | (reads & word.weak);
         }
