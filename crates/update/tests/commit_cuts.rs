@@ -56,12 +56,34 @@ fn cut_twice(
 
 #[test]
 fn cuts_in_the_commit() {
-    let flash = flash_with(&image(1), 1);
     let act = |flash: &mut MockFlash| stage(flash, &image(2).bytes()).is_ok();
-    let end = operations(&flash, act);
-    let pairs = (end - 4..end).map(|at| cut_twice(&flash, act, at, &[image(1), image(2)])).sum::<u32>();
+    let mut pairs = 0;
+    for seed in 0..4 {
+        let flash = flash_with(&image(1), seed);
+        let end = operations(&flash, act);
+        pairs += (end - 4..end).map(|at| cut_twice(&flash, act, at, &[image(1), image(2)])).sum::<u32>();
+    }
     println!("{pairs} pairs of cuts in and after the commit");
-    assert!(pairs > 100);
+    assert!(pairs > 300);
+}
+
+#[test]
+fn a_commit_that_was_cut_is_decided_once() {
+    let mut decisions = Vec::new();
+    for seed in 0..24 {
+        let mut flash = flash_with(&image(1), seed);
+        let commit = operations(&flash, |flash| stage(flash, &image(2).bytes()).is_ok());
+        flash.cut_after(commit - 1, Weak::Either);
+        assert!(stage(&mut flash, &image(2).bytes()).is_err());
+        let mut starts = (0..4).map(|_| {
+            flash.power_up();
+            start(&mut flash)
+        });
+        let first = starts.next().unwrap();
+        assert!(starts.all(|again| again == first));
+        decisions.push(first);
+    }
+    assert!([1, 2].map(image).iter().all(|image| decisions.contains(&Decision::Start(image.header))));
 }
 
 #[test]
@@ -79,10 +101,13 @@ fn cuts_around_the_mark_that_the_copy_is_done() {
 /// An image that was committed and not copied is cleared for the next one.
 #[test]
 fn cuts_in_the_clear_of_a_committed_image() {
-    let mut flash = flash_with(&image(1), 1);
-    stage(&mut flash, &image(2).bytes()).unwrap();
     let act = |flash: &mut MockFlash| stage(flash, &image(3).bytes()).is_ok();
-    let pairs = (0..8).map(|at| cut_twice(&flash, act, at, &[image(1), image(2)])).sum::<u32>();
+    let mut pairs = 0;
+    for seed in 0..4 {
+        let mut flash = flash_with(&image(1), seed);
+        stage(&mut flash, &image(2).bytes()).unwrap();
+        pairs += (0..8).map(|at| cut_twice(&flash, act, at, &[image(1), image(2)])).sum::<u32>();
+    }
     println!("{pairs} pairs of cuts in and after the clear");
-    assert!(pairs > 100);
+    assert!(pairs > 300);
 }
