@@ -7,8 +7,8 @@ use crate::network::{Network, Unit};
 
 const REQUEST: u16 = 0x7E5;
 const RESPONSE: u16 = 0x7E4;
-/// How long nobody answers before nobody is taken to be there.
-const TIME_OUT: Duration = Duration::from_millis(2);
+/// How long nobody answers before nobody is taken to be there: a frame at 1 Mbit/s and as much again.
+const TIME_OUT: Duration = Duration(300);
 
 /// The master of one network.
 #[derive(Debug)]

@@ -48,6 +48,7 @@ fn number_all(network: &mut Network<PressureNode>) -> Vec<u32> {
         assert!(Master::new(network).configure(node_id));
         let boot_up = network.await_id(0x700 + u16::from(node_id.get()), Duration::from_millis(5));
         assert_eq!(boot_up.unwrap().data(), [0]);
+        hear_all(network);
     }
     serial_numbers
 }

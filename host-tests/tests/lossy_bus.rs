@@ -8,7 +8,7 @@ use host_tests::sdo::Client;
 
 /// Each has four transfers.
 const ROUNDS: u64 = 80;
-/// Of three: what is left of a transfer on the bus is over when the next one begins.
+/// Between two transfers: what the bus repeats or holds up of one is over when the next one begins.
 const PAUSE: Duration = Duration::from_millis(10);
 
 fn bus(seed: u64, percent: u32) -> Network<DomainDevice> {
@@ -35,7 +35,13 @@ fn round(network: &mut Network<DomainDevice>, rng: &mut Rng, len: usize) {
         let read = if by_blocks { client.read(DOMAIN) } else { client.read_blocks(DOMAIN, block_size) };
         assert!(read == Ok(data), "{:?}", read.err());
         network.run(PAUSE);
+        assert_eq!(aborts(network), 0, "the server has complained of a request that came twice");
     }
+}
+
+fn aborts(network: &mut Network<DomainDevice>) -> usize {
+    let responses = std::iter::from_fn(|| network.hear_id(0x580 + u16::from(ID)));
+    responses.filter(|frame| frame.data()[0] == 0x80).count()
 }
 
 #[test]
@@ -75,10 +81,11 @@ fn the_same_seed_takes_the_same_course() {
     assert_ne!(course(7), course(8));
 }
 
-/// Beyond what is asked: one frame in ten each.
+/// Three times as bad. At five times, with eight steps up for a frame that fails and one down for a frame that is sent, the
+/// error counters would end in bus-off.
 #[test]
 fn a_worse_bus_is_slower_and_no_less_exact() {
-    for seed in 200..205 {
-        round(&mut bus(seed, 10), &mut Rng::with_seed(seed), 500);
+    for seed in 200..210 {
+        round(&mut bus(seed, 3), &mut Rng::with_seed(seed), 500);
     }
 }

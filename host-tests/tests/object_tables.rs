@@ -42,6 +42,7 @@ impl Row {
             "UNSIGNED8" => Some(1),
             "UNSIGNED16" | "INTEGER16" => Some(2),
             "UNSIGNED32" | "INTEGER32" | "REAL32" => Some(4),
+            "UNSIGNED64" => Some(8),
             "VISIBLE_STRING" | "DOMAIN" => None,
             other => panic!("{other}"),
         }
@@ -144,7 +145,7 @@ fn a_value_of_the_wrong_length_is_refused() {
             assert_eq!(bench.write(row.index, row.sub, &[0; 4][..=size]), Err(TOO_LONG), "{row:X?}");
         }
         if size > 1 {
-            assert_eq!(bench.write(row.index, row.sub, &[0; 4][..size - 1]), Err(TOO_SHORT), "{row:X?}");
+            assert_eq!(bench.write(row.index, row.sub, &[0; 8][..size - 1]), Err(TOO_SHORT), "{row:X?}");
         }
     }
 }

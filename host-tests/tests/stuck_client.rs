@@ -168,7 +168,7 @@ fn a_client_that_dies_is_told_and_forgotten_after_the_time_out() {
     each_step(|network, transfer, step| {
         network.run(TIME_OUT);
         let last = responses(network).last().copied().and_then(Response::parse);
-        // The end of a block upload and the last segments need no more of the client.
+        // After the last segment of a simple transfer and the end of a block download it waits for nobody.
         let is_told = matches!(last, Some(Response::Abort(at, 0x0504_0000)) if at == DOMAIN);
         let is_over = match transfer {
             Read | Write => step == 30,

@@ -227,3 +227,17 @@ proptest! {
         prop_assert_eq!(Transmission::parse(value).is_none(), (241..=251).contains(&value));
     }
 }
+
+proptest! {
+    #![proptest_config(repeatable())]
+
+    #[test]
+    fn any_multiplexed_pdo_parses_to_what_it_encodes(frame: [u8; 8]) {
+        use canopen::pdo::Mpdo;
+        if let Some(mpdo) = Mpdo::parse(frame) {
+            prop_assert_eq!(mpdo.encode(), frame);
+        } else {
+            prop_assert_eq!(frame[0], 0);
+        }
+    }
+}

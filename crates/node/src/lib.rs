@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
+pub mod encoder;
 mod faults;
 mod flags;
 mod keeping;

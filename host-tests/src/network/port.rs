@@ -179,3 +179,50 @@ pub fn from_bus(frame: &canbus::Frame) -> Option<Frame> {
         Frame::new(id.as_raw(), frame.bytes())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use canbus::{Bus, HostNode};
+
+    const BIT: Time = Time::from_micros(1);
+
+    /// Runs the bus until `end` and gives the identifiers that have arrived.
+    fn run(bus: &mut Bus, port: &mut Port, other: &mut HostNode, end: Time) -> Vec<u16> {
+        bus.step(&mut [port, other], end, &mut |_| {});
+        std::iter::from_fn(|| other.receive())
+            .filter_map(|got| from_bus(&got.frame))
+            .map(|f| f.id())
+            .collect()
+    }
+
+    #[test]
+    fn an_urgent_frame_overtakes_all_but_the_one_on_the_wire() {
+        let (mut bus, mut port, mut other) = (Bus::new(), Port::new(BIT), HostNode::new(BIT));
+        for id in [0x709, 0x589, 0x489, 0x389] {
+            port.send(Frame::new(id, &[0; 8]).unwrap()).unwrap();
+            port.pump(Time::ZERO);
+        }
+        // The mailboxes hold 389h, 489h and 589h; 389h is on the wire.
+        assert_eq!(run(&mut bus, &mut port, &mut other, BIT * 50), []);
+        for id in [0x289, 0x189] {
+            port.send(Frame::new(id, &[0; 8]).unwrap()).unwrap();
+            port.pump(BIT * 50);
+        }
+        let order = run(&mut bus, &mut port, &mut other, Time::from_millis(2));
+        assert_eq!(order, [0x389, 0x189, 0x289, 0x489, 0x589, 0x709]);
+        assert_eq!((port.sent, port.is_sending()), (6, false));
+    }
+
+    #[test]
+    fn a_cleared_port_ends_the_frame_on_the_wire_and_sends_no_other() {
+        let (mut bus, mut port, mut other) = (Bus::new(), Port::new(BIT), HostNode::new(BIT));
+        for id in [0x709, 0x589] {
+            port.send(Frame::new(id, &[0; 8]).unwrap()).unwrap();
+            port.pump(Time::ZERO);
+        }
+        run(&mut bus, &mut port, &mut other, BIT * 50);
+        port.clear();
+        assert_eq!(run(&mut bus, &mut port, &mut other, Time::from_millis(2)), [0x589]);
+    }
+}

@@ -7,6 +7,7 @@
 
 mod application;
 mod lss;
+mod multiplexed;
 mod objects;
 mod pdos;
 mod process;
@@ -24,7 +25,7 @@ pub use store::{Job, Selection, Stored};
 use crate::dictionary::Dictionary;
 use crate::lss::{BitRate, Configuration, Slave};
 use crate::nmt::State;
-use crate::pdo::{PdoSet, Rpdo, Tpdo};
+use crate::pdo::{PdoSet, Rpdo, Scanner, Tpdo};
 use crate::sdo::{Response, Server};
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
@@ -62,6 +63,7 @@ struct Core<A, const N: usize> {
     emcy: emcy::Producer,
     tpdos: [Tpdo; TPDOS],
     rpdos: [Rpdo; RPDOS],
+    scanner: Scanner,
     /// The PDOs that are valid, and the RPDOs that have a fault.
     valid_tpdos: PdoSet,
     valid_rpdos: PdoSet,
@@ -98,6 +100,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             emcy: emcy::Producer::new(),
             tpdos: [const { Tpdo::new() }; TPDOS],
             rpdos: [const { Rpdo::new() }; RPDOS],
+            scanner: Scanner::new(),
             valid_tpdos: PdoSet::EMPTY,
             valid_rpdos: PdoSet::EMPTY,
             faulty_rpdos: PdoSet::EMPTY,

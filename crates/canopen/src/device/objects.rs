@@ -125,6 +125,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::EmcyCobId => self.emcy.configure(value),
             Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
+            Rule::ScannerLine => self.configure_pdos(now),
             Rule::PdoCobId | Rule::PdoType | Rule::PdoInhibit | Rule::PdoEventTimer | Rule::PdoSyncStart => {
                 self.configure_pdo(entry, now);
             }

@@ -5,7 +5,10 @@
 
 use super::{Application, Core};
 use crate::dictionary::Entry;
-use crate::pdo::{Direction, Layout, MappedObject, RpdoSettings, Settings, Transmission, locate};
+use crate::pdo::{
+    Addressing, Content, Direction, Layout, MappedObject, RpdoSettings, ScannerSettings, Settings,
+    Transmission, locate,
+};
 use crate::sdo::Abort;
 use crate::{CobId, Duration, Instant};
 
@@ -41,11 +44,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         for number in (0..).take(self.rpdos.len()) {
             self.apply(Pdo { direction: Direction::Receive, number }, now);
         }
+        self.configure_scanner(self.scanner_settings());
     }
 
     /// Gives the PDO to which the entry belongs its settings.
     pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Instant) {
         self.apply(Pdo::of(entry), now);
+        self.configure_scanner(self.scanner_settings());
     }
 
     fn apply(&mut self, pdo: Pdo, now: Instant) {
@@ -82,15 +87,15 @@ impl<A: Application, const N: usize> Core<A, N> {
         settings.inhibit = Duration::from_inhibit(parameter(3));
         settings.event = Duration::from_millis(parameter(5).into());
         settings.sync_start = low_byte(parameter(6));
-        settings.layout = self.enabled_layout(pdo)?;
+        let Content::Objects(layout) = self.content(pdo)? else { return None };
+        settings.layout = layout;
         Some(settings)
     }
 
     fn rpdo_settings(&self, pdo: Pdo) -> Option<RpdoSettings> {
         let parameter = |sub| self.number(pdo.communication(), sub);
         let deadline = Duration::from_millis(parameter(5).into());
-        let layout = self.enabled_layout(pdo)?;
-        RpdoSettings::new(self.cob_id_value(pdo), low_byte(parameter(2)), deadline, layout)
+        RpdoSettings::new(self.cob_id_value(pdo), low_byte(parameter(2)), deadline, self.content(pdo)?)
     }
 
     /// Whether every mapping names objects that can be mapped. A stored one may be of an older dictionary.
@@ -99,11 +104,33 @@ impl<A: Application, const N: usize> Core<A, N> {
         let pdos = numbers.flat_map(|number| {
             [Direction::Transmit, Direction::Receive].map(|direction| Pdo { direction, number })
         });
-        pdos.into_iter().all(|pdo| self.enabled_layout(pdo).is_some())
+        pdos.into_iter().all(|pdo| self.content(pdo).is_some())
     }
 
-    fn enabled_layout(&self, pdo: Pdo) -> Option<Layout> {
-        self.layout(pdo, self.number(pdo.mapping(), 0)).ok()
+    /// The one multiplexed TPDO that there can be (CiA 301, 7.2.2.6): the first that is valid.
+    fn scanner_settings(&self) -> Option<ScannerSettings> {
+        let numbers = (0..).take(self.tpdos.len());
+        numbers.map(|number| Pdo { direction: Direction::Transmit, number }).find_map(|pdo| {
+            let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
+            let parameter = |sub| self.number(pdo.communication(), sub);
+            let settings = Settings::new(self.cob_id_value(pdo), low_byte(parameter(2)))?;
+            let inhibit = Duration::from_inhibit(parameter(3));
+            let event = Duration::from_millis(parameter(5).into());
+            Some(ScannerSettings { id: settings.id, addressing, own: self.node_id?, inhibit, event })
+        })
+    }
+
+    /// What the mapping makes of the PDO; `None` when it names what cannot be mapped.
+    fn content(&self, pdo: Pdo) -> Option<Content> {
+        let count = self.number(pdo.mapping(), 0);
+        match Addressing::from_count(low_byte(count)) {
+            Some(addressing) => Some(Content::Multiplexed(addressing)),
+            None => self.layout(pdo, count).ok().map(Content::Objects),
+        }
+    }
+
+    fn is_multiplexed(&self, pdo: Pdo) -> bool {
+        Addressing::from_count(low_byte(self.number(pdo.mapping(), 0))).is_some()
     }
 
     /// The layout of the first `count` mapping entries.
@@ -134,7 +161,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     /// The CAN-ID changes only while the PDO does not exist; to exist, it needs a CAN-ID that is free for PDOs, a
-    /// mapping, and remote frames if its type lives on them.
+    /// mapping, and remote frames if its type lives on them. A multiplexed PDO is sent by event.
     pub(super) fn admit_pdo_cob_id(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let pdo = Pdo::of(entry);
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
@@ -142,7 +169,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         let transmission = Transmission::parse(low_byte(self.number(entry.index(), 2)));
         let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
         let is_empty = self.number(pdo.mapping(), 0) == 0;
-        let cannot_exist = moves || contradicts || is_empty || new.id.is_restricted();
+        let is_not_sent = self.is_multiplexed(pdo) && transmission != Some(Transmission::Event);
+        let cannot_exist = moves || contradicts || is_empty || is_not_sent || new.id.is_restricted();
         if !new.bit31 && cannot_exist { Err(Abort::InvalidValue) } else { Ok(()) }
     }
 
@@ -152,7 +180,9 @@ impl<A: Application, const N: usize> Core<A, N> {
         let transmission = Transmission::parse(low_byte(value)).ok_or(Abort::InvalidValue)?;
         let no_remote = self.cob_id(pdo).is_some_and(|cob_id| !cob_id.bit31 && cob_id.bit30);
         let is_receive = pdo.direction == Direction::Receive;
-        if transmission.needs_remote() && (no_remote || is_receive) {
+        let is_not_sent =
+            self.is_multiplexed(pdo) && transmission != Transmission::Event && self.is_valid(pdo);
+        if is_not_sent || transmission.needs_remote() && (no_remote || is_receive) {
             return Err(Abort::InvalidValue);
         }
         Ok(())
@@ -164,7 +194,11 @@ impl<A: Application, const N: usize> Core<A, N> {
         if self.is_valid(pdo) {
             return Err(Abort::Access);
         }
-        self.layout(pdo, count).map(|_| ())
+        if Addressing::from_count(low_byte(count)).is_some() {
+            return Ok(());
+        }
+        let has_room = count == 0 || self.dictionary.find(entry.index(), low_byte(count)).is_ok();
+        if has_room { self.layout(pdo, count).map(|_| ()) } else { Err(Abort::ValueTooHigh) }
     }
 
     pub(super) fn admit_pdo_slot(&self, entry: &Entry, value: u32) -> Result<(), Abort> {

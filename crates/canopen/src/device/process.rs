@@ -35,7 +35,9 @@ impl<A: Application, const N: usize> Device<A, N> {
             core.poll_sync(now);
             core.poll_rpdos(now);
             core.each_tpdo(|tpdo, image| tpdo.poll(image, now, out));
-            core.process_due = core.next_tpdo().min(core.next_rpdo()).min(core.sync.due());
+            core.scanner.poll(&core.image, now, out);
+            let pdos = core.next_tpdo().min(core.next_rpdo()).min(core.scanner.due());
+            core.process_due = pdos.min(core.sync.due());
         }
         core.process_due
     }
@@ -45,6 +47,8 @@ impl<A: Application, const N: usize> Device<A, N> {
         let out = &mut self.gate(out);
         if self.core.state.has_pdos() {
             self.core.each_tpdo(|tpdo, image| tpdo.on_change(image, now, out));
+            self.core.scanner.on_change(&self.core.image, now, out);
+            self.core.process_due = self.core.process_due.min(self.core.scanner.due());
         }
     }
 

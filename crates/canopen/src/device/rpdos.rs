@@ -13,6 +13,9 @@ impl<A: Application, const N: usize> Core<A, N> {
             let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
             let Some(reception) = rpdo.take(frame, &mut self.image, now, late) else { continue };
             self.process_due = self.process_due.min(rpdo.due());
+            if let Reception::Multiplexed(addressing) = reception {
+                self.on_mpdo(frame.bytes(), addressing, now);
+            }
             if reception != Reception::Complete || self.faulty_rpdos.contains(number) {
                 self.on_reception(number, reception, now);
             }
@@ -25,7 +28,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         if reception != Reception::TooShort {
             self.clear(Fault::RpdoDeadline(number), now);
         }
-        self.faulty_rpdos.set(number, reception != Reception::Complete);
+        let is_faulty = matches!(reception, Reception::TooShort | Reception::TooLong);
+        self.faulty_rpdos.set(number, is_faulty);
     }
 
     fn set_rpdo_fault(&mut self, fault: Fault, active: bool, now: Instant) {

@@ -172,6 +172,11 @@ impl<A: Application, const N: usize> Core<A, N> {
             if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
         }
         self.rpdos.iter_mut().for_each(crate::pdo::Rpdo::stop);
+        if state.has_pdos() {
+            self.scanner.start();
+        } else {
+            self.scanner.stop();
+        }
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 

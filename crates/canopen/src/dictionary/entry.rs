@@ -53,7 +53,7 @@ impl Entry {
     /// Checks a value of the right length that is to be written.
     pub(crate) fn check_value(&self, bytes: &[u8]) -> Result<(), Abort> {
         match self.kind {
-            Type::VisibleString(_) | Type::Domain | Type::Unsigned48 => Ok(()),
+            Type::VisibleString(_) | Type::Domain | Type::Unsigned48 | Type::Unsigned64 => Ok(()),
             Type::Real32 => check_real(f32::from_bits(little_endian(bytes))),
             _ => self.check_limits(self.kind.integer(little_endian(bytes))),
         }

@@ -113,6 +113,8 @@ pub enum Rule {
     PdoCount,
     /// 1600h.., 1A00h..:1 and up, a mapped object.
     PdoSlot,
+    /// 1FA0h:1 and up, a line of the object scanner list.
+    ScannerLine,
     /// The application decides, by this number.
     Application(u8),
 }

@@ -17,6 +17,8 @@ pub enum Type {
     Unsigned32,
     /// UNSIGNED48
     Unsigned48,
+    /// UNSIGNED64; a default value of at most 63 bits.
+    Unsigned64,
     /// REAL32
     Real32,
     /// `VISIBLE_STRING` of at most this many characters.
@@ -34,6 +36,7 @@ impl Type {
             Type::Integer16 | Type::Unsigned16 => 2,
             Type::Integer32 | Type::Unsigned32 | Type::Real32 => 4,
             Type::Unsigned48 => 6,
+            Type::Unsigned64 => 8,
             Type::VisibleString(capacity) => capacity,
             Type::Domain => 0,
         }
@@ -53,6 +56,7 @@ impl Type {
             Type::VisibleString(_) => 0x09,
             Type::Domain => 0x0F,
             Type::Unsigned48 => 0x19,
+            Type::Unsigned64 => 0x1B,
         }
     }
 
@@ -67,6 +71,7 @@ impl Type {
             Type::Unsigned16 => Some((0, u16::MAX as i64)),
             Type::Unsigned32 => Some((0, u32::MAX as i64)),
             Type::Unsigned48 => Some((0, (1 << 48) - 1)),
+            Type::Unsigned64 => Some((0, i64::MAX)),
             Type::Real32 | Type::VisibleString(_) | Type::Domain => None,
         }
     }

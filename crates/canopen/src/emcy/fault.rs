@@ -39,6 +39,8 @@ pub enum Fault {
     SyncMissing,
     /// A SYNC of another length than 1019h asks for.
     SyncLength,
+    /// A multiplexed PDO for this node names an object that takes none.
+    MpdoNotTaken,
     /// The heartbeat of a node is missing: entry of 1016h, from 0.
     Heartbeat(u8),
     /// An RPDO, from 0, was shorter than its mapping and is not processed.
@@ -54,7 +56,7 @@ const COMMUNICATION: u8 = 16;
 
 impl Fault {
     /// Those that exist once.
-    const SINGLE: [Fault; 18] = [
+    const SINGLE: [Fault; 19] = [
         Fault::SensorClock,
         Fault::SensorBoot,
         Fault::SensorBreak,
@@ -73,6 +75,7 @@ impl Fault {
         Fault::BusOffRecovered,
         Fault::SyncMissing,
         Fault::SyncLength,
+        Fault::MpdoNotTaken,
     ];
 
     fn all() -> impl Iterator<Item = Fault> {
@@ -106,6 +109,7 @@ impl Fault {
             Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),
             Fault::SyncMissing => (COMMUNICATION + 3, 0x8100),
             Fault::SyncLength => (COMMUNICATION + 4, 0x8240),
+            Fault::MpdoNotTaken => (COMMUNICATION + 33, 0x8230),
             Fault::Heartbeat(number) => (COMMUNICATION + 5 + (number & 3), 0x8130),
             Fault::RpdoTooShort(number) => (COMMUNICATION + 9 + (number & 7), 0x8210),
             Fault::RpdoTooLong(number) => (COMMUNICATION + 17 + (number & 7), 0x8220),

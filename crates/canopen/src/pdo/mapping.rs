@@ -1,5 +1,6 @@
 //! PDO mapping: from mapping entries to places in the image, resolved once, when the mapping is enabled.
 
+use super::Addressing;
 use crate::dictionary::{Dictionary, Field, Mapping};
 use crate::sdo::Abort;
 
@@ -71,6 +72,15 @@ pub(crate) fn locate(
     if fits && same_length { Ok(field) } else { Err(Abort::NotMappable) }
 }
 
+/// What a PDO carries.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Content {
+    /// Mapped objects.
+    Objects(Layout),
+    /// One object at a time, which the PDO names.
+    Multiplexed(Addressing),
+}
+
 /// For each byte of the PDO the place in the image. Byte by byte, as nothing in the dictionary is shorter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Layout {
@@ -89,6 +99,11 @@ impl Layout {
         }
         self.len += field.size;
         Ok(())
+    }
+
+    /// Whether a value is in the PDO.
+    pub(crate) fn contains(&self, field: Field) -> bool {
+        self.places.iter().take(usize::from(self.len)).any(|&place| place == field.offset)
     }
 
     /// Bytes of the PDO.

@@ -3,7 +3,7 @@
 //! The types 0 to 240 take it with the next SYNC, the types 254 and 255 at once. With an event timer, it must come
 //! again within that time.
 
-use super::{Layout, Transmission};
+use super::{Addressing, Content, Transmission};
 use crate::{CanId, CobId, Duration, Frame, Instant};
 
 /// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
@@ -13,7 +13,7 @@ pub(crate) struct RpdoSettings {
     is_synchronous: bool,
     /// Deadline between two receptions; zero for none.
     deadline: Duration,
-    layout: Layout,
+    content: Content,
 }
 
 impl RpdoSettings {
@@ -22,12 +22,22 @@ impl RpdoSettings {
         cob_id: u32,
         transmission: u8,
         deadline: Duration,
-        layout: Layout,
+        content: Content,
     ) -> Option<RpdoSettings> {
         let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
         let transmission = Transmission::parse(transmission).filter(|kind| !kind.needs_remote())?;
         let is_synchronous = transmission != Transmission::Event;
-        Some(RpdoSettings { id: cob_id.id, is_synchronous, deadline, layout })
+        Some(RpdoSettings { id: cob_id.id, is_synchronous, deadline, content })
+    }
+}
+
+impl RpdoSettings {
+    /// Bytes that it must have.
+    fn len(&self) -> usize {
+        match &self.content {
+            Content::Objects(layout) => layout.len().into(),
+            Content::Multiplexed(_) => 8,
+        }
     }
 }
 
@@ -40,6 +50,8 @@ pub(crate) enum Reception {
     TooShort,
     /// Too long: the first bytes are taken (EMCY 8220h).
     TooLong,
+    /// Complete, and of this kind: the device finds out where it goes.
+    Multiplexed(Addressing),
 }
 
 /// An RPDO. Without settings it does not exist.
@@ -82,23 +94,27 @@ impl Rpdo {
         late: bool,
     ) -> Option<Reception> {
         let settings = self.settings.as_ref().filter(|settings| settings.id.get() == frame.id())?;
-        let mapped = usize::from(settings.layout.len());
+        let mapped = settings.len();
         if frame.len() < mapped {
             return Some(Reception::TooShort);
         }
         self.due = if settings.deadline.is_zero() { Instant::NEVER } else { now + settings.deadline };
-        match settings.is_synchronous {
-            false => settings.layout.scatter(frame.bytes(), image),
-            true if late => (),
-            true => self.waiting = Some(frame.bytes()),
+        match (&settings.content, settings.is_synchronous) {
+            (Content::Multiplexed(addressing), _) => return Some(Reception::Multiplexed(*addressing)),
+            (Content::Objects(layout), false) => layout.scatter(frame.bytes(), image),
+            (Content::Objects(_), true) if late => (),
+            (Content::Objects(_), true) => self.waiting = Some(frame.bytes()),
         }
         Some(if frame.len() == mapped { Reception::Complete } else { Reception::TooLong })
     }
 
     /// A SYNC arrived: what waits becomes valid.
     pub(crate) fn on_sync(&mut self, image: &mut [u8]) {
-        if let (Some(settings), Some(data)) = (&self.settings, self.waiting.take()) {
-            settings.layout.scatter(data, image);
+        let data = self.waiting.take();
+        if let (Some(RpdoSettings { content: Content::Objects(layout), .. }), Some(data)) =
+            (&self.settings, data)
+        {
+            layout.scatter(data, image);
         }
     }
 

@@ -39,12 +39,13 @@ impl Sender {
         self.phase == Phase::Sending
     }
 
-    /// The client is ready for the first block.
-    pub(super) fn start(&mut self) -> Result<(), Abort> {
-        if self.phase != Phase::Ready {
-            return Err(Abort::Command);
+    /// The client is ready for the first block. It may say so twice.
+    pub(super) fn start(&mut self, is_repeated: bool) -> Result<(), Abort> {
+        match self.phase {
+            Phase::Ready => self.phase = Phase::Sending,
+            _ if is_repeated => (),
+            _ => return Err(Abort::Command),
         }
-        self.phase = Phase::Sending;
         Ok(())
     }
 
@@ -81,7 +82,8 @@ impl Sender {
 
     /// The client has the block up to a segment and states the size of the next. The end, when it has everything.
     ///
-    /// One that comes while the block is still going out, or that has more than the block, is the last one repeated.
+    /// One that comes while the block is still going out, or that has more than the block, is the last one repeated. The
+    /// last one of all is answered again.
     pub(super) fn acknowledge(
         &mut self,
         sequence: u8,
@@ -93,6 +95,7 @@ impl Sender {
             Phase::Waiting if sequence > self.sequence && is_repeated => return Ok(None),
             Phase::Waiting if sequence > self.sequence => return Err(Abort::Sequence),
             Phase::Waiting => (),
+            Phase::Ended if is_repeated => return Ok(Some(self.end())),
             Phase::Ready | Phase::Ended => return Err(Abort::Command),
         }
         self.block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
@@ -100,7 +103,11 @@ impl Sender {
         self.sequence = 0;
         let is_all = self.acknowledged >= self.source.len();
         self.phase = if is_all { Phase::Ended } else { Phase::Sending };
-        Ok(is_all.then(|| BlockEnd::of(self.source.len(), self.crc)))
+        Ok(is_all.then(|| self.end()))
+    }
+
+    fn end(&self) -> BlockEnd {
+        BlockEnd::of(self.source.len(), self.crc)
     }
 
     /// The client confirms the end.

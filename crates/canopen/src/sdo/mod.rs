@@ -30,12 +30,12 @@ pub struct Multiplexer {
 }
 
 impl Multiplexer {
-    const fn parse(frame: [u8; 8]) -> Multiplexer {
+    pub(crate) const fn parse(frame: [u8; 8]) -> Multiplexer {
         Multiplexer { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
     }
 
     /// A frame with it, its command specifier and four bytes.
-    const fn frame(self, command: u8, data: [u8; 4]) -> [u8; 8] {
+    pub(crate) const fn frame(self, command: u8, data: [u8; 4]) -> [u8; 8] {
         let [low, high] = self.index.to_le_bytes();
         [command, low, high, self.sub, data[0], data[1], data[2], data[3]]
     }

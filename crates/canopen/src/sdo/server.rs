@@ -93,14 +93,17 @@ impl Server {
     }
 
     /// The answer to a frame that came twice, be it that the bus repeated it or that the client missed the answer.
-    /// Segments and the end of a block download change from one to the next; only they can be known as repeated.
+    /// Segments and the end of a block download change from one to the next; only they can be known as repeated, and
+    /// what begins a block download, as no first segment looks like it.
     fn repeated(&self, frame: [u8; 8]) -> Option<Response> {
         let (previous, response) = self.previous;
         let changes = matches!(frame[0] >> 5, 0 | 3) || frame[0] & 0xE1 == 0xC1;
-        response.filter(|_| changes && frame == previous && !self.wants_block_segments())
+        let is_begin = matches!(response, Some(Response::BlockDownload(..)));
+        response.filter(|_| frame == previous && (is_begin || changes && !self.wants_block_segments()))
     }
 
     fn dispatch(&mut self, frame: [u8; 8], objects: &mut impl Objects, now: Instant) -> Answer {
+        let is_repeated = frame == self.previous.0;
         match Request::parse(frame).ok_or(Abort::Command)? {
             Request::Upload(at) => self.upload(at, objects),
             Request::Download(at, initiate) => self.download(at, initiate, objects, now),
@@ -115,12 +118,13 @@ impl Server {
             Request::BlockUpload { at, block_size, threshold, .. } => {
                 self.block_upload(at, block_size, threshold, objects)
             }
-            Request::BlockUploadStart => self.sender()?.start().map(|()| None),
+            Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| None),
             Request::BlockAcknowledge { sequence, block_size } => {
-                let is_repeated = frame == self.previous.0;
                 let end = self.sender()?.acknowledge(sequence, block_size, is_repeated)?;
                 Ok(end.map(Response::BlockUploadEnd))
             }
+            // The confirmation of the end is not answered; one that was refused is refused again.
+            Request::BlockUploadEnded if is_repeated && self.previous.1.is_none() => Ok(None),
             Request::BlockUploadEnded => {
                 self.sender()?.ended()?;
                 self.transfer = Transfer::Idle;

@@ -288,6 +288,37 @@ fn a_block_leaves_room_in_the_queue() {
     assert_eq!(client.block().len(), 100);
 }
 
+#[test]
+fn the_begin_of_a_download_that_comes_twice_is_no_segment() {
+    let mut client = Client::new();
+    let request = Request::BlockDownload { at: DOMAIN, crc: true, size: Some(7) };
+    let ready = client.bench.ask(request);
+    assert!(matches!(ready, Some(Response::BlockDownload(DOMAIN, _))));
+    assert_eq!(client.bench.ask(request), ready);
+    assert_eq!(
+        client.send_segment(segment(&data(7), 0, 1)),
+        Some(Response::BlockAcknowledge(1, BlockSize::MAX))
+    );
+    assert_eq!(client.bench.ask(Request::BlockDownloadEnd(end(&data(7)))), Some(Response::BlockDownloaded));
+}
+
+#[test]
+fn the_requests_of_an_upload_may_come_twice() {
+    let mut client = Client::new();
+    client.bench.device.application_mut().domain = data(20);
+    client.bench.ask(Request::BlockUpload { at: DOMAIN, crc: true, block_size: 3, threshold: 0 });
+    client.request(Request::BlockUploadStart);
+    client.request(Request::BlockUploadStart);
+    assert_eq!(client.block().len(), 3);
+    let all = Request::BlockAcknowledge { sequence: 3, block_size: 3 };
+    for _ in 0..2 {
+        assert_eq!(client.bench.ask(all), Some(Response::BlockUploadEnd(end(&data(20)))));
+    }
+    client.request(Request::BlockUploadEnded);
+    client.request(Request::BlockUploadEnded);
+    assert_eq!(client.block(), [[0; 8]; 0]);
+}
+
 proptest! {
     #![proptest_config(repeatable())]
 

@@ -6,6 +6,7 @@ mod emcy;
 mod heartbeat;
 mod lss;
 mod mapping;
+mod multiplexed;
 mod nmt;
 mod robustness;
 mod rpdo;

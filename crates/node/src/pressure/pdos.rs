@@ -78,7 +78,9 @@ const fn rpdo(number: u16, name: &'static str) -> [Object; 4] {
 }
 
 const fn mapping(index: u16, name: &'static str) -> [Object; 9] {
-    let mut rows = [count(index, name, 8, 0); 9];
+    // No limit in the table: 254 and 255 make it a multiplexed PDO, and the rule knows how many slots there are.
+    let count = parameter(index, 0, name, Type::Unsigned8, Rule::PdoCount);
+    let mut rows = [count; 9];
     let mut sub = 1;
     while sub <= 8 {
         rows[sub as usize] = slot(index, sub, 0);

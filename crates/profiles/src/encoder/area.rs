@@ -1,72 +1,89 @@
-//! Work area supervision: objects 6400h, 6401h and 6402h.
+//! Work area supervision: objects 6400h, 6401h, 6402h and 650Ah.
 
-/// The work area of one channel.
+/// The area state register (6400h): outside of the manufacturer's limits.
+pub const OUT_OF_RANGE: u8 = 1 << 0;
+/// The area state register (6400h): above the work area.
+pub const OVERFLOW: u8 = 1 << 1;
+/// The area state register (6400h): below the work area.
+pub const UNDERFLOW: u8 = 1 << 2;
+
+/// The work area of one channel, in position values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Area {
     /// Work area low limit (6401h).
     pub low: i32,
     /// Work area high limit (6402h).
     pub high: i32,
-    /// Lowest position the manufacturer allows (650Ah:2).
-    pub manufacturer_low: i32,
-    /// Highest position the manufacturer allows (650Ah:3).
-    pub manufacturer_high: i32,
 }
 
-/// The area state register (6400h).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AreaState(pub u8);
-
-impl AreaState {
-    /// Bit 0: outside of the manufacturer's limits.
-    pub const OUT_OF_RANGE: u8 = 1 << 0;
-    /// Bit 1: above the work area.
-    pub const OVERFLOW: u8 = 1 << 1;
-    /// Bit 2: below the work area.
-    pub const UNDERFLOW: u8 = 1 << 2;
+/// What the manufacturer says about the sensor (650Ah), in its own steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Module {
+    /// From the sensor's own zero to that of the encoder (650Ah:1).
+    pub offset: i32,
+    /// Lowest position (650Ah:2).
+    pub low: i32,
+    /// Highest position (650Ah:3).
+    pub high: i32,
 }
 
-impl Area {
-    /// The state at a position. Limits belong to the area; only what is beyond them is reported.
-    #[must_use]
-    pub fn state(&self, position: u32) -> AreaState {
-        let position = i64::from(position);
-        let outside =
-            position < i64::from(self.manufacturer_low) || position > i64::from(self.manufacturer_high);
-        let bit = |set: bool, mask: u8| if set { mask } else { 0 };
-        AreaState(
-            bit(outside, AreaState::OUT_OF_RANGE)
-                | bit(position > i64::from(self.high), AreaState::OVERFLOW)
-                | bit(position < i64::from(self.low), AreaState::UNDERFLOW),
-        )
+impl Default for Module {
+    /// No limits.
+    fn default() -> Module {
+        Module { offset: 0, low: i32::MIN, high: i32::MAX }
     }
+}
+
+/// The area state register at a position value and a position in native steps.
+///
+/// Limits belong to the area; only what is beyond them is reported, or a sensor that uses its whole range would be out
+/// of range at both ends ("is reached" in CiA 406). The limits are signed and 6004h is not: both are compared in 64
+/// bits. The ends of INTEGER32 are no limits to the sensor.
+#[must_use]
+pub fn area_state(area: &Area, module: &Module, position: u32, native: i64) -> u8 {
+    let position = i64::from(position);
+    let native = i32::try_from(native).unwrap_or(if native < 0 { i32::MIN } else { i32::MAX });
+    let bit = |set: bool, mask: u8| if set { mask } else { 0 };
+    bit(native < module.low || native > module.high, OUT_OF_RANGE)
+        | bit(position > area.high.into(), OVERFLOW)
+        | bit(position < area.low.into(), UNDERFLOW)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const AREA: Area = Area { low: 100, high: 200 };
+
     #[test]
     fn only_what_is_beyond_a_limit_is_reported() {
-        let area = Area { low: 100, high: 200, manufacturer_low: 50, manufacturer_high: 250 };
-        let expected = [
-            (49, AreaState::OUT_OF_RANGE | AreaState::UNDERFLOW),
-            (50, AreaState::UNDERFLOW),
-            (99, AreaState::UNDERFLOW),
-            (100, 0),
-            (200, 0),
-            (201, AreaState::OVERFLOW),
-            (250, AreaState::OVERFLOW),
-            (251, AreaState::OUT_OF_RANGE | AreaState::OVERFLOW),
-        ];
-        for (position, state) in expected {
-            assert_eq!(area.state(position), AreaState(state), "at {position}");
+        let module = Module { offset: 0, low: -50, high: 50 };
+        for (position, native, state) in [
+            (99, 0, UNDERFLOW),
+            (100, 0, 0),
+            (200, 0, 0),
+            (201, 0, OVERFLOW),
+            (150, -50, 0),
+            (150, -51, OUT_OF_RANGE),
+            (150, 50, 0),
+            (150, 51, OUT_OF_RANGE),
+            (150, i64::MIN, OUT_OF_RANGE),
+            (u32::MAX, i64::MAX, OUT_OF_RANGE | OVERFLOW),
+        ] {
+            assert_eq!(area_state(&AREA, &module, position, native), state, "at {position}, {native}");
         }
     }
 
     #[test]
-    fn the_upper_half_of_the_position_is_above_every_limit() {
-        let area = Area { low: 0, high: i32::MAX, manufacturer_low: 0, manufacturer_high: i32::MAX };
-        assert_eq!(area.state(u32::MAX), AreaState(AreaState::OUT_OF_RANGE | AreaState::OVERFLOW));
+    fn a_module_without_limits_is_never_out_of_range() {
+        for native in [i64::MIN, 0, i64::MAX] {
+            assert_eq!(area_state(&AREA, &Module::default(), 150, native), 0);
+        }
+    }
+
+    #[test]
+    fn limits_in_the_wrong_order_are_both_exceeded_in_between() {
+        let area = Area { low: 200, high: 100 };
+        assert_eq!(area_state(&area, &Module::default(), 150, 0), OVERFLOW | UNDERFLOW);
     }
 }

@@ -1,6 +1,9 @@
 //! Electronic cams: objects 6300h to 6337h, eight a channel.
 
 /// One cam of one channel.
+///
+/// Active from the low to the high limit, both included; once active until the position is further outside than the
+/// hysteresis. Limits in the wrong order are taken in the right one (CiA 406 is silent).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cam {
     /// Low limit (6310h to 6317h).
@@ -11,56 +14,78 @@ pub struct Cam {
     pub hysteresis: u16,
 }
 
-impl Cam {
-    /// Whether the cam is active at `position`, when it was `before` (or nobody knows).
-    ///
-    /// Active from the low to the high limit, both included; once active until the position is further outside
-    /// than the hysteresis. Limits in the wrong order are taken in the right one (CiA 406 is silent). The limits
-    /// are signed and the position is not, so both are compared in 64 bits.
-    #[must_use]
-    pub fn active(&self, position: u32, before: Option<bool>) -> bool {
-        let margin = if before == Some(true) { i64::from(self.hysteresis) } else { 0 };
-        let low = i64::from(self.low.min(self.high)) - margin;
-        let high = i64::from(self.low.max(self.high)) + margin;
-        (low..=high).contains(&i64::from(position))
-    }
-}
-
-/// Which cams of a channel work, and how they show.
+/// The cams of one channel, which of them work, and how they show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CamControl {
+pub struct Cams {
+    /// In the order of their bits.
+    pub cams: [Cam; 8],
     /// Cam enable (6301h): bit n - 1 for cam n.
     pub enable: u8,
     /// Cam polarity (6302h): a set bit shows an active cam as 0.
     pub polarity: u8,
 }
 
-/// The cams of one channel with what hysteresis must remember.
+/// An interval of positions.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    low: u32,
+    /// The highest position less the lowest.
+    length: u32,
+}
+
+impl Window {
+    /// The interval with this margin on both sides. The limits are signed and the position is not: what lies below
+    /// zero no position reaches; `None` when that is all.
+    fn new(cam: &Cam, margin: u16) -> Option<Window> {
+        let low = i64::from(cam.low.min(cam.high)) - i64::from(margin);
+        let high = i64::from(cam.low.max(cam.high)) + i64::from(margin);
+        let (low, high) = (u32::try_from(low.max(0)).ok()?, u32::try_from(high).ok()?);
+        Some(Window { low, length: high - low })
+    }
+
+    fn contains(self, position: u32) -> bool {
+        position.wrapping_sub(self.low) <= self.length
+    }
+}
+
+/// The cams of one channel, ready to be looked up, with what hysteresis must remember.
 #[derive(Clone, Debug, Default)]
 pub struct CamChannel {
+    enable: u8,
+    polarity: u8,
+    /// Those whose limits some position can reach.
+    reachable: u8,
+    /// Where a cam goes on, and where it stays on.
+    windows: [[Window; 2]; 8],
     active: u8,
-    known: u8,
 }
 
 impl CamChannel {
-    /// The cam state register (6300h) at `position`.
-    ///
-    /// A cam that is not enabled reads 0 whatever its polarity (6301h: its calculation is off) and forgets its
-    /// state, so after enabling the window alone decides.
-    pub fn update(&mut self, cams: &[Cam; 8], control: CamControl, position: u32) -> u8 {
-        self.known &= control.enable;
-        let mut active = 0;
-        for (cam, bit) in cams.iter().zip((0..8).map(|n| 1_u8 << n)) {
-            let before = (self.known & bit != 0).then_some(self.active & bit != 0);
-            if control.enable & bit != 0 && cam.active(position, before) {
-                active |= bit;
-            }
+    /// Takes over parameters.
+    pub fn apply(&mut self, cams: &Cams) {
+        (self.enable, self.polarity, self.reachable) = (cams.enable, cams.polarity, 0);
+        for ((cam, windows), bit) in cams.cams.iter().zip(&mut self.windows).zip(BITS) {
+            let [on, stay] = [0, cam.hysteresis].map(|margin| Window::new(cam, margin));
+            self.reachable |= if on.is_some() { bit } else { 0 };
+            *windows = [on.unwrap_or_default(), stay.unwrap_or_default()];
         }
-        self.active = active;
-        self.known = control.enable;
-        (active ^ control.polarity) & control.enable
+    }
+
+    /// The cam state register (6300h) at `position`. A cam that is not enabled reads 0 whatever its polarity: 6301h says
+    /// that its calculation is off and its state permanently 0. It forgets its state, so after enabling its limits alone
+    /// decide.
+    pub fn update(&mut self, position: u32) -> u8 {
+        let mut active = 0;
+        for ([on, stay], bit) in self.windows.iter().zip(BITS) {
+            let window = if self.active & bit == 0 { on } else { stay };
+            active |= if window.contains(position) { bit } else { 0 };
+        }
+        self.active = active & self.enable & self.reachable;
+        (self.active ^ self.polarity) & self.enable
     }
 }
+
+const BITS: [u8; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
 
 #[cfg(test)]
 mod tests {
@@ -68,8 +93,26 @@ mod tests {
 
     use super::*;
 
+    fn channel(cam: Cam, enable: u8, polarity: u8) -> CamChannel {
+        let mut channel = CamChannel::default();
+        channel.apply(&Cams { cams: [cam; 8], enable, polarity });
+        channel
+    }
+
+    /// Limits near both ends of what a position and a limit can be, and near each other.
+    fn any_limit() -> impl Strategy<Value = i32> {
+        prop_oneof![-50..150_i32, Just(i32::MIN), Just(i32::MAX), i32::MAX - 50..i32::MAX, any::<i32>()]
+    }
+
+    fn any_position() -> impl Strategy<Value = u32> {
+        let edge = i32::MAX.unsigned_abs();
+        prop_oneof![0..200_u32, edge - 60..edge + 60, u32::MAX - 50..=u32::MAX, any::<u32>()]
+    }
+
     prop_compose! {
-        fn any_cam()(low in -50..150_i32, high in -50..150_i32, hysteresis in 0..20_u16) -> Cam {
+        fn any_cam()(
+            low in any_limit(), high in any_limit(), hysteresis in prop_oneof![0..20_u16, any::<u16>()],
+        ) -> Cam {
             Cam { low, high, hysteresis }
         }
     }
@@ -93,39 +136,37 @@ mod tests {
 
     proptest! {
         #[test]
-        fn agrees_with_a_walk(cam in any_cam(), positions in prop::collection::vec(0..200_u32, 1..60)) {
+        fn agrees_with_a_walk(
+            cams in prop::array::uniform8(any_cam()), enable: u8, polarity: u8,
+            positions in prop::collection::vec(any_position(), 1..60),
+        ) {
             let mut channel = CamChannel::default();
-            let cams = [cam; 8];
-            let control = CamControl { enable: 0xFF, polarity: 0x0F };
-            for (position, on) in positions.iter().zip(walk(cam, &positions)) {
-                let expected = if on { 0xF0 } else { 0x0F };
-                prop_assert_eq!(channel.update(&cams, control, *position), expected);
+            channel.apply(&Cams { cams, enable, polarity });
+            let walks = cams.map(|cam| walk(cam, &positions));
+            for (i, position) in positions.into_iter().enumerate() {
+                let active = walks.iter().zip(BITS).map(|(walk, bit)| if walk[i] { bit } else { 0 }).sum::<u8>();
+                prop_assert_eq!(channel.update(position), (active ^ polarity) & enable);
             }
-        }
-
-        #[test]
-        fn any_limits_and_position_are_accepted(low: i32, high: i32, hysteresis: u16, position: u32, enable: u8) {
-            let cams = [Cam { low, high, hysteresis }; 8];
-            let state = CamChannel::default().update(&cams, CamControl { enable, polarity: 0 }, position);
-            prop_assert_eq!(state & !enable, 0);
         }
     }
 
     #[test]
     fn a_disabled_cam_reads_zero_even_with_inverted_polarity() {
-        let cams = [Cam { low: 0, high: 100, hysteresis: 0 }; 8];
-        let control = CamControl { enable: 0, polarity: 0xFF };
-        assert_eq!(CamChannel::default().update(&cams, control, 50), 0);
+        let cam = Cam { low: 0, high: 100, hysteresis: 0 };
+        assert_eq!(channel(cam, 0, 0xFF).update(50), 0);
     }
 
     #[test]
-    fn enabling_again_forgets_the_hysteresis() {
-        let cams = [Cam { low: 10, high: 20, hysteresis: 5 }; 8];
-        let on = CamControl { enable: 1, polarity: 0 };
-        let mut channel = CamChannel::default();
-        assert_eq!(channel.update(&cams, on, 20), 1);
-        assert_eq!(channel.update(&cams, on, 25), 1);
-        assert_eq!(channel.update(&cams, CamControl::default(), 25), 0);
-        assert_eq!(channel.update(&cams, on, 25), 0);
+    fn new_limits_keep_the_state_and_enabling_again_forgets_it() {
+        let cam = Cam { low: 10, high: 20, hysteresis: 5 };
+        let cams = |enable| Cams { cams: [cam; 8], enable, polarity: 0 };
+        let mut channel = channel(cam, 1, 0);
+        assert_eq!(channel.update(20), 1);
+        channel.apply(&cams(1));
+        assert_eq!(channel.update(25), 1);
+        channel.apply(&cams(0));
+        assert_eq!(channel.update(25), 0);
+        channel.apply(&cams(1));
+        assert_eq!(channel.update(25), 0);
     }
 }

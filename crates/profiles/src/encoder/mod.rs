@@ -1,24 +1,77 @@
-//! Encoders as CiA 406 describes them: from native steps of a sensor to position, speed, cams and work area.
+//! Encoders as CiA 406 describes them: from what the hardware reads to position, speed, cams and work area.
 //!
 //! ```text
-//! sensor word -> Tracker -> Shaft -> Scale -> + offset -> position 6004h -> cams 6300h, area 6400h
-//!                             |
-//!                             +---> Speedometer -> speed 6030h
+//! timer count, index ─┐
+//!                     ├─ Input ─ Tracker ─ Shaft ─ Position (Scale, offset) ─ 6004h ─┬─ CamChannel 6300h
+//! SSI frame ── Format ┘             │                                                └─ area 6400h
+//!                                   └─ Speedometer ─ 6030h
 //! ```
 //!
-//! Everything here is arithmetic on values; where they come from (a timer in encoder mode, an SSI word) and where
-//! they go (the object dictionary) is the caller's affair.
+//! [`Encoder`] is two of these chains, and what is common to them: alarms, warnings, operating time.
+//!
+//! # What a sample costs
+//!
+//! At 1 kHz everything that can be computed when a parameter changes is computed then. A sample has no 64-bit division:
+//! units within a turn come from a multiplication by a fraction, turns add up one by one ([`Position`]), cams compare
+//! with windows that are ready, and the speed is one division in single precision.
+//!
+//! # Where CiA 406 is open
+//!
+//! Readings that are not in the text of CiA 406 v3.0 are collected here; the code refers to them.
+//!
+//! * 6000h bit 3 is printed "reward": reverse, as in 6500h. Bits that are reserved are refused, as is a direction bit that
+//!   no sensor has. In 6500h bit 1 says that the diagnostic is supported, not that it runs.
+//! * 6001h is at most the resolution of the sensor (6501h) and 6002h at most what it tells apart, as makers of encoders
+//!   have it. The position repeats after 6002h whatever its ratio to 6001h is, since turns are counted without end.
+//! * A preset is below 6002h; above, it is refused. In other units the offset is 0 again; counted the other way, the
+//!   position stays and the offset follows ([`Position::rescale`]).
+//! * 6010h and 6020h are INTEGER32 (v3.1), 6003h and 6004h UNSIGNED32: the same 32 bits. Limits of cams and of the work
+//!   area are signed and compare with the position as an unsigned number.
+//! * Both channels are scaled by the same 6000h to 6002h; 6005h is for those that are linear.
+//! * Cam limits in the wrong order are swapped; a cam that is not enabled reads 0 whatever its polarity; hysteresis
+//!   moves the points where a cam goes off outwards, and without history the limits alone decide ([`Cam`]).
+//! * 6400h bit 0 is set beyond the limits of 650Ah, not at them, and those limits have no channel: they hold for both.
+//! * An alarm stays until it is acknowledged, for which the manufacturer's object 2109h is there, and its cause has gone.
+//! * 6502h cannot hold 65 536 and 6501h not 2^32.
+//! * 1000h is type 10 when two channels are used, and the type of the sensor when one is.
 
 mod area;
 mod cam;
+mod chain;
+mod channel;
+mod commissioning;
+mod fraction;
+mod input;
+mod kept;
+mod parameters;
+mod position;
 mod scale;
+mod sensor;
 mod shaft;
 mod speed;
 mod ssi;
+mod supervision;
 
-pub use area::{Area, AreaState};
-pub use cam::{Cam, CamChannel, CamControl};
-pub use scale::{Invalid, Native, Scale, Settings};
+pub use area::{Area, Module, OUT_OF_RANGE, OVERFLOW, UNDERFLOW, area_state};
+pub use cam::{Cam, CamChannel, Cams};
+pub use chain::{Encoder, Snapshot};
+pub use channel::ChannelValues;
+pub use commissioning::Progress;
+pub use input::{
+    RawEncoder, SENSOR_ALARM, SENSOR_HELD, SENSOR_IMPLAUSIBLE, SENSOR_INDEX, SENSOR_NO_SIGNAL, SENSOR_PARITY,
+    SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED,
+};
+pub use kept::{Kept, KeptChannel, OperatingTime, Start};
+pub use parameters::{
+    CODE_SEQUENCE, COMMISSIONING, ChannelParameters, Command, DIRECTION, Parameters, SCALING,
+};
+pub use position::Position;
+pub use scale::{Native, Scale, Settings};
+pub use sensor::{Sensor, SensorType};
 pub use shaft::{Shaft, Tracker};
-pub use speed::{Ratio, Speedometer};
-pub use ssi::{Coding, Fault, Format, Parity, Reading};
+pub use speed::{STANDSTILL, Speedometer, speed_value};
+pub use ssi::{Coding, Fault, Format, Frame, Parity, Reading};
+pub use supervision::{
+    ALARM_COMMISSIONING, ALARM_POSITION, Board, Conditions, Limits, SUPPORTED_ALARMS, SUPPORTED_WARNINGS,
+    WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
+};

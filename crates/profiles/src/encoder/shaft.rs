@@ -1,129 +1,194 @@
 //! Where the shaft is, counted without end.
 
-use core::num::NonZeroU32;
+use core::num::{NonZeroU32, NonZeroU64};
 
-/// A mechanical position in native steps: whole revolutions since some origin, and the step within one.
+/// A mechanical position in native steps: whole turns since some origin, and the step within one.
+///
+/// A turn is a revolution of a rotary encoder; for a linear one, [`Scale::turn`](super::Scale::turn) says what it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Shaft {
-    /// Whole revolutions, negative below the origin.
+    /// Whole turns, negative below the origin.
     pub turns: i64,
-    /// Native step within the revolution, below the steps per revolution.
+    /// Native step within the turn, below the steps per turn.
     pub step: u32,
 }
 
-/// Follows a counter that wraps (a 16-bit timer, a single-turn or multi-turn word) without losing revolutions.
+impl Shaft {
+    /// The shaft at `total` steps from its origin.
+    #[must_use]
+    pub fn at(total: i64, turn: NonZeroU32) -> Shaft {
+        let turns = div_floor(total, turn);
+        Shaft { turns, step: remainder(total, turns, turn) }
+    }
+
+    /// Steps from its origin, modulo 2^64.
+    #[must_use]
+    pub fn total(self, turn: NonZeroU32) -> i64 {
+        self.turns.wrapping_mul(turn.get().into()).wrapping_add(self.step.into())
+    }
+}
+
+/// Follows a counter that wraps (a 16-bit timer, a single-turn or multi-turn word) without losing turns.
 ///
-/// Between two updates the shaft may turn less than half of what the counter can tell apart; a faster shaft is
+/// Between two readings the shaft may move less than half of what the counter can tell apart; a faster shaft is
 /// taken for a slower one in the other direction, as with every counter.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Tracker {
-    per_revolution: NonZeroU32,
-    modulus: u64,
-    last: u32,
+    turn: NonZeroU32,
+    /// Bits of a word that the counter does not have.
+    unused: u32,
+    word: u32,
     shaft: Shaft,
+    count: u32,
 }
 
 impl Tracker {
-    /// A counter that runs from 0 to `modulus - 1` (a modulus of zero means 2^32), with `per_revolution` native
-    /// steps, which stands at `raw` while the shaft is at `at`.
+    /// A counter of `bits` bits, 1 to 32, that reads `word` while the shaft is `total` steps from its origin.
     #[must_use]
-    pub fn new(per_revolution: NonZeroU32, modulus: u32, raw: u32, at: Shaft) -> Tracker {
-        let modulus = if modulus == 0 { 1 << 32 } else { u64::from(modulus) };
-        let step = at.step.min(per_revolution.get() - 1);
-        Tracker { per_revolution, modulus, last: raw, shaft: Shaft { step, ..at } }
+    pub fn new(turn: NonZeroU32, bits: u32, word: u32, total: i64) -> Tracker {
+        Tracker { turn, unused: 32 - bits.clamp(1, 32), word, shaft: Shaft::at(total, turn), count: 0 }
     }
 
-    /// Takes a new reading of the counter and returns where the shaft is.
-    pub fn update(&mut self, raw: u32) -> Shaft {
-        let delta = self.shortest(raw);
-        self.last = raw;
-        self.advance(delta);
-        self.shaft
+    /// Steps from the last reading to this one, the shorter way.
+    #[must_use]
+    pub fn distance(&self, word: u32) -> i32 {
+        (word.wrapping_sub(self.word) << self.unused).cast_signed() >> self.unused
     }
 
-    /// Where the shaft was at the last update.
+    /// Takes a reading; returns the steps moved.
+    pub fn follow(&mut self, word: u32) -> i32 {
+        let moved = self.distance(word);
+        self.word = word;
+        self.count = self.count.wrapping_add_signed(moved);
+        self.correct(moved.into());
+        moved
+    }
+
+    /// Puts the shaft elsewhere, though it has not moved.
+    pub fn correct(&mut self, steps: i64) {
+        let step = i64::from(self.shaft.step).wrapping_add(steps);
+        let turn = i64::from(self.turn.get());
+        // A shaft turns less than once in a sample: the division is for what never happens.
+        let turns = match step {
+            _ if step < -turn || step >= 2 * turn => div_floor(step, self.turn),
+            _ if step < 0 => -1,
+            _ => i64::from(step >= turn),
+        };
+        self.shaft.turns = self.shaft.turns.wrapping_add(turns);
+        self.shaft.step = remainder(step, turns, self.turn);
+    }
+
+    /// Counts in turns of another length from now on.
+    pub fn set_turn(&mut self, turn: NonZeroU32) {
+        if turn != self.turn {
+            self.shaft = Shaft::at(self.total(), turn);
+            self.turn = turn;
+        }
+    }
+
+    /// Where the shaft was at the last reading.
     #[must_use]
     pub fn shaft(&self) -> Shaft {
         self.shaft
     }
 
-    /// The way from the last reading to this one, the shorter of the two.
-    fn shortest(&self, raw: u32) -> i64 {
-        let forward = if raw >= self.last {
-            u64::from(raw - self.last)
-        } else {
-            (self.modulus + u64::from(raw)).saturating_sub(u64::from(self.last))
-        };
-        let forward = i64::try_from(forward).unwrap_or(0);
-        let modulus = i64::try_from(self.modulus).unwrap_or(i64::MAX);
-        if forward.saturating_mul(2) > modulus { forward - modulus } else { forward }
+    /// Steps from the origin at the last reading.
+    #[must_use]
+    pub fn total(&self) -> i64 {
+        self.shaft.total(self.turn)
     }
 
-    fn advance(&mut self, delta: i64) {
-        let per_revolution = i64::from(self.per_revolution.get());
-        let step = i64::from(self.shaft.step) + delta;
-        let turns = div_floor(step, self.per_revolution);
-        self.shaft.turns = self.shaft.turns.saturating_add(turns);
-        self.shaft.step = u32::try_from(step - turns * per_revolution).unwrap_or(0);
+    /// The last reading.
+    #[must_use]
+    pub fn word(&self) -> u32 {
+        self.word
+    }
+
+    /// All movement since the start, in steps modulo 2^32; a correction is none.
+    #[must_use]
+    pub fn count(&self) -> u32 {
+        self.count
     }
 }
 
-/// Division rounded towards minus infinity, by a divisor that cannot be zero.
+/// Division rounded towards minus infinity.
 fn div_floor(value: i64, divisor: NonZeroU32) -> i64 {
-    let divisor = core::num::NonZeroU64::from(divisor);
+    let divisor = NonZeroU64::from(divisor);
     let quotient = |n: u64| i64::try_from(n / divisor).unwrap_or(i64::MAX);
     if value >= 0 { quotient(value.unsigned_abs()) } else { -quotient(value.unsigned_abs() - 1) - 1 }
 }
 
+/// What is left of `value` after so many turns; less than one is.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn remainder(value: i64, turns: i64, turn: NonZeroU32) -> u32 {
+    value.wrapping_sub(turns.wrapping_mul(turn.get().into())) as u32
+}
+
 #[cfg(test)]
-#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
 
-    fn total(shaft: Shaft, per_revolution: u32) -> i64 {
-        shaft.turns * i64::from(per_revolution) + i64::from(shaft.step)
-    }
-
     proptest! {
         /// Against a plain sum of the movements.
         #[test]
         fn follows_any_movement_below_half_the_counter(
-            per_revolution in 1..100_000_u32,
-            modulus in 3..=u32::MAX,
+            turn in 1..=u32::MAX, bits in 2..=32_u32, start in -(1_i64 << 60)..1 << 60,
             moves in prop::collection::vec(-1.0..1.0_f64, 1..50),
         ) {
-            let steps = NonZeroU32::new(per_revolution).unwrap();
-            let mut tracker = Tracker::new(steps, modulus, 0, Shaft::default());
-            let mut position = 0_i64;
+            let turn = NonZeroU32::new(turn).unwrap();
+            let word = |total: i64| u32::try_from(total.rem_euclid(1 << bits)).unwrap();
+            let mut tracker = Tracker::new(turn, bits, word(start), start);
+            let mut total = start;
             for fraction in moves {
-                position += (fraction * f64::from((modulus - 1) / 2)) as i64;
-                let raw = u32::try_from(position.rem_euclid(i64::from(modulus))).unwrap();
-                let shaft = tracker.update(raw);
-                prop_assert_eq!(total(shaft, per_revolution), position);
-                prop_assert!(shaft.step < per_revolution);
+                total += (fraction * f64::from((1_u32 << (bits - 1)) - 1)) as i64;
+                tracker.follow(word(total));
+                prop_assert_eq!(tracker.total(), total);
+                prop_assert!(tracker.shaft().step < turn.get());
+                prop_assert_eq!(tracker.count(), total.wrapping_sub(start) as u32);
             }
         }
 
-        /// A counter may hold any word, also one outside its own modulus.
         #[test]
-        fn any_reading_leaves_a_step_inside_the_revolution(
-            per_revolution in 1..=u32::MAX, modulus: u32, words in prop::collection::vec(any::<u32>(), 1..20),
+        fn anything_leaves_a_step_inside_the_turn(
+            turn in 1..=u32::MAX, other in 1..=u32::MAX, bits: u32, start: i64,
+            words in prop::collection::vec(any::<u32>(), 1..20), corrections in prop::collection::vec(any::<i64>(), 1..20),
         ) {
-            let steps = NonZeroU32::new(per_revolution).unwrap();
-            let mut tracker = Tracker::new(steps, modulus, 0, Shaft { turns: 0, step: u32::MAX });
+            let turn = NonZeroU32::new(turn).unwrap();
+            let mut tracker = Tracker::new(turn, bits, 0, start);
             for word in words {
-                prop_assert!(tracker.update(word).step < per_revolution);
+                tracker.follow(word);
+                prop_assert!(tracker.shaft().step < turn.get());
             }
+            for steps in corrections {
+                tracker.correct(steps);
+                prop_assert!(tracker.shaft().step < turn.get());
+            }
+            tracker.set_turn(NonZeroU32::new(other).unwrap());
+            prop_assert!(tracker.shaft().step < other);
         }
     }
 
     #[test]
     fn a_counter_of_32_bits_wraps_both_ways() {
-        let steps = NonZeroU32::new(4096).unwrap();
-        let mut tracker = Tracker::new(steps, 0, u32::MAX, Shaft { turns: 5, step: 4095 });
-        assert_eq!(tracker.update(0), Shaft { turns: 6, step: 0 });
-        assert_eq!(tracker.update(u32::MAX - 1), Shaft { turns: 5, step: 4094 });
+        let turn = NonZeroU32::new(4096).unwrap();
+        let mut tracker = Tracker::new(turn, 32, u32::MAX, 5 * 4096 + 4095);
+        assert_eq!(tracker.follow(0), 1);
+        assert_eq!(tracker.shaft(), Shaft { turns: 6, step: 0 });
+        assert_eq!(tracker.follow(u32::MAX - 1), -2);
+        assert_eq!(tracker.shaft(), Shaft { turns: 5, step: 4094 });
+    }
+
+    #[test]
+    fn a_correction_is_no_movement() {
+        let turn = NonZeroU32::new(100).unwrap();
+        let mut tracker = Tracker::new(turn, 16, 0, 0);
+        tracker.follow(30);
+        tracker.correct(-40);
+        assert_eq!((tracker.shaft(), tracker.count()), (Shaft { turns: -1, step: 90 }, 30));
+        tracker.follow(35);
+        assert_eq!(tracker.total(), -5);
     }
 }

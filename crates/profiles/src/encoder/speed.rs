@@ -1,144 +1,225 @@
 //! Speed from positions: object 6030h.
 //!
-//! The difference of two positions over a window. A fast shaft is measured over one or a few milliseconds, so the
-//! value follows at once; a slow one over up to 128 ms, so a single step still counts. The window is the shortest
-//! one in which the shaft moved [`ENOUGH`] steps: the value is then exact to 1 in `ENOUGH`, and after a stop it falls
-//! steadily to zero.
+//! Steps divided by time between two milliseconds in which the position changed (the M/T method). The steps are exact
+//! and so is the time, to the millisecond, so one rule serves a fast shaft, which changes every millisecond, and a
+//! slow one, which changes once in many:
+//!
+//! * The interval ends at the last change and starts 1, 2, 4 .. 128 changes before: the shortest that has 256 steps or
+//!   128 ms, but none beyond 256 ms, except the one of a single change. What it says is exact to 1 %. It is found from
+//!   the one before: it grows to twice as many changes at most, and shrinks to any.
+//! * While nothing changes, the speed is at most one step in the time since. After [`STANDSTILL`] it is 0.
+//!
+//! So a shaft that starts or stops shows after a few milliseconds, and one that dithers between two steps stands still.
 
-use core::num::NonZeroU64;
+/// Changes that are remembered.
+const MARKS: u32 = 128;
+/// Steps that make an interval long enough.
+const ENOUGH_STEPS: u32 = 256;
+/// Milliseconds that make an interval long enough.
+const ENOUGH_TIME: u32 = 128;
+/// Milliseconds beyond which an interval says what was, not what is.
+const TOO_LONG: u32 = 256;
+/// Milliseconds without a change after which the shaft stands still: slower than about one step a second is 0.
+pub const STANDSTILL: u32 = 1024;
 
-/// Longest window in samples.
-const WINDOW: u32 = 128;
-
-/// Steps in a window that make it long enough.
-const ENOUGH: u32 = 64;
-
-/// A positive fraction that turns native steps per second into units of 6030h.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ratio {
-    /// Units.
-    pub numerator: u32,
-    /// Per this many native steps a second.
-    pub denominator: NonZeroU64,
+/// A change of the position.
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    /// In milliseconds.
+    time: u32,
+    /// Movement up to then.
+    count: u32,
 }
 
-/// Remembers the last 128 positions, one a millisecond.
+/// Movement between two changes.
+#[derive(Clone, Copy, Debug)]
+struct Interval {
+    steps: i32,
+    /// In milliseconds.
+    time: u32,
+}
+
+impl Interval {
+    fn is_enough(self) -> bool {
+        self.steps.unsigned_abs() >= ENOUGH_STEPS || self.time >= ENOUGH_TIME
+    }
+}
+
+/// Remembers the last 128 changes.
 #[derive(Clone, Debug)]
 pub struct Speedometer {
-    positions: [u32; WINDOW as usize],
+    marks: [Mark; MARKS as usize],
     next: u32,
+    /// Changes in the present interval.
+    changes: u32,
+    last: Mark,
+    now: u32,
+    /// Steps a millisecond.
+    rate: f32,
 }
 
 impl Speedometer {
-    /// A shaft that has stood at `position`.
+    /// A shaft that has stood still, with its movement counted modulo 2^32 from `count` on.
     #[must_use]
-    pub fn new(position: u32) -> Speedometer {
-        Speedometer { positions: [position; WINDOW as usize], next: 0 }
+    pub fn new(count: u32) -> Speedometer {
+        let last = Mark { time: 0, count };
+        Speedometer { marks: [last; MARKS as usize], next: 0, changes: 1, last, now: STANDSTILL, rate: 0.0 }
     }
 
-    /// Takes the position in native steps, counted modulo 2^32 without end, and returns the speed in units,
-    /// saturated to INTEGER16.
-    pub fn update(&mut self, position: u32, ratio: Ratio) -> i16 {
-        let (moved, millis) = self.window(position);
-        if let Some(oldest) = self.positions.get_mut(self.next as usize) {
-            *oldest = position;
+    /// Takes the movement up to now, once a millisecond; returns steps per second.
+    #[allow(clippy::cast_precision_loss)] // 24 bits are more than the 15 of the result.
+    pub fn update(&mut self, count: u32) -> f32 {
+        self.now = self.now.wrapping_add(1);
+        let silence = self.now.wrapping_sub(self.last.time);
+        if count != self.last.count {
+            let now = Mark { time: self.now, count };
+            self.rate = self.rate_until(now);
+            self.remember(now);
+        } else if silence >= STANDSTILL {
+            self.rate = 0.0;
+        } else {
+            let most = 1.0 / silence as f32;
+            self.rate = self.rate.max(-most).min(most);
         }
-        self.next = (self.next + 1) % WINDOW;
-        scaled(moved, millis, ratio)
+        self.rate * 1000.0
     }
 
-    /// The movement in the shortest window that is long enough, and its length in milliseconds.
-    fn window(&self, position: u32) -> (i32, u32) {
-        let moved = |millis| position.wrapping_sub(self.ago(millis)).cast_signed();
-        let millis = (1..WINDOW).find(|millis| moved(*millis).unsigned_abs() >= ENOUGH).unwrap_or(WINDOW);
-        (moved(millis), millis)
+    #[allow(clippy::cast_precision_loss)]
+    fn rate_until(&mut self, now: Mark) -> f32 {
+        let mut changes = (self.changes * 2).min(MARKS);
+        let mut interval = self.since(changes, now);
+        while changes > 1 {
+            let half = self.since(changes / 2, now);
+            if interval.time <= TOO_LONG && !half.is_enough() {
+                break;
+            }
+            (changes, interval) = (changes / 2, half);
+        }
+        self.changes = changes;
+        interval.steps as f32 / interval.time as f32
     }
 
-    /// The position `millis` samples before the one that comes next.
-    fn ago(&self, millis: u32) -> u32 {
-        let index = (self.next + WINDOW - millis) % WINDOW;
-        self.positions.get(index as usize).copied().unwrap_or(0)
+    /// The interval since that many changes before.
+    fn since(&self, changes: u32, now: Mark) -> Interval {
+        let index = self.next.wrapping_sub(changes) % MARKS;
+        let mark = self.marks.get(index as usize).copied().unwrap_or(self.last);
+        let steps = now.count.wrapping_sub(mark.count).cast_signed();
+        Interval { steps, time: now.time.wrapping_sub(mark.time) }
+    }
+
+    fn remember(&mut self, mark: Mark) {
+        if let Some(oldest) = self.marks.get_mut(self.next as usize) {
+            *oldest = mark;
+        }
+        self.next = (self.next + 1) % MARKS;
+        self.last = mark;
     }
 }
 
-/// `moved / millis * 1000 * ratio`, rounded towards zero.
-fn scaled(moved: i32, millis: u32, ratio: Ratio) -> i16 {
-    let units = u128::from(moved.unsigned_abs()) * 1000 * u128::from(ratio.numerator);
-    let per = u128::from(ratio.denominator.get()) * u128::from(millis);
-    let speed = i16::try_from(units.checked_div(per).unwrap_or(0)).unwrap_or(i16::MAX);
-    match (moved < 0, speed) {
-        (true, i16::MAX) => i16::MIN,
-        (true, speed) => -speed,
-        (false, speed) => speed,
-    }
+/// Steps per second as the value of 6030h: in units, rounded to the nearest, saturated to INTEGER16.
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // `as` saturates.
+pub fn speed_value(per_second: f32, units_per_step: f32) -> i16 {
+    let value = per_second * units_per_step;
+    (if value < 0.0 { value - 0.5 } else { value + 0.5 }) as i16
 }
 
 #[cfg(test)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
-    const UNITS: Ratio = Ratio { numerator: 1, denominator: NonZeroU64::MIN };
+    /// Turns evenly from `start` on and gives the speed at every millisecond.
+    fn turn(start: u32, per_second: f64, millis: i64) -> Vec<f32> {
+        let mut speedometer = Speedometer::new(start);
+        let at = |t: i64| (per_second * t as f64 / 1000.0).floor() as i64;
+        (1..=millis).map(|t| speedometer.update(start.wrapping_add(at(t) as u32))).collect()
+    }
 
-    /// Steps per second exactly, sampled at whole milliseconds.
-    fn turn(per_second: i64, millis: i64, ratio: Ratio) -> i16 {
-        let mut speedometer = Speedometer::new(0);
-        let mut speed = 0;
-        for t in 1..=millis {
-            let position = (per_second * t).div_euclid(1000);
-            speed = speedometer.update(u32::try_from(position.rem_euclid(1 << 32)).unwrap(), ratio);
+    fn deviation(speed: f32, per_second: f64) -> f64 {
+        (f64::from(speed) - per_second).abs() / per_second.abs()
+    }
+
+    proptest! {
+        /// From one step in half a second to 30 steps in a microsecond, wherever the counter wraps.
+        #[test]
+        fn is_exact_to_one_per_cent_at_any_speed(start: u32, exponent in 0.31..7.4_f64, backwards: bool) {
+            let per_second = 10_f64.powf(exponent) * if backwards { -1.0 } else { 1.0 };
+            for speed in turn(start, per_second, 1500).split_off(1000) {
+                prop_assert!(deviation(speed, per_second) < 0.01, "{} for {}", speed, per_second);
+            }
         }
-        speed
-    }
 
-    #[test]
-    fn stands_still_at_zero() {
-        assert_eq!(turn(0, 500, UNITS), 0);
-    }
-
-    #[test]
-    fn is_within_one_part_in_64_from_low_to_top_speed() {
-        for per_second in [500, 1_000, 5_000, 20_000, 32_000] {
-            for direction in [1, -1] {
-                let speed = i64::from(turn(per_second * direction, 300, UNITS));
-                let error = (speed - per_second * direction).abs();
-                assert!(error * 64 <= per_second, "{speed} for {}", per_second * direction);
+        #[test]
+        fn any_movement_gives_a_number(counts in prop::collection::vec(any::<u32>(), 1..300), factor in 0.0..1e9_f32) {
+            let mut speedometer = Speedometer::new(0);
+            for count in counts {
+                let speed = speedometer.update(count);
+                prop_assert!(speed.is_finite() && (speed * factor).is_finite());
             }
         }
     }
 
     #[test]
-    fn a_creeping_shaft_shows() {
-        let speed = turn(16, 1000, UNITS);
-        assert!((8..=24).contains(&speed), "{speed}");
+    fn stands_still_at_zero() {
+        assert!(turn(7, 0.0, 5000).iter().all(|speed| *speed == 0.0));
     }
 
     #[test]
-    fn saturates() {
-        assert_eq!(turn(1_000_000, 10, UNITS), i16::MAX);
-        assert_eq!(turn(-1_000_000, 10, UNITS), i16::MIN);
-    }
-
-    /// 6000 rpm of a sensor with 4096 steps, in units of a tenth of a degree, across the wrap of the counter.
-    #[test]
-    fn converts_to_units_and_does_not_jump_at_the_wrap() {
-        let ratio = Ratio { numerator: 3600, denominator: NonZeroU64::new(4096 * 100).unwrap() };
-        let mut speedometer = Speedometer::new(u32::MAX - 10_000);
-        let mut position = u32::MAX - 10_000;
-        let mut speeds = (0..100).map(|_| {
-            position = position.wrapping_add(4096 / 10);
-            speedometer.update(position, ratio)
-        });
-        assert!(speeds.all(|speed| (3590..=3600).contains(&speed)));
-    }
-
-    #[test]
-    fn follows_a_stop_within_the_window() {
-        let mut speedometer = Speedometer::new(0);
-        for t in 1..=50_u32 {
-            speedometer.update(t * 100, UNITS);
+    fn a_start_shows_in_the_second_millisecond() {
+        for per_second in [-3_000_000.0, 409_600.0] {
+            let speeds = turn(0, per_second, 3);
+            assert!(speeds[1..].iter().all(|speed| deviation(*speed, per_second) < 0.01), "{speeds:?}");
         }
-        let stopped: Vec<i16> = (0..128).map(|_| speedometer.update(5000, UNITS)).collect();
-        assert_eq!(stopped.last(), Some(&0));
+    }
+
+    #[test]
+    fn a_stop_shows_at_once_and_falls_to_zero() {
+        let mut speedometer = Speedometer::new(0);
+        (1..=50_u32).for_each(|t| _ = speedometer.update(t * 100));
+        let stopped: Vec<f32> = (0..STANDSTILL).map(|_| speedometer.update(5000)).collect();
+        assert!(stopped[0] <= 1000.0 && stopped[9] <= 100.0);
         assert!(stopped.windows(2).all(|pair| pair[1] <= pair[0]));
+        assert_eq!(stopped.last(), Some(&0.0));
+    }
+
+    #[test]
+    fn a_turn_back_shows_the_other_way() {
+        let mut speedometer = Speedometer::new(0);
+        (1..=100_u32).for_each(|t| _ = speedometer.update(t * 400));
+        let back: Vec<f32> = (1..=3).map(|t| speedometer.update(40_000 - t * 400)).collect();
+        assert!(back.iter().all(|speed| deviation(*speed, -400_000.0) < 0.01), "{back:?}");
+    }
+
+    /// Two steps a second, then a hundred: the long pauses before say nothing about now.
+    #[test]
+    fn a_slow_shaft_that_speeds_up_forgets_how_slow_it_was() {
+        let mut speedometer = Speedometer::new(0);
+        (1..=3000_u32).for_each(|t| _ = speedometer.update(t / 500));
+        let speeds: Vec<f32> = (1..=300_u32).map(|t| speedometer.update(6 + t / 10)).collect();
+        assert!(speeds[20..].iter().all(|speed| deviation(*speed, 100.0) < 0.01), "{speeds:?}");
+    }
+
+    #[test]
+    fn dithering_between_two_steps_is_no_speed() {
+        let mut speedometer = Speedometer::new(0);
+        let speeds = (0..1000_u32).map(|t| speedometer.update(t % 2)).skip(200);
+        assert!(speeds.into_iter().all(|speed| speed == 0.0));
+    }
+
+    #[test]
+    fn rounds_and_saturates() {
+        for (speed, factor, value) in [
+            (409_600.0, 3600.0 / 4096.0 / 100.0, 3600),
+            (0.49, 1.0, 0),
+            (-0.51, 1.0, -1),
+            (32_766.6, 1.0, 32_767),
+            (1e9, 1.0, i16::MAX),
+            (-1e9, 1.0, i16::MIN),
+        ] {
+            assert_eq!(speed_value(speed, factor), value);
+        }
     }
 }

@@ -1,6 +1,18 @@
-//! The word of an absolute encoder with synchronous serial interface.
+//! The frame of an absolute encoder with synchronous serial interface.
 //!
-//! Most significant bit first: revolutions, steps, then an alarm bit and a parity bit where the encoder has them.
+//! At rest the line is high; the first clock latches the position. So the first bit that is clocked in is the rest level,
+//! then comes the word with the most significant bit first: revolutions, steps, then an alarm bit and a parity bit where
+//! the encoder has them. Then the line is low until the clock has rested for the monoflop time. The level before the
+//! word and the one after it tell an encoder from a line that is open or shorted.
+
+/// What was clocked in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Frame {
+    /// The bits, the last one in bit 0.
+    pub bits: u64,
+    /// How many, from the rest level on: at least two more than the word has.
+    pub clocks: u32,
+}
 
 /// How the position is coded on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +42,8 @@ pub struct Format {
     coding: Coding,
     alarm: bool,
     parity: Parity,
+    /// The bit before the word: the rest level.
+    head: u64,
 }
 
 /// What a good word says.
@@ -37,21 +51,34 @@ pub struct Format {
 pub struct Reading {
     /// Revolutions and steps as one number: the steps are its low bits.
     pub position: u32,
+    /// The same as it was coded on the line.
+    pub code: u32,
     /// The encoder's own alarm bit.
     pub alarm: bool,
 }
 
-/// Why a word is no position.
+/// Why a frame is no position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// Every bit is 1: the data line is open, or the encoder has no power.
-    LineOpen,
+    /// The line was not high before the word or not low after it: it is open or shorted, the encoder has no power, or its
+    /// word is longer than the format says.
+    NoSignal,
     /// The parity bit does not fit: a disturbed or shorted line.
     Parity,
 }
 
 impl Format {
-    /// A layout; `None` for no step bits or more than 32 position bits.
+    /// 4096 revolutions of 8192 steps in Gray code: what most multi-turn encoders send.
+    pub const COMMON: Format = Format {
+        revolution_bits: 12,
+        step_bits: 13,
+        coding: Coding::Gray,
+        alarm: false,
+        parity: Parity::None,
+        head: 1 << 25,
+    };
+
+    /// A layout; `None` for no step bits, more than 31 of them (6501h is an UNSIGNED32), or more than 32 position bits.
     #[must_use]
     pub fn new(
         revolution_bits: u8,
@@ -60,56 +87,74 @@ impl Format {
         alarm: bool,
         parity: Parity,
     ) -> Option<Format> {
-        let bits = revolution_bits.checked_add(step_bits)?;
-        (step_bits > 0 && bits <= 32).then_some(Format { revolution_bits, step_bits, coding, alarm, parity })
+        let bits = revolution_bits.checked_add(step_bits).filter(|bits| *bits <= 32)?;
+        let length = u32::from(bits) + u32::from(alarm) + u32::from(parity != Parity::None);
+        let format = Format { revolution_bits, step_bits, coding, alarm, parity, head: 1 << length };
+        (1..=31).contains(&step_bits).then_some(format)
     }
 
     /// Bits on the line.
     #[must_use]
     pub fn length(self) -> u32 {
-        self.position_bits() + u32::from(self.alarm) + u32::from(self.parity != Parity::None)
+        self.head.trailing_zeros()
     }
 
-    /// Number of different positions, 2^32 at most.
+    /// Bits of the position within a revolution.
     #[must_use]
-    pub fn positions(self) -> u64 {
-        1 << self.position_bits()
+    pub fn step_bits(self) -> u32 {
+        self.step_bits.into()
+    }
+
+    /// Bits of revolutions.
+    #[must_use]
+    pub fn revolution_bits(self) -> u32 {
+        self.revolution_bits.into()
+    }
+
+    /// Bits of the position, 32 at most.
+    #[must_use]
+    pub fn position_bits(self) -> u32 {
+        self.revolution_bits() + self.step_bits()
+    }
+
+    /// Reads a frame.
+    ///
+    /// # Errors
+    /// [`Fault`] when the line or the parity is bad.
+    pub fn read(self, frame: Frame) -> Result<Reading, Fault> {
+        let Some(tail) = frame.clocks.min(64).checked_sub(self.length() + 1).filter(|tail| *tail > 0) else {
+            return Err(Fault::NoSignal);
+        };
+        let word = frame.bits >> tail;
+        let is_high_before = word & self.head != 0;
+        let is_low_after = frame.bits.trailing_zeros() >= tail;
+        if is_high_before && is_low_after { self.decode(word) } else { Err(Fault::NoSignal) }
     }
 
     /// Reads a word, right-aligned; bits above its length are ignored.
     ///
     /// # Errors
-    /// [`Fault`] when the line or the parity is bad.
+    /// [`Fault::Parity`].
     pub fn decode(self, word: u64) -> Result<Reading, Fault> {
-        let word = word & self.mask();
-        if word == self.mask() {
-            return Err(Fault::LineOpen);
-        }
-        let odd = word.count_ones() % 2 == 1;
-        let good = match self.parity {
-            Parity::None => true,
-            Parity::Even => !odd,
-            Parity::Odd => odd,
+        let word = word & (self.head - 1);
+        let is_odd = || word.count_ones() % 2 == 1;
+        let rest = match self.parity {
+            Parity::None => word,
+            Parity::Even if is_odd() => return Err(Fault::Parity),
+            Parity::Odd if !is_odd() => return Err(Fault::Parity),
+            Parity::Even | Parity::Odd => word >> 1,
         };
-        if !good {
-            return Err(Fault::Parity);
-        }
-        let rest = if self.parity == Parity::None { word } else { word >> 1 };
         let (alarm, code) = if self.alarm { (rest & 1 == 1, rest >> 1) } else { (false, rest) };
-        let position = u32::try_from(code).unwrap_or(u32::MAX);
-        Ok(Reading {
-            position: if self.coding == Coding::Gray { from_gray(position) } else { position },
-            alarm,
-        })
+        let code = low_word(code);
+        let position = if self.coding == Coding::Gray { from_gray(code) } else { code };
+        Ok(Reading { position, code, alarm })
     }
+}
 
-    fn position_bits(self) -> u32 {
-        u32::from(self.revolution_bits) + u32::from(self.step_bits)
-    }
-
-    fn mask(self) -> u64 {
-        (1 << self.length()) - 1
-    }
+/// A position has at most 32 bits.
+#[allow(clippy::cast_possible_truncation)]
+fn low_word(code: u64) -> u32 {
+    code as u32
 }
 
 /// Each bit is the exclusive or of all Gray bits from the top down to it.
@@ -148,41 +193,54 @@ mod tests {
         )
     }
 
+    fn frame(format: Format, position: u32, alarm: bool, tail: u32) -> Frame {
+        let bits = (1 << format.length() | encode(format, position, alarm)) << tail;
+        Frame { bits, clocks: 1 + format.length() + tail }
+    }
+
     proptest! {
         #[test]
-        fn decodes_what_an_encoder_sends(format in any_format(), raw: u32, alarm: bool) {
-            let position = raw & u32::try_from(format.positions() - 1).unwrap();
-            let word = encode(format, position, alarm);
-            prop_assume!(word != (1 << format.length()) - 1);
-            prop_assert_eq!(format.decode(word), Ok(Reading { position, alarm: alarm && format.alarm }));
+        fn decodes_what_an_encoder_sends(format in any_format(), raw: u32, alarm: bool, tail in 1..=28_u32) {
+            let position = raw & u32::MAX >> (32 - format.position_bits());
+            let reading = format.read(frame(format, position, alarm, tail)).unwrap();
+            prop_assert_eq!((reading.position, reading.alarm), (position, alarm && format.alarm));
         }
 
         #[test]
         fn one_wrong_bit_breaks_the_parity(format in any_format(), raw: u32, bit in 0..34_u32) {
             prop_assume!(format.parity != Parity::None && bit < format.length());
-            let position = raw & u32::try_from(format.positions() - 1).unwrap();
+            let position = raw & u32::MAX >> (32 - format.position_bits());
             let word = encode(format, position, false) ^ (1 << bit);
-            prop_assert!(format.decode(word).is_err());
+            prop_assert_eq!(format.decode(word), Err(Fault::Parity));
         }
 
         #[test]
-        fn any_word_is_read_or_refused(format in any_format(), word: u64) {
-            if let Ok(reading) = format.decode(word) {
-                prop_assert!(u64::from(reading.position) < format.positions());
+        fn any_frame_is_read_or_refused(format in any_format(), bits: u64, clocks: u32) {
+            if let Ok(reading) = format.read(Frame { bits, clocks }) {
+                prop_assert!(u64::from(reading.position) < 1 << format.position_bits());
+            }
+        }
+
+        #[test]
+        fn a_dead_line_is_no_position(format in any_format(), clocks in 0..=64_u32) {
+            for bits in [0, u64::MAX] {
+                prop_assert_eq!(format.read(Frame { bits, clocks }), Err(Fault::NoSignal));
             }
         }
     }
 
     #[test]
-    fn an_open_line_is_no_position() {
-        let format = Format::new(12, 13, Coding::Gray, false, Parity::None).unwrap();
-        assert_eq!(format.decode(u64::MAX), Err(Fault::LineOpen));
+    fn a_bit_after_the_word_is_noticed() {
+        let long = Format::new(12, 14, Coding::Gray, false, Parity::None).unwrap();
+        assert_eq!(Format::COMMON.read(frame(long, 1, false, 5)), Err(Fault::NoSignal));
+        assert!(long.read(frame(long, 1, false, 5)).is_ok());
     }
 
     #[test]
     fn refuses_layouts_that_fit_no_position() {
         assert_eq!(Format::new(0, 0, Coding::Binary, false, Parity::None), None);
         assert_eq!(Format::new(20, 13, Coding::Binary, false, Parity::None), None);
+        assert_eq!(Format::new(0, 32, Coding::Binary, false, Parity::None), None);
         assert!(Format::new(16, 16, Coding::Binary, true, Parity::Odd).is_some());
     }
 }

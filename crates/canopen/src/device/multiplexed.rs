@@ -1,0 +1,132 @@
+//! Multiplexed PDOs in the device: which objects the producer watches, and where a received one goes.
+
+use super::{Application, Core};
+use crate::dictionary::{Entry, Mapping};
+use crate::emcy::Fault;
+use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Tpdo, Watched};
+use crate::sdo::Multiplexer;
+use crate::{Instant, NodeId};
+
+/// Object scanner list (CiA 301, 7.5.2.44): which objects are sent in source address mode.
+const SCANNER_LIST: u16 = 0x1FA0;
+/// Object dispatching list (CiA 301, 7.5.2.45): where the objects of other nodes go in source address mode.
+const DISPATCHING_LIST: u16 = 0x1FD0;
+/// The longest value that such a PDO carries.
+const LONGEST: u8 = 4;
+
+impl<A: Application, const N: usize> Core<A, N> {
+    /// Gives the producer its settings and its objects, after any change that may concern it.
+    pub(super) fn configure_scanner(&mut self, settings: Option<ScannerSettings>) {
+        let mut scanner = core::mem::replace(&mut self.scanner, crate::pdo::Scanner::new());
+        match settings.map(|settings| settings.addressing) {
+            Some(Addressing::Source) => scanner.configure(settings, self.listed()),
+            _ => scanner.configure(settings, self.not_mapped()),
+        }
+        if self.state.has_pdos() {
+            scanner.start();
+        }
+        self.scanner = scanner;
+    }
+
+    /// All that can be sent and that no TPDO carries.
+    fn not_mapped(&self) -> impl Iterator<Item = Watched> {
+        let entries = self.dictionary.entries().iter();
+        let free = entries.filter(|entry| is_sendable(entry) && !self.is_in_a_tpdo(entry));
+        free.map(|entry| Watched::new(multiplexer(entry), entry.field))
+    }
+
+    fn is_in_a_tpdo(&self, entry: &Entry) -> bool {
+        let mut layouts = self.tpdos.iter().filter_map(Tpdo::settings).map(|settings| &settings.layout);
+        layouts.any(|layout| layout.contains(entry.field))
+    }
+
+    /// What the scanner list names: blocks of sub-indexes of one object.
+    fn listed(&self) -> impl Iterator<Item = Watched> {
+        let count = self.number(SCANNER_LIST, 0).to_le_bytes()[0];
+        let blocks = (1..=count).map(|sub| self.number(SCANNER_LIST, sub).to_le_bytes());
+        blocks.flat_map(move |[first, low, high, size]| {
+            let index = u16::from_le_bytes([low, high]);
+            (0..size).filter_map(move |i| {
+                let entry = self.dictionary.find(index, first.checked_add(i)?).ok()?;
+                is_sendable(entry).then(|| Watched::new(multiplexer(entry), entry.field))
+            })
+        })
+    }
+
+    /// Takes a received multiplexed PDO of a kind that the RPDO is for.
+    pub(super) fn on_mpdo(&mut self, frame: [u8; 8], addressing: Addressing, now: Instant) {
+        let Some(mpdo) = Mpdo::parse(frame) else { return };
+        match (mpdo.address, addressing) {
+            (Address::Destination(node), Addressing::Destination)
+                if node.is_none() || node == self.node_id =>
+            {
+                self.take_addressed(&mpdo, node, now);
+            }
+            (Address::Source(node), Addressing::Source) => self.dispatch(&mpdo, node),
+            _ => (),
+        }
+    }
+
+    /// An object that is not there is an error for the one node that is meant; of all nodes some may have it.
+    fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Instant) {
+        let is_taken = self.store_mpdo(mpdo.at, mpdo.data);
+        if !is_taken && node.is_some() {
+            self.raise(Fault::MpdoNotTaken, now);
+            self.clear(Fault::MpdoNotTaken, now);
+        }
+    }
+
+    /// Whether the object exists and takes process data.
+    fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
+        let entry = self.dictionary.find(at.index, at.sub).ok();
+        let entry = entry.filter(|entry| entry.mapping == Mapping::Rpdo && entry.field.size <= LONGEST);
+        if let Some(entry) = entry {
+            let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
+            entry.field.set(&mut self.image, bytes);
+        }
+        entry.is_some()
+    }
+
+    fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
+        let count = self.number(DISPATCHING_LIST, 0).to_le_bytes()[0];
+        let mut lines = (1..=count).filter_map(|sub| self.dispatching_line(sub));
+        let target = lines.find_map(|line| line.target(mpdo.at, sender));
+        if let Some(at) = target {
+            self.store_mpdo(at, mpdo.data);
+        }
+    }
+
+    fn dispatching_line(&self, sub: u8) -> Option<DispatchingLine> {
+        let entry = self.dictionary.find(DISPATCHING_LIST, sub).ok()?;
+        let [node, remote_sub, a, b, sub, c, d, size] = entry.field.load(&self.image);
+        let remote = Multiplexer { index: u16::from_le_bytes([a, b]), sub: remote_sub };
+        let local = Multiplexer { index: u16::from_le_bytes([c, d]), sub };
+        Some(DispatchingLine { sender: NodeId::new(node)?, remote, local, size })
+    }
+}
+
+/// A line of the dispatching list: a block of a sender's sub-indexes, and where the block goes.
+struct DispatchingLine {
+    sender: NodeId,
+    remote: Multiplexer,
+    local: Multiplexer,
+    size: u8,
+}
+
+impl DispatchingLine {
+    /// Where a sender's object goes, if it is in the block.
+    fn target(&self, at: Multiplexer, sender: NodeId) -> Option<Multiplexer> {
+        let offset = at.sub.checked_sub(self.remote.sub)?;
+        let is_meant = sender == self.sender && at.index == self.remote.index && offset < self.size;
+        let sub = self.local.sub.checked_add(offset)?;
+        is_meant.then_some(Multiplexer { index: self.local.index, sub })
+    }
+}
+
+fn is_sendable(entry: &Entry) -> bool {
+    entry.mapping == Mapping::Tpdo && entry.field.size <= LONGEST
+}
+
+fn multiplexer(entry: &Entry) -> Multiplexer {
+    Multiplexer { index: entry.index(), sub: entry.sub() }
+}

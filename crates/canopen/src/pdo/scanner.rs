@@ -1,0 +1,156 @@
+//! The producer of a multiplexed TPDO: it watches objects and sends those that change.
+//!
+//! In destination address mode these are all objects that can be mapped and that no other TPDO carries, sent to all
+//! nodes; in source address mode those of the object scanner list. With an event timer the timer alone sends, all of
+//! them; without one, each change does. Entering Operational sends all in both cases.
+
+use super::{Address, Addressing, Mpdo};
+use crate::dictionary::Field;
+use crate::sdo::Multiplexer;
+use crate::transmit::RETRY;
+use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
+use heapless::Vec;
+
+/// Objects that it can watch: one bit each.
+pub(crate) const WATCHED: usize = 32;
+
+/// What the dictionary says about the PDO.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScannerSettings {
+    pub(crate) id: CanId,
+    pub(crate) addressing: Addressing,
+    pub(crate) own: NodeId,
+    pub(crate) inhibit: Duration,
+    pub(crate) event: Duration,
+}
+
+impl ScannerSettings {
+    fn frame(&self, watched: &Watched, data: [u8; 4]) -> Frame {
+        let address = match self.addressing {
+            Addressing::Source => Address::Source(self.own),
+            Addressing::Destination => Address::Destination(None),
+        };
+        Frame::data_frame(self.id, 8, Mpdo { address, at: watched.at, data }.encode())
+    }
+}
+
+/// An object that is watched.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Watched {
+    at: Multiplexer,
+    field: Field,
+    sent: [u8; 4],
+}
+
+impl Watched {
+    pub(crate) fn new(at: Multiplexer, field: Field) -> Watched {
+        Watched { at, field, sent: [0; 4] }
+    }
+
+    fn value(&self, image: &[u8]) -> [u8; 4] {
+        let mut data = [0; 4];
+        for (to, from) in data.iter_mut().zip(self.field.get(image)) {
+            *to = *from;
+        }
+        data
+    }
+}
+
+/// The producer. Without settings there is none.
+#[derive(Debug)]
+pub(crate) struct Scanner {
+    settings: Option<ScannerSettings>,
+    watched: Vec<Watched, WATCHED>,
+    /// Which of them are to be sent, a bit each.
+    pending: u32,
+    event_due: Instant,
+    inhibited_until: Instant,
+}
+
+impl Scanner {
+    pub(crate) const fn new() -> Scanner {
+        Scanner {
+            settings: None,
+            watched: Vec::new(),
+            pending: 0,
+            event_due: Instant::NEVER,
+            inhibited_until: Instant(0),
+        }
+    }
+
+    /// Takes new settings and what to watch; what is beyond its room is left out.
+    pub(crate) fn configure(
+        &mut self,
+        settings: Option<ScannerSettings>,
+        watched: impl Iterator<Item = Watched>,
+    ) {
+        *self = Scanner { settings, ..Scanner::new() };
+        if settings.is_some() {
+            self.watched.extend(watched.take(WATCHED));
+        }
+    }
+
+    /// Entering Operational.
+    pub(crate) fn start(&mut self) {
+        self.stop();
+        if self.settings.is_some() {
+            self.pending = u32::MAX;
+        }
+    }
+
+    /// Leaving Operational.
+    pub(crate) fn stop(&mut self) {
+        (self.pending, self.event_due, self.inhibited_until) = (0, Instant::NEVER, Instant(0));
+    }
+
+    /// The next instant at which something is due.
+    pub(crate) fn due(&self) -> Instant {
+        if self.pending == 0 { self.event_due } else { self.inhibited_until.min(self.event_due) }
+    }
+
+    /// Watched values may have changed.
+    pub(crate) fn on_change(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+        let Some(settings) = &self.settings else { return };
+        if settings.event.is_zero() {
+            let changed = |watched: &Watched| watched.value(image) != watched.sent;
+            let bits = self.watched.iter().zip(0..).filter(|(watched, _)| changed(watched));
+            self.pending |= bits.fold(0, |pending, (_, number)| pending | bit(number));
+        }
+        self.poll(image, now, out);
+    }
+
+    /// Sends what is due: one after the other, as the inhibit time and the queue allow.
+    pub(crate) fn poll(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+        let Some(settings) = &self.settings else { return };
+        let elapsed = now >= self.event_due;
+        if elapsed {
+            self.pending = u32::MAX;
+        }
+        if self.pending != 0 && !settings.event.is_zero() && (elapsed || self.event_due == Instant::NEVER) {
+            self.event_due = now + settings.event;
+        }
+        for (number, watched) in (0..).zip(&mut self.watched) {
+            if now < self.inhibited_until {
+                return;
+            }
+            if self.pending & bit(number) == 0 {
+                continue;
+            }
+            let data = watched.value(image);
+            if out.send(settings.frame(watched, data)).is_err() {
+                self.inhibited_until = now + RETRY;
+                return;
+            }
+            watched.sent = data;
+            self.pending &= !bit(number);
+            if !settings.inhibit.is_zero() {
+                self.inhibited_until = now + settings.inhibit;
+            }
+        }
+        self.pending = 0;
+    }
+}
+
+fn bit(number: u32) -> u32 {
+    1_u32.checked_shl(number).unwrap_or(0)
+}

@@ -1,0 +1,199 @@
+//! Multiplexed PDOs, both ways and in both modes.
+
+use crate::bench::{Bench, DICTIONARY, ID};
+use canopen::Duration;
+use canopen::Frame;
+
+const TPDO: u16 = 0x500 + ID as u16;
+const RPDO: u16 = 0x205;
+const EMCY: u16 = 0x085;
+const SOURCE: u8 = 0xFE;
+const DESTINATION: u8 = 0xFF;
+
+/// Makes TPDO 1 a multiplexed one.
+fn sender(count: u8) -> Bench {
+    let mut bench = Bench::booted();
+    bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+    bench.write(0x1800, 5, &[0, 0]).unwrap();
+    bench.write(0x1A00, 0, &[count]).unwrap();
+    bench.write32(0x1800, 1, TPDO.into()).unwrap();
+    bench.take();
+    bench
+}
+
+/// Makes RPDO 1 a multiplexed one, in Operational.
+fn receiver(count: u8) -> Bench {
+    let mut bench = Bench::operational();
+    bench.write(0x1600, 0, &[count]).unwrap();
+    bench.write32(0x1400, 1, RPDO.into()).unwrap();
+    bench.take();
+    bench
+}
+
+fn mpdos(bench: &mut Bench) -> Vec<Vec<u8>> {
+    bench.sent().into_iter().filter(|(id, _)| *id == TPDO).map(|(_, data)| data).collect()
+}
+
+fn value(bench: &Bench) -> u16 {
+    DICTIONARY.field(0x6200, 0).u16(bench.device.image())
+}
+
+fn errors(bench: &mut Bench) -> Vec<u16> {
+    let emcys = bench.sent().into_iter().filter(|(id, _)| *id == EMCY);
+    emcys.map(|(_, data)| u16::from_le_bytes([data[0], data[1]])).filter(|&code| code != 0).collect()
+}
+
+#[test]
+fn in_destination_mode_all_that_no_tpdo_carries_is_sent_to_all_nodes() {
+    let mut bench = sender(DESTINATION);
+    bench.nmt(1);
+    let first = mpdos(&mut bench);
+    assert_eq!(first, [1, 2, 3].map(|sub| vec![0x80, 0x00, 0x60, sub, 0, 0, 0, 0]));
+    bench.set_value(2, &[0x34, 0x12]);
+    assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 2, 0x34, 0x12, 0, 0]]);
+    bench.set_value(2, &[0x34, 0x12]);
+    assert_eq!(mpdos(&mut bench), [[0; 8]; 0], "only changes");
+}
+
+#[test]
+fn in_source_mode_the_scanner_list_is_sent_under_the_own_node_id() {
+    let mut bench = sender(SOURCE);
+    bench.write32(0x1FA0, 1, 0x0260_0002).unwrap();
+    bench.write(0x1FA0, 0, &[1]).unwrap();
+    bench.write32(0x1FA0, 1, 0x0260_0002).unwrap();
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench), [2, 3].map(|sub| vec![ID, 0x00, 0x60, sub, 0, 0, 0, 0]));
+    bench.set_value(1, &[1, 0, 0, 0]);
+    assert_eq!(mpdos(&mut bench), [[0; 8]; 0], "not in the list");
+    bench.set_value(3, &[1, 2, 3, 4]);
+    assert_eq!(mpdos(&mut bench), [[ID, 0x00, 0x60, 3, 1, 2, 3, 4]]);
+}
+
+#[test]
+fn the_inhibit_time_separates_the_frames_and_nothing_is_lost() {
+    let mut bench = sender(DESTINATION);
+    bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+    bench.write(0x1800, 3, &[50, 0]).unwrap();
+    bench.write32(0x1800, 1, TPDO.into()).unwrap();
+    bench.nmt(1);
+    let times = bench.times_of(TPDO, Duration::from_millis(30));
+    assert_eq!(times, [0, 5_000, 10_000]);
+}
+
+#[test]
+fn with_an_event_timer_the_timer_alone_sends() {
+    let mut bench = sender(DESTINATION);
+    bench.write(0x1800, 5, &[20, 0]).unwrap();
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench).len(), 3, "entering Operational");
+    bench.set_value(1, &[9, 9, 9, 9]);
+    assert_eq!(mpdos(&mut bench).len(), 0);
+    assert_eq!(
+        bench.times_of(TPDO, Duration::from_millis(41)),
+        [20_000, 20_000, 20_000, 40_000, 40_000, 40_000]
+    );
+}
+
+#[test]
+fn a_full_queue_delays_and_leaving_operational_drops() {
+    let mut bench = sender(DESTINATION);
+    bench.out.room = 1;
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench).len(), 1);
+    bench.out.room = 10;
+    bench.run(Duration::from_millis(2));
+    assert_eq!(mpdos(&mut bench).len(), 2);
+    bench.nmt(0x80);
+    bench.set_value(1, &[7, 0, 0, 0]);
+    bench.run(Duration::from_millis(10));
+    assert_eq!(mpdos(&mut bench).len(), 0);
+}
+
+#[test]
+fn one_that_is_mapped_elsewhere_is_not_sent_twice() {
+    let mut bench = Bench::operational();
+    // TPDO 1 carries 6000h:1; there is no second TPDO to be multiplexed, so none is.
+    bench.set_value(2, &[1, 0]);
+    assert!(bench.sent().iter().all(|(id, _)| *id != TPDO));
+}
+
+#[test]
+fn one_for_this_node_or_for_all_is_taken() {
+    for address in [0x80 | ID, 0x80] {
+        let mut bench = receiver(DESTINATION);
+        bench.receive(Frame::new(RPDO, &[address, 0x00, 0x62, 0, 0x34, 0x12, 0, 0]).unwrap());
+        assert_eq!(value(&bench), 0x1234);
+        assert_eq!(errors(&mut bench), []);
+    }
+}
+
+#[test]
+fn one_for_another_node_or_by_source_is_not() {
+    for address in [0x80 | (ID + 1), ID, 0x00, 0x7F] {
+        let mut bench = receiver(DESTINATION);
+        bench.receive(Frame::new(RPDO, &[address, 0x00, 0x62, 0, 0x34, 0x12, 0, 0]).unwrap());
+        assert_eq!((value(&bench), errors(&mut bench)), (0, vec![]));
+    }
+}
+
+#[test]
+fn an_object_that_takes_none_is_an_error_for_the_node_that_is_meant_only() {
+    for (address, expected) in [(0x80 | ID, vec![0x8230]), (0x80, vec![])] {
+        for object in [[0x00, 0x70, 0], [0x00, 0x62, 1], [0x00, 0x60, 1], [0x17, 0x10, 0]] {
+            let mut bench = receiver(DESTINATION);
+            let [low, high, sub] = object;
+            bench.receive(Frame::new(RPDO, &[address, low, high, sub, 1, 2, 3, 4]).unwrap());
+            assert_eq!(errors(&mut bench), expected, "{object:x?}");
+        }
+    }
+}
+
+#[test]
+fn a_short_one_is_a_length_error() {
+    let mut bench = receiver(DESTINATION);
+    bench.receive(Frame::new(RPDO, &[0x80, 0x00, 0x62, 0, 1]).unwrap());
+    assert_eq!((value(&bench), errors(&mut bench)), (0, vec![0x8210]));
+}
+
+#[test]
+fn the_dispatching_list_says_where_the_objects_of_others_go() {
+    let line = |size: u8, local_sub: u8, remote_sub: u8, node: u8| {
+        [node, remote_sub, 0x34, 0x71, local_sub, 0x00, 0x62, size]
+    };
+    for (line, is_taken) in [
+        (line(1, 0, 5, 9), true),
+        (line(1, 0, 5, 8), false),
+        (line(1, 0, 4, 9), false),
+        (line(0, 0, 5, 9), false),
+        (line(2, 1, 5, 9), false),
+    ] {
+        let mut bench = receiver(SOURCE);
+        DICTIONARY.field(0x1FD0, 1).set(bench.device.image_mut(), &line);
+        bench.write(0x1FD0, 0, &[1]).unwrap();
+        bench.receive(Frame::new(RPDO, &[9, 0x34, 0x71, 5, 0xCD, 0xAB, 0, 0]).unwrap());
+        assert_eq!(value(&bench) == 0xABCD, is_taken, "{line:x?}");
+        assert_eq!(errors(&mut bench), []);
+    }
+}
+
+#[test]
+fn a_multiplexed_pdo_is_one_of_events() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1800, 1, 0x8000_0505).unwrap();
+    bench.write(0x1800, 2, &[1]).unwrap();
+    bench.write(0x1A00, 0, &[DESTINATION]).unwrap();
+    assert_eq!(bench.write32(0x1800, 1, 0x505), Err(0x0609_0030));
+    bench.write(0x1800, 2, &[254]).unwrap();
+    assert_eq!(bench.write32(0x1800, 1, 0x505), Ok(()));
+    assert_eq!(bench.write(0x1800, 2, &[1]), Err(0x0609_0030));
+    assert_eq!(bench.write(0x1800, 2, &[255]), Ok(()));
+}
+
+#[test]
+fn a_count_between_the_slots_and_the_modes_is_too_high() {
+    let mut bench = Bench::booted();
+    bench.write32(0x1800, 1, 0x8000_0185).unwrap();
+    for count in [5, 8, 64, 200, 253] {
+        assert_eq!(bench.write(0x1A00, 0, &[count]), Err(0x0609_0031));
+    }
+}

@@ -1,0 +1,125 @@
+//! Rules of the encoder's own objects.
+
+use super::values::Fields;
+use canopen::dictionary::{Entry, Field};
+use canopen::sdo::Abort;
+use profiles::encoder::{COMMISSIONING, ChannelParameters, Parameters, SCALING, SENSOR_HELD};
+
+/// 6000h.
+pub(super) const OPERATING: u8 = 0x20;
+/// 6001h.
+pub(super) const PER_REVOLUTION: u8 = 0x21;
+/// 6002h.
+pub(super) const RANGE: u8 = 0x22;
+/// 6003h and 6010h.
+pub(super) const PRESET: u8 = 0x23;
+/// 6005h:1.
+pub(super) const STEP: u8 = 0x24;
+/// 6200h takes any value; that it is 1800h:5 too is the affair of whoever has both.
+pub const CYCLIC_TIMER: u8 = 0x25;
+/// 2100h to 2103h.
+pub(super) const SENSOR: u8 = 0x26;
+/// 2107h.
+pub(super) const FACTORY: u8 = 0x27;
+/// 2109h.
+pub(super) const ACKNOWLEDGE: u8 = 0x28;
+
+/// What 2108h takes to open 2107h: "fact".
+const FACTORY_SIGNATURE: [u8; 4] = *b"fact";
+
+impl Fields {
+    /// Decides on a write to an object with one of the rules above.
+    ///
+    /// # Errors
+    /// The reason to refuse it.
+    pub fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let mut word = [0; 4];
+        word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+        let value = u32::from_le_bytes(word);
+        match rule {
+            OPERATING => allow(is_operating(&self.parameters(image), value)),
+            PER_REVOLUTION => allow(self.parameters(image).allow_per_revolution(value)),
+            RANGE => allow(self.parameters(image).allow_range(value)),
+            STEP => allow(self.parameters(image).allow_step(value)),
+            PRESET => self.preset(entry, value, image),
+            SENSOR => self.describe_sensor(entry, bytes, image),
+            FACTORY if self.factory_key.load(image) != FACTORY_SIGNATURE => Err(Abort::Access),
+            ACKNOWLEDGE => {
+                count(self.acknowledgements, image);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Gives the command for a preset, and shows the position that it leads to: whoever reads it next reads the preset.
+    fn preset(&self, entry: &Entry, value: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let ([first, second], parameters) = (&self.channels, self.parameters(image));
+        let [first_own, second_own] = &parameters.channels;
+        let (channel, own) = if entry.sub() == 2 { (second, second_own) } else { (first, first_own) };
+        check_preset(&parameters, own, channel.sensor_state.u8(image), value)?;
+        count(channel.presets, image);
+        channel.preset.store(image, value.to_le_bytes());
+        channel.position.store(image, value.to_le_bytes());
+        if entry.sub() != 2 {
+            self.preset.store(image, value.to_le_bytes());
+            self.position.store(image, value.to_le_bytes());
+        }
+        Ok(())
+    }
+
+    /// Tries what the sensor would be, and leaves it as it was when the scaling that is on could not be given.
+    fn describe_sensor(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let field = entry.field();
+        let before = Saved::of(field, image);
+        field.set(image, bytes);
+        let result = allow(self.format(image).is_some() && self.parameters(image).is_consistent());
+        field.set(image, before.bytes());
+        result
+    }
+}
+
+/// There is no preset to a position that is not known, and none outside of the range.
+fn check_preset(all: &Parameters, own: &ChannelParameters, state: u8, value: u32) -> Result<(), Abort> {
+    match all.sensor(own) {
+        Some(sensor) if state & SENSOR_HELD == 0 => {
+            allow(u64::from(value) < all.scale(&sensor).range().get())
+        }
+        _ => Err(Abort::DeviceState),
+    }
+}
+
+/// A value of at most four bytes.
+struct Saved {
+    bytes: [u8; 4],
+    len: usize,
+}
+
+impl Saved {
+    fn of(field: Field, image: &[u8]) -> Saved {
+        let mut bytes = [0; 4];
+        let value = field.get(image);
+        bytes.iter_mut().zip(value).for_each(|(to, from)| *to = *from);
+        Saved { bytes, len: value.len() }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&self.bytes)
+    }
+}
+
+/// Bits that are reserved, the direction of what no sensor is, and a scaling that no sensor can give are refused.
+fn is_operating(parameters: &Parameters, value: u32) -> bool {
+    let Ok(operating) = u16::try_from(value) else { return false };
+    let known = COMMISSIONING | SCALING | parameters.directions();
+    operating & !known == 0 && Parameters { operating, ..*parameters }.is_consistent()
+}
+
+/// Counts a command; 0 is only before the first.
+fn count(field: Field, image: &mut [u8]) {
+    field.store(image, [field.u8(image).checked_add(1).unwrap_or(1)]);
+}
+
+fn allow(is_allowed: bool) -> Result<(), Abort> {
+    if is_allowed { Ok(()) } else { Err(Abort::InvalidValue) }
+}

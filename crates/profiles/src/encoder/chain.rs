@@ -1,0 +1,133 @@
+//! The encoder: two channels and what is common to them.
+
+use super::channel::{Channel, Pending};
+use super::supervision::{Conditions, Supervision};
+use super::{ChannelParameters, ChannelValues, Kept, KeptChannel, Limits, Parameters, RawEncoder, Start};
+
+/// What the encoder gives for one sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Snapshot {
+    /// Sub-indexes 1 and 2 of the objects with channels; the first is also that of the objects without.
+    pub channels: [ChannelValues; 2],
+    /// Operating status (6500h).
+    pub operating_status: u16,
+    /// Resolution of the first sensor (6501h).
+    pub resolution: u32,
+    /// Revolutions that the first sensor tells apart (6502h).
+    pub revolutions: u16,
+    /// Alarms (6503h).
+    pub alarms: u16,
+    /// Warnings (6505h).
+    pub warnings: u16,
+    /// Operating time (6508h) in 0.1 h.
+    pub operating_time: u32,
+    /// What is reported as an emergency.
+    pub conditions: Conditions,
+}
+
+/// The whole chain with its state.
+#[derive(Clone, Debug)]
+pub struct Encoder {
+    channels: [Option<Channel>; 2],
+    /// The operating time, and what the channels have not taken back yet.
+    kept: Kept,
+    /// What was to be kept is damaged, and nobody has said yet which sensors there are.
+    is_damaged: bool,
+    supervision: Supervision,
+    limits: Limits,
+    acknowledge: Pending,
+    /// What depends on parameters alone.
+    fixed: Snapshot,
+}
+
+impl Default for Encoder {
+    fn default() -> Encoder {
+        Encoder::new(Start::First)
+    }
+}
+
+impl Encoder {
+    /// An encoder after power-on. It gives no position until parameters are applied: the first ones say which sensor it
+    /// was that left its position.
+    #[must_use]
+    pub fn new(start: Start) -> Encoder {
+        Encoder {
+            channels: [None, None],
+            kept: if let Start::Kept(kept) = start { kept } else { Kept::default() },
+            is_damaged: start == Start::Damaged,
+            supervision: Supervision::default(),
+            limits: Limits::default(),
+            acknowledge: Pending::default(),
+            fixed: Snapshot::default(),
+        }
+    }
+
+    /// Takes over parameters, from the next sample on.
+    pub fn apply(&mut self, parameters: &Parameters) {
+        if core::mem::take(&mut self.is_damaged) {
+            self.supervision.set_damaged(parameters.sensors().any(|sensor| sensor.kind.is_kept()));
+        }
+        // What was kept is for the first parameters: a channel that is switched off and on again starts afresh.
+        let kept = core::mem::take(&mut self.kept.channels);
+        for ((channel, own), kept) in self.channels.iter_mut().zip(&parameters.channels).zip(&kept) {
+            apply(channel, parameters, own, kept);
+        }
+        self.acknowledge.set(parameters.acknowledge);
+        self.limits = parameters.limits;
+        self.fixed = fixed(parameters);
+    }
+
+    /// Processes what was read in one millisecond.
+    pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
+        self.kept.operating_time.tick();
+        if let Some(mask) = self.acknowledge.take() {
+            let [low, high, ..] = mask.to_le_bytes();
+            self.supervision.acknowledge(u16::from_le_bytes([low, high]));
+        }
+        let mut snapshot = self.fixed;
+        for (values, channel) in snapshot.channels.iter_mut().zip(&mut self.channels) {
+            if let Some(channel) = channel {
+                *values = channel.sample(raw);
+            }
+        }
+        let (channels, limits, time) = (&snapshot.channels, &self.limits, self.kept.operating_time);
+        snapshot.alarms = self.supervision.alarms(channels);
+        snapshot.warnings = self.supervision.warnings(channels, &raw.board, limits, time);
+        snapshot.conditions = self.supervision.conditions(channels, &raw.board, limits);
+        snapshot.operating_time = time.tenths();
+        snapshot
+    }
+
+    /// What is to outlive a loss of power: see [`Kept`].
+    #[must_use]
+    pub fn kept(&self) -> Kept {
+        let mut kept = self.kept;
+        for (kept, channel) in kept.channels.iter_mut().zip(&self.channels) {
+            *kept = channel.as_ref().map_or(*kept, Channel::kept);
+        }
+        kept
+    }
+}
+
+fn apply(channel: &mut Option<Channel>, all: &Parameters, own: &ChannelParameters, kept: &KeptChannel) {
+    match (all.sensor(own), channel) {
+        (Some(sensor), Some(channel)) => channel.apply(all, own, sensor),
+        (Some(sensor), channel) => *channel = Some(Channel::new(all, own, sensor, kept)),
+        (None, channel) => *channel = None,
+    }
+}
+
+fn fixed(parameters: &Parameters) -> Snapshot {
+    let first = parameters.sensors().next();
+    let unused = |channel: ChannelParameters| ChannelValues {
+        presets: channel.preset.count,
+        ..ChannelValues::default()
+    };
+    Snapshot {
+        channels: parameters.channels.map(unused),
+        operating_status: parameters.operating_status(),
+        resolution: first.map_or(0, |sensor| sensor.resolution()),
+        revolutions: first.map_or(0, |sensor| sensor.revolutions()),
+        ..Snapshot::default()
+    }
+}

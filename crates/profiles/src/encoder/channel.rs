@@ -1,0 +1,151 @@
+//! One channel: from the sensor to position, speed, cams and work area.
+
+use super::area::area_state;
+use super::commissioning::Commissioning;
+use super::input::{Input, RawEncoder};
+use super::speed::speed_value;
+use super::{
+    Area, CamChannel, ChannelParameters, Command, KeptChannel, Module, Parameters, Position, Progress, Scale,
+    Sensor, Speedometer,
+};
+
+/// What a channel gives for one sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ChannelValues {
+    /// Position value (6004h, 6020h).
+    pub position: u32,
+    /// Speed value (6030h).
+    pub speed: i16,
+    /// Cam state register (6300h).
+    pub cams: u8,
+    /// Area state register (6400h).
+    pub area: u8,
+    /// Offset value (6509h, 650Ch).
+    pub offset: i32,
+    /// What is known about the sensor: bits `SENSOR_..`.
+    pub sensor_state: u8,
+    /// How far the commissioning diagnostic is.
+    pub commissioning: Progress,
+    /// [`Command::count`] of the last preset that this position knows of.
+    pub presets: u8,
+}
+
+/// The commands that were carried out, and the one that waits.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pending {
+    count: u8,
+    value: Option<u32>,
+}
+
+impl Pending {
+    /// Takes note of the last command.
+    pub(super) fn set(&mut self, command: Command) {
+        if command.count != self.count {
+            self.count = command.count;
+            self.value = Some(command.value).filter(|_| command.count != 0);
+        }
+    }
+
+    /// The command to be carried out.
+    pub(super) fn take(&mut self) -> Option<u32> {
+        self.value.take()
+    }
+}
+
+/// A channel and its state.
+#[derive(Clone, Debug)]
+pub(super) struct Channel {
+    input: Input,
+    position: Position,
+    speedometer: Speedometer,
+    speed_factor: f32,
+    cams: CamChannel,
+    area: Area,
+    module: Module,
+    commissioning: Commissioning,
+    preset: Pending,
+}
+
+impl Channel {
+    /// A channel that has not measured yet, with what it kept.
+    pub(super) fn new(
+        all: &Parameters,
+        own: &ChannelParameters,
+        sensor: Sensor,
+        kept: &KeptChannel,
+    ) -> Channel {
+        let scale = all.scale(&sensor);
+        let resolution = sensor.resolution();
+        let offset = kept.offset(sensor.kind, resolution, &scale).unwrap_or(0);
+        let left = kept.left(sensor.kind, resolution);
+        let mut channel = Channel {
+            input: Input::new(sensor, all.module.offset, left),
+            position: Position::new(scale, offset),
+            speedometer: Speedometer::new(0),
+            speed_factor: 0.0,
+            cams: CamChannel::default(),
+            area: own.area,
+            module: all.module,
+            commissioning: Commissioning::default(),
+            preset: Pending { count: own.preset.count, value: None },
+        };
+        channel.configure(all, own, &scale);
+        channel
+    }
+
+    /// Takes over parameters, from the next sample on. Another sensor makes another channel.
+    pub(super) fn apply(&mut self, all: &Parameters, own: &ChannelParameters, sensor: Sensor) {
+        if !sensor.is_like(self.input.sensor()) {
+            *self = Channel::new(all, own, sensor, &KeptChannel::default());
+            return;
+        }
+        let scale = all.scale(&sensor);
+        let shaft = self.input.tracker().map(super::Tracker::shaft).unwrap_or_default();
+        self.position.rescale(scale, shaft);
+        self.input.apply(sensor, &scale, all.module.offset);
+        self.preset.set(own.preset);
+        self.configure(all, own, &scale);
+    }
+
+    fn configure(&mut self, all: &Parameters, own: &ChannelParameters, scale: &Scale) {
+        let factor = all.speed_factor(self.input.sensor());
+        self.speed_factor = if scale.is_reversed() { -factor } else { factor };
+        self.cams.apply(&own.cams);
+        (self.area, self.module) = (own.area, all.module);
+        self.commissioning.set(all.operating & super::COMMISSIONING != 0);
+    }
+
+    /// Processes one sample.
+    pub(super) fn sample(&mut self, raw: &RawEncoder) -> ChannelValues {
+        let seen = self.input.read(raw, self.position.scale());
+        self.commissioning.observe(self.input.sensor(), &seen);
+        let fixed = ChannelValues {
+            sensor_state: seen.state,
+            commissioning: self.commissioning.progress(),
+            offset: self.position.offset(),
+            presets: self.preset.count,
+            ..ChannelValues::default()
+        };
+        let Some(tracker) = self.input.tracker() else { return fixed };
+        if let Some(preset) = self.preset.take() {
+            self.position.preset(preset, tracker.shaft());
+        }
+        let position = self.position.value(tracker.shaft());
+        let speed = self.speedometer.update(tracker.count());
+        ChannelValues {
+            position,
+            speed: speed_value(speed, self.speed_factor),
+            cams: self.cams.update(position),
+            area: area_state(&self.area, &self.module, position, self.input.native()),
+            offset: self.position.offset(),
+            ..fixed
+        }
+    }
+
+    /// What outlives a loss of power.
+    pub(super) fn kept(&self) -> KeptChannel {
+        let sensor = self.input.sensor();
+        let kept = |left| KeptChannel::new(sensor.kind, sensor.resolution(), left, &self.position);
+        self.input.left().map(kept).unwrap_or_default()
+    }
+}

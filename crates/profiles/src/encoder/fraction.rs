@@ -1,0 +1,73 @@
+//! Multiplication by a fraction without a division.
+//!
+//! A 64-bit division is a library call of more than a hundred instructions on a Cortex-M4; this is three
+//! multiplications.
+
+use core::num::NonZeroU32;
+
+/// A fraction of at most 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Fraction {
+    numerator: u32,
+    denominator: NonZeroU32,
+    /// The fraction in units of 2^-32, rounded down: at most 2^32.
+    approximation: u64,
+}
+
+impl Fraction {
+    /// `numerator / denominator`; 1 where that would be more.
+    pub(super) fn new(numerator: u32, denominator: NonZeroU32) -> Fraction {
+        let numerator = numerator.min(denominator.get());
+        let approximation = (u64::from(numerator) << 32) / core::num::NonZeroU64::from(denominator);
+        Fraction { numerator, denominator, approximation }
+    }
+
+    /// `value * numerator / denominator`, rounded down, exactly.
+    ///
+    /// The approximation is less than 2^-32 too small and the value below 2^32, so the estimate is less than 1 too small
+    /// before it is rounded down: it is the result or the result less 1, and the remainder tells which.
+    #[allow(clippy::cast_possible_truncation)] // The result is at most `value`.
+    pub(super) fn of(self, value: u32) -> u32 {
+        let value = u64::from(value);
+        let denominator = u64::from(self.denominator.get());
+        let estimate = (value * self.approximation) >> 32;
+        let remainder = value * u64::from(self.numerator) - estimate * denominator;
+        estimate as u32 + u32::from(remainder >= denominator)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn check(value: u32, numerator: u32, denominator: u32) {
+        let exact = u64::from(value) * u64::from(numerator) / u64::from(denominator);
+        let fraction = Fraction::new(numerator, NonZeroU32::new(denominator).unwrap());
+        assert_eq!(u64::from(fraction.of(value)), exact, "{value} * {numerator} / {denominator}");
+    }
+
+    proptest! {
+        #[test]
+        fn is_exact((numerator, denominator) in (1..=u32::MAX).prop_flat_map(|d| (0..=d, Just(d))), value: u32) {
+            check(value, numerator, denominator);
+        }
+    }
+
+    #[test]
+    fn is_exact_for_all_small_numbers_and_at_the_ends() {
+        for denominator in 1..60 {
+            for numerator in 0..=denominator {
+                (0..200).for_each(|value| check(value, numerator, denominator));
+            }
+        }
+        for (numerator, denominator) in
+            [(1, u32::MAX), (u32::MAX - 1, u32::MAX), (u32::MAX, u32::MAX), (1, 1)]
+        {
+            for value in [0, 1, u32::MAX - 1, u32::MAX] {
+                check(value, numerator, denominator);
+            }
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! All parameters of the encoder as one consistent set.
+
+use core::num::{NonZeroU16, NonZeroU32};
+
+use super::{Area, Cams, Format, Limits, Module, Native, Scale, Sensor, SensorType, Settings};
+
+/// Operating parameter (6000h): the position falls when the shaft turns clockwise. Rotary encoders only.
+pub const CODE_SEQUENCE: u16 = 1 << 0;
+/// Operating parameter (6000h): the commissioning diagnostic runs.
+pub const COMMISSIONING: u16 = 1 << 1;
+/// Operating parameter (6000h): the scaling function works.
+pub const SCALING: u16 = 1 << 2;
+/// Operating parameter (6000h): the measuring direction is reverse. Linear encoders only.
+pub const DIRECTION: u16 = 1 << 3;
+
+/// A command: it is carried out once, when `count` has changed to anything but 0, which means that there was none yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Command {
+    /// What to do: a preset value, or a mask of alarms to clear.
+    pub value: u32,
+    /// Commands given up to now.
+    pub count: u8,
+}
+
+/// The parameters of one channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChannelParameters {
+    /// The sensor, `None` for a channel that is not used.
+    pub kind: Option<SensorType>,
+    /// See [`Sensor::resolution`].
+    pub resolution: NonZeroU32,
+    /// See [`Sensor::counted`].
+    pub counted: NonZeroU16,
+    /// See [`Sensor::fastest`].
+    pub fastest: u32,
+    /// Preset (6003h, 6010h).
+    pub preset: Command,
+    /// Cams (6301h to 6337h).
+    pub cams: Cams,
+    /// Work area (6401h, 6402h).
+    pub area: Area,
+}
+
+/// The parameters of the encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parameters {
+    /// Operating parameters (6000h), see [`SCALING`] and the others.
+    pub operating: u16,
+    /// Measuring units per revolution (6001h).
+    pub per_revolution: u32,
+    /// Total measuring range (6002h).
+    pub range: u32,
+    /// Position measuring step of a linear encoder in nm (6005h:1).
+    pub step: u32,
+    /// Speed measuring step of a linear encoder in 0.01 mm/s (6005h:2).
+    pub speed_step: u32,
+    /// Sub-indexes 1 and 2 of the objects with channels.
+    pub channels: [ChannelParameters; 2],
+    /// Frame of the SSI input.
+    pub format: Format,
+    /// Whether the index input is used.
+    pub index: bool,
+    /// What the manufacturer says about the sensors (650Ah).
+    pub module: Module,
+    /// Limits of what the board measures.
+    pub limits: Limits,
+    /// Clears alarms.
+    pub acknowledge: Command,
+}
+
+impl Default for ChannelParameters {
+    /// Not used.
+    fn default() -> ChannelParameters {
+        ChannelParameters {
+            kind: None,
+            resolution: const { NonZeroU32::new(4096).unwrap() },
+            counted: const { NonZeroU16::new(4096).unwrap() },
+            fastest: 10_000,
+            preset: Command::default(),
+            cams: Cams::default(),
+            area: Area { low: 0, high: i32::MAX },
+        }
+    }
+}
+
+impl Default for Parameters {
+    /// One incremental encoder with 1024 lines, an index and electronic counting.
+    fn default() -> Parameters {
+        let first =
+            ChannelParameters { kind: Some(SensorType::IncrementalCounted), ..ChannelParameters::default() };
+        Parameters {
+            operating: 0,
+            per_revolution: 4096,
+            range: 4096 * 4096,
+            step: 10_000,
+            speed_step: 100,
+            channels: [first, ChannelParameters::default()],
+            format: Format::COMMON,
+            index: true,
+            module: Module::default(),
+            limits: Limits::default(),
+            acknowledge: Command::default(),
+        }
+    }
+}
+
+impl Parameters {
+    /// The encoder type of object 1000h: that of the sensor, or 10 for two of them. 0 for none.
+    #[must_use]
+    pub fn encoder_type(&self) -> u8 {
+        match self.channels.map(|channel| channel.kind) {
+            [Some(_), Some(_)] => 10,
+            [Some(kind), None] | [None, Some(kind)] => kind.code(),
+            [None, None] => 0,
+        }
+    }
+
+    /// The sensor of a channel.
+    #[must_use]
+    pub fn sensor(&self, channel: &ChannelParameters) -> Option<Sensor> {
+        let ChannelParameters { resolution, counted, fastest, .. } = *channel;
+        let (format, index) = (self.format, self.index);
+        channel.kind.map(|kind| Sensor { kind, resolution, counted, format, index, fastest })
+    }
+
+    /// All sensors.
+    pub fn sensors(&self) -> impl Iterator<Item = Sensor> {
+        self.channels.iter().filter_map(|channel| self.sensor(channel))
+    }
+
+    /// Whether every sensor can give so many units per revolution (6001h).
+    #[must_use]
+    pub fn allow_per_revolution(&self, units: u32) -> bool {
+        self.natives().all(|native| native.gives_per_revolution(units))
+    }
+
+    /// Whether every sensor can give this range (6002h).
+    #[must_use]
+    pub fn allow_range(&self, range: u32) -> bool {
+        self.natives().all(|native| native.gives_range(range))
+    }
+
+    /// Whether every sensor can give this measuring step (6005h:1).
+    #[must_use]
+    pub fn allow_step(&self, nanometres: u32) -> bool {
+        self.natives().all(|native| native.gives_step(nanometres))
+    }
+
+    /// Whether the scaling function works as it is asked for, with every sensor.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        self.sensors().all(|sensor| self.asked_scale(&sensor).is_some())
+    }
+
+    /// The scale of a sensor: the one asked for, or the sensor's own steps where it cannot give that.
+    #[must_use]
+    pub fn scale(&self, sensor: &Sensor) -> Scale {
+        self.asked_scale(sensor)
+            .unwrap_or_else(|| Scale::unscaled(&sensor.native(), self.is_reversed(sensor)))
+    }
+
+    /// Units of 6030h in a native step a second: measuring units of a shaft, speed measuring steps of a rod.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // 24 bits are more than the 15 of the result.
+    pub fn speed_factor(&self, sensor: &Sensor) -> f32 {
+        if sensor.kind.is_linear() {
+            // A step of 6005h:2 is 0.01 mm/s: 10 000 nm/s.
+            return sensor.resolution.get() as f32 / (10_000.0 * self.speed_step.max(1) as f32);
+        }
+        let scale = self.scale(sensor);
+        scale.units() as f32 / scale.turn().get() as f32
+    }
+
+    /// Object 6500h: the parameters as they are active. Bit 1 says that there is a commissioning diagnostic.
+    #[must_use]
+    pub fn operating_status(&self) -> u16 {
+        let scaling = if self.is_consistent() { SCALING } else { 0 };
+        COMMISSIONING | self.operating & (self.directions() | scaling)
+    }
+
+    /// The bits of 6000h that turn the direction of one of the sensors.
+    #[must_use]
+    pub fn directions(&self) -> u16 {
+        self.sensors().fold(0, |bits, sensor| bits | direction_bit(&sensor))
+    }
+
+    fn natives(&self) -> impl Iterator<Item = Native> {
+        self.sensors().map(|sensor| sensor.native())
+    }
+
+    fn asked_scale(&self, sensor: &Sensor) -> Option<Scale> {
+        let settings = Settings {
+            reversed: self.is_reversed(sensor),
+            scaling: self.operating & SCALING != 0,
+            per_revolution: self.per_revolution,
+            range: self.range,
+            step: self.step,
+        };
+        Scale::new(&sensor.native(), &settings)
+    }
+
+    fn is_reversed(&self, sensor: &Sensor) -> bool {
+        self.operating & direction_bit(sensor) != 0
+    }
+}
+
+fn direction_bit(sensor: &Sensor) -> u16 {
+    if sensor.kind.is_linear() { DIRECTION } else { CODE_SEQUENCE }
+}

@@ -1,0 +1,136 @@
+#![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]
+
+use proptest::prelude::*;
+
+use super::*;
+
+impl Scale {
+    /// The same scale the other way round.
+    pub(in crate::encoder) fn turned(self) -> Scale {
+        Scale { reversed: !self.reversed, ..self }
+    }
+}
+
+fn rotary(per_revolution: u32, revolutions: u32) -> Native {
+    let [per_revolution, revolutions] = [per_revolution, revolutions].map(|n| NonZeroU32::new(n).unwrap());
+    Native::Rotary { per_revolution, revolutions }
+}
+
+fn linear(step: u32) -> Native {
+    Native::Linear { step: NonZeroU32::new(step).unwrap(), steps: MOST }
+}
+
+fn scaled(per_revolution: u32, range: u32) -> Settings {
+    Settings { reversed: false, scaling: true, per_revolution, range, step: 1 }
+}
+
+fn any_settings() -> impl Strategy<Value = (Native, Settings)> {
+    let shaft = (1..u32::MAX, 1..=65_536_u32).prop_map(|(steps, revolutions)| rotary(steps, revolutions));
+    let rod = (1..u32::MAX).prop_map(linear);
+    prop_oneof![3 => shaft, 1 => rod].prop_flat_map(|native| {
+        let (units, steps) = match native {
+            Native::Rotary { per_revolution, .. } => (1..=per_revolution.get(), 1..=u32::MAX),
+            Native::Linear { step, .. } => (1..=u32::MAX, step.get()..=u32::MAX),
+        };
+        let range = 1..=native.steps().get().min(u32::MAX.into()) as u32;
+        (units, steps, range, any::<bool>(), any::<bool>()).prop_map(
+            move |(per_revolution, step, range, reversed, scaling)| {
+                (native, Settings { reversed, scaling, per_revolution, range, step })
+            },
+        )
+    })
+}
+
+/// Any sensor with any settings that it can serve.
+pub(in crate::encoder) fn any_scale() -> impl Strategy<Value = Scale> {
+    any_settings().prop_map(|(native, settings)| Scale::new(&native, &settings).unwrap())
+}
+
+pub(in crate::encoder) fn shaft_at(total: i64, scale: &Scale) -> Shaft {
+    Shaft::at(total, scale.turn())
+}
+
+/// Units per native step as a fraction, from the definitions.
+fn ratio(native: &Native, settings: &Settings) -> (i128, i128) {
+    match native {
+        _ if !settings.scaling => (1, 1),
+        Native::Rotary { per_revolution, .. } => {
+            (settings.per_revolution.into(), per_revolution.get().into())
+        }
+        Native::Linear { step, .. } => (step.get().into(), settings.step.into()),
+    }
+}
+
+proptest! {
+    /// The formula of CiA 406 on numbers that cannot overflow: floor(P * 6001h / 6501h) modulo 6002h.
+    #[test]
+    fn agrees_with_the_formula((native, settings) in any_settings(), total in -(1_i64 << 60)..1 << 60) {
+        let scale = Scale::new(&native, &settings).unwrap();
+        let (units, steps) = ratio(&native, &settings);
+        let seen = i128::from(if settings.reversed { -1 - total } else { total });
+        let expected = (seen * units).div_euclid(steps).rem_euclid(i128::from(scale.range().get()));
+        prop_assert_eq!(i128::from(scale.value(shaft_at(total, &scale), 0)), expected);
+    }
+
+    /// One native step changes the value by nothing or by one unit, also where the range ends.
+    #[test]
+    fn has_no_jump_anywhere(scale in any_scale(), total in -(1_i64 << 60)..1 << 60, offset: i32) {
+        let [here, there] = [total, total + 1].map(|total| scale.value(shaft_at(total, &scale), offset));
+        let way = if scale.is_reversed() { scale.subtract(here, there) } else { scale.subtract(there, here) };
+        prop_assert!(way <= 1 || scale.range().get() == 1, "{} to {}", here, there);
+    }
+
+    /// Within one range a shaft that turns forwards never reads less.
+    #[test]
+    fn is_monotonic(scale in any_scale(), from in any::<u32>(), by in 0..=u32::MAX) {
+        let scale = if scale.is_reversed() { scale.turned() } else { scale };
+        let (first, second) = (i64::from(from), i64::from(from) + i64::from(by));
+        let units = |total: i64| i128::from(total) * i128::from(scale.units()) / i128::from(scale.turn().get());
+        prop_assume!(units(second) < i128::from(scale.range().get()));
+        let [first, second] = [first, second].map(|total| scale.value(shaft_at(total, &scale), 0));
+        prop_assert!(first <= second);
+    }
+
+    #[test]
+    fn sums_and_differences_are_modular(scale in any_scale(), a: u32, b: u32) {
+        let range = scale.range().get();
+        let (a, b) = ((u64::from(a) % range) as u32, (u64::from(b) % range) as u32);
+        prop_assert_eq!(u64::from(scale.add(a, b)), (u64::from(a) + u64::from(b)) % range);
+        prop_assert_eq!(scale.add(scale.subtract(a, b), b), a);
+    }
+}
+
+#[test]
+fn refuses_what_the_sensor_cannot_resolve() {
+    let native = rotary(4096, 16);
+    for (per_revolution, range) in [(0, 1), (4097, 1), (4096, 0), (4096, 65_537)] {
+        assert_eq!(Scale::new(&native, &scaled(per_revolution, range)), None);
+    }
+    assert!(Scale::new(&native, &scaled(4096, 65_536)).is_some());
+    let settings = Settings { step: 999, ..scaled(1, 100) };
+    assert_eq!(Scale::new(&linear(1000), &settings), None);
+    assert!(Scale::new(&linear(1000), &Settings { step: 1000, ..settings }).is_some());
+}
+
+#[test]
+fn refuses_a_preset_outside_of_the_range() {
+    let scale = Scale::new(&rotary(4096, 16), &scaled(360, 3600)).unwrap();
+    assert_eq!(scale.offset_for(3600, Shaft::default()), None);
+    assert_eq!(scale.offset_for(3599, Shaft::default()), Some(-1));
+}
+
+#[test]
+fn without_scaling_the_largest_sensor_fits_the_value() {
+    assert_eq!(Scale::unscaled(&rotary(u32::MAX, 65_536), false).range(), MOST);
+}
+
+/// A rod of 1 um, read in steps of 5 um, and one of 5 nm in steps of 3 um.
+#[test]
+fn a_rod_counts_in_its_measuring_step() {
+    for (native, step, moved, expected) in [(1000, 5000, 26, 5), (5, 3000, 1199, 1), (5, 3000, 1200, 2)] {
+        let settings = Settings { step, ..scaled(1, 1000) };
+        let scale = Scale::new(&linear(native), &settings).unwrap();
+        assert_eq!(scale.value(shaft_at(moved, &scale), 0), expected);
+        assert_eq!(scale.value(shaft_at(-1, &scale), 0), 999);
+    }
+}

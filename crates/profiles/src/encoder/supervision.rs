@@ -1,0 +1,189 @@
+//! Alarms, warnings and what is reported as an emergency: objects 6503h to 6506h.
+
+use super::input::{SENSOR_NO_SIGNAL, SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED};
+use super::{ChannelValues, OperatingTime};
+
+/// Alarm bit 0: position error.
+pub const ALARM_POSITION: u16 = 1 << 0;
+/// Alarm bit 1: the commissioning diagnostic has found something.
+pub const ALARM_COMMISSIONING: u16 = 1 << 1;
+/// Supported alarms (6504h).
+pub const SUPPORTED_ALARMS: u16 = ALARM_POSITION | ALARM_COMMISSIONING;
+
+/// Warning bit 0: frequency exceeded.
+pub const WARNING_FREQUENCY: u16 = 1 << 0;
+/// Warning bit 2: the last reset came from the watchdog.
+pub const WARNING_WATCHDOG: u16 = 1 << 2;
+/// Warning bit 3: operating time limit.
+pub const WARNING_OPERATING_TIME: u16 = 1 << 3;
+/// Warning bit 4: battery charge too low.
+pub const WARNING_BATTERY: u16 = 1 << 4;
+/// Warning bit 5: reference point not reached.
+pub const WARNING_REFERENCE: u16 = 1 << 5;
+/// Supported warnings (6506h): all but the light reserve, bit 1, which neither kind of input tells.
+pub const SUPPORTED_WARNINGS: u16 =
+    WARNING_FREQUENCY | WARNING_WATCHDOG | WARNING_OPERATING_TIME | WARNING_BATTERY | WARNING_REFERENCE;
+
+/// Milliseconds for which a supply must be out of its limits, or back, before that is believed.
+const DEBOUNCE: u8 = 10;
+
+/// What the board knows besides positions; `None` where it does not measure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Board {
+    /// Supply of the sensors in mV.
+    pub supply: Option<u16>,
+    /// Current of the sensors in mA.
+    pub current: Option<u16>,
+    /// Battery behind what is kept, in mV.
+    pub battery: Option<u16>,
+    /// The last reset came from the watchdog.
+    pub watchdog_reset: bool,
+    /// A memory test has failed.
+    pub memory_error: bool,
+}
+
+/// The limits of what the board measures, and of the operating time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Lowest supply of the sensors in mV.
+    pub lowest_supply: u16,
+    /// Highest supply of the sensors in mV.
+    pub highest_supply: u16,
+    /// Highest current of the sensors in mA.
+    pub highest_current: u16,
+    /// Lowest battery voltage in mV.
+    pub lowest_battery: u16,
+    /// Operating time in 0.1 h from which on bit 3 of 6505h warns; 0 for none.
+    pub operating_time: u32,
+}
+
+impl Default for Limits {
+    /// Sensors for 5 V, a lithium cell.
+    fn default() -> Limits {
+        let (lowest_supply, highest_supply) = (4500, 5500);
+        Limits {
+            lowest_supply,
+            highest_supply,
+            highest_current: 200,
+            lowest_battery: 2400,
+            operating_time: 0,
+        }
+    }
+}
+
+/// What is wrong, for emergency messages (CiA 406, 5.3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools)] // Each is a fault of its own.
+pub struct Conditions {
+    /// 2110h, input current too high.
+    pub current: bool,
+    /// 3110h, input voltage out of range.
+    pub voltage: bool,
+    /// 5100h, hardware memory error: what was to be kept is damaged, or a memory test has failed.
+    pub memory: bool,
+    /// A sensor does not answer.
+    pub sensor_break: bool,
+}
+
+/// A condition that must last before it counts.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lasting {
+    is_set: bool,
+    other: u8,
+}
+
+impl Lasting {
+    fn update(&mut self, now: bool) -> bool {
+        self.other = if now == self.is_set { 0 } else { self.other.saturating_add(1) };
+        if self.other >= DEBOUNCE {
+            *self = Lasting { is_set: now, other: 0 };
+        }
+        self.is_set
+    }
+}
+
+/// Everything that lasts longer than a sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Supervision {
+    alarms: u16,
+    current: Lasting,
+    voltage: Lasting,
+    battery: Lasting,
+    is_damaged: bool,
+    /// The operating time has reached its limit since power-on, and has not been below it after that.
+    is_old: bool,
+    has_been_old: bool,
+}
+
+impl Supervision {
+    /// What was to be kept is damaged.
+    pub(super) fn set_damaged(&mut self, positions_are_lost: bool) {
+        self.is_damaged = true;
+        self.alarms |= if positions_are_lost { ALARM_POSITION } else { 0 };
+    }
+
+    /// Clears alarms, until the next sample finds them again.
+    pub(super) fn acknowledge(&mut self, mask: u16) {
+        self.alarms &= !mask;
+    }
+
+    /// Object 6503h: what is wrong now, and what was and has not been acknowledged.
+    pub(super) fn alarms(&mut self, channels: &[ChannelValues; 2]) -> u16 {
+        let position = sensors(channels) & SENSOR_POSITION_ERROR != 0;
+        let commissioning = channels.iter().any(|channel| channel.commissioning.is_failure());
+        self.alarms |= flag(position, ALARM_POSITION) | flag(commissioning, ALARM_COMMISSIONING);
+        self.alarms
+    }
+
+    /// Object 6505h: what is out of tolerance now.
+    pub(super) fn warnings(
+        &mut self,
+        channels: &[ChannelValues; 2],
+        board: &Board,
+        limits: &Limits,
+        time: OperatingTime,
+    ) -> u16 {
+        let sensors = sensors(channels);
+        let battery = board.battery.is_some_and(|voltage| voltage < limits.lowest_battery);
+        flag(sensors & SENSOR_TOO_FAST != 0, WARNING_FREQUENCY)
+            | flag(board.watchdog_reset, WARNING_WATCHDOG)
+            | flag(self.is_too_old(limits, time), WARNING_OPERATING_TIME)
+            | flag(self.battery.update(battery), WARNING_BATTERY)
+            | flag(sensors & SENSOR_UNREFERENCED != 0, WARNING_REFERENCE)
+    }
+
+    pub(super) fn conditions(
+        &mut self,
+        channels: &[ChannelValues; 2],
+        board: &Board,
+        limits: &Limits,
+    ) -> Conditions {
+        let supplies = limits.lowest_supply..=limits.highest_supply;
+        let current = board.current.is_some_and(|current| current > limits.highest_current);
+        let voltage = board.supply.is_some_and(|supply| !supplies.contains(&supply));
+        let broken = SENSOR_NO_SIGNAL | SENSOR_POSITION_ERROR;
+        Conditions {
+            current: self.current.update(current),
+            voltage: self.voltage.update(voltage),
+            memory: self.is_damaged || board.memory_error,
+            sensor_break: channels.iter().any(|channel| channel.sensor_state & broken == broken),
+        }
+    }
+
+    /// The warning goes when the limit is raised, and then comes again only after power-on (CiA 406, 6505h).
+    fn is_too_old(&mut self, limits: &Limits, time: OperatingTime) -> bool {
+        let reached = limits.operating_time > 0 && time.tenths() >= limits.operating_time;
+        self.is_old = reached && (self.is_old || !self.has_been_old);
+        self.has_been_old |= self.is_old;
+        self.is_old
+    }
+}
+
+fn sensors(channels: &[ChannelValues; 2]) -> u8 {
+    let [first, second] = channels;
+    first.sensor_state | second.sensor_state
+}
+
+fn flag(is_set: bool, mask: u16) -> u16 {
+    if is_set { mask } else { 0 }
+}

@@ -1,0 +1,111 @@
+//! An encoder on a shaft or a rod that is moved.
+
+use profiles::encoder::{
+    ChannelParameters, ChannelValues, Coding, Command, Encoder, Format, Frame, Parameters, RawEncoder,
+    SensorType, Snapshot, Start,
+};
+
+/// The encoder with its parameters, and where the sensors are.
+pub(crate) struct Bench {
+    pub(crate) encoder: Encoder,
+    pub(crate) parameters: Parameters,
+    /// Steps of the sensors since they left the factory.
+    pub(crate) total: i64,
+    /// Steps that the timer has lost.
+    pub(crate) lost: i64,
+    pub(crate) raw: RawEncoder,
+}
+
+pub(crate) fn one(kind: SensorType) -> Parameters {
+    let mut parameters = Parameters::default();
+    parameters.channels[0].kind = Some(kind);
+    parameters
+}
+
+pub(crate) fn two(first: SensorType, second: SensorType) -> Parameters {
+    let mut parameters = one(first);
+    parameters.channels[1] = ChannelParameters { kind: Some(second), ..parameters.channels[1] };
+    parameters
+}
+
+impl Bench {
+    pub(crate) fn new(parameters: Parameters) -> Bench {
+        Bench::started(parameters, Start::First, 0)
+    }
+
+    pub(crate) fn started(parameters: Parameters, start: Start, total: i64) -> Bench {
+        let mut encoder = Encoder::new(start);
+        encoder.apply(&parameters);
+        Bench { encoder, parameters, total, lost: total, raw: RawEncoder::default() }
+    }
+
+    /// Takes over what `change` has changed.
+    pub(crate) fn change(&mut self, change: impl FnOnce(&mut Parameters)) {
+        change(&mut self.parameters);
+        self.encoder.apply(&self.parameters);
+    }
+
+    pub(crate) fn preset(&mut self, channel: usize, value: u32) {
+        self.change(|parameters| {
+            let count = parameters.channels[channel].preset.count + 1;
+            parameters.channels[channel].preset = Command { value, count };
+        });
+    }
+
+    /// Moves to `total` within a millisecond; the index comes where a turn of 4096 steps begins.
+    pub(crate) fn go(&mut self, total: i64) -> Snapshot {
+        let index = [total, self.total].map(|at| at.div_euclid(4096)).into_iter().max().unwrap_or(0) * 4096;
+        let crossed = self.total.div_euclid(4096) != total.div_euclid(4096);
+        self.raw.index = crossed.then(|| self.counter(index));
+        self.total = total;
+        self.stay()
+    }
+
+    pub(crate) fn step(&mut self, by: i64) -> Snapshot {
+        self.go(self.total + by)
+    }
+
+    /// A millisecond in which nothing moves but what was moved before.
+    pub(crate) fn stay(&mut self) -> Snapshot {
+        self.raw.counter = self.counter(self.total);
+        self.raw.ssi = Some(frame(self.parameters.format, self.total));
+        let snapshot = self.encoder.sample(&self.raw);
+        self.raw.index = None;
+        snapshot
+    }
+
+    /// A millisecond with this frame.
+    pub(crate) fn receive(&mut self, frame: Option<Frame>) -> Snapshot {
+        self.raw.ssi = frame;
+        self.encoder.sample(&self.raw)
+    }
+
+    pub(crate) fn first(&mut self) -> ChannelValues {
+        self.stay().channels[0]
+    }
+
+    /// What the timer counts while the sensor is there.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn counter(&self, total: i64) -> u16 {
+        (total - self.lost) as u16
+    }
+}
+
+/// A frame without alarm bit and parity.
+pub(crate) fn frame(format: Format, total: i64) -> Frame {
+    let bits = format.position_bits();
+    let position = u64::try_from(total.rem_euclid(1 << bits)).unwrap();
+    let code = if is_gray(format) { position ^ (position >> 1) } else { position };
+    Frame { bits: ((1 << bits) | code) << 2, clocks: bits + 3 }
+}
+
+fn is_gray(format: Format) -> bool {
+    let binary = Format::new(
+        u8::try_from(format.revolution_bits()).unwrap(),
+        u8::try_from(format.step_bits()).unwrap(),
+        Coding::Binary,
+        false,
+        profiles::encoder::Parity::None,
+    );
+    binary != Some(format)
+}

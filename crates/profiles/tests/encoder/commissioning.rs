@@ -1,0 +1,108 @@
+//! The commissioning diagnostic finds what it says, and nothing where nothing is.
+
+use profiles::encoder::{
+    ALARM_COMMISSIONING, COMMISSIONING, Coding, Command, Format, Parameters, Parity, Progress, SensorType,
+};
+
+use crate::bench::{Bench, frame, one};
+
+fn diagnosed(kind: SensorType) -> Bench {
+    Bench::new(Parameters { operating: COMMISSIONING, ..one(kind) })
+}
+
+fn progress(bench: &mut Bench) -> Progress {
+    bench.stay().channels[0].commissioning
+}
+
+#[test]
+fn off_until_it_is_asked_for() {
+    let mut bench = Bench::new(one(SensorType::MultiTurn));
+    assert_eq!(progress(&mut bench), Progress::Off);
+    bench.change(|parameters| parameters.operating = COMMISSIONING);
+    assert_eq!(progress(&mut bench), Progress::Running);
+    bench.change(|parameters| parameters.operating = 0);
+    assert_eq!(progress(&mut bench), Progress::Off);
+}
+
+#[test]
+fn a_good_encoder_passes_at_rest_and_over_two_turns() {
+    for kind in [SensorType::MultiTurn, SensorType::SingleTurn, SensorType::IncrementalCounted] {
+        for speed in [1_i64, 7, -13, 64, 400] {
+            let mut bench = diagnosed(kind);
+            (0..1000).for_each(|_| _ = bench.stay());
+            assert_eq!(progress(&mut bench), Progress::GoodAtRest, "{kind:?}");
+            (0..20_000 / speed.abs()).for_each(|_| _ = bench.step(speed));
+            assert_eq!(progress(&mut bench), Progress::GoodOverTurns, "{kind:?} at {speed}");
+            assert_eq!(bench.stay().alarms, 0);
+        }
+    }
+}
+
+#[test]
+fn an_open_line_is_found_at_rest() {
+    let mut bench = diagnosed(SensorType::MultiTurn);
+    bench.stay();
+    let snapshot = bench.receive(None);
+    assert_eq!(snapshot.channels[0].commissioning, Progress::BadReading);
+    assert_eq!(snapshot.alarms, ALARM_COMMISSIONING);
+    // It stays, and goes when the diagnostic is no longer wanted and somebody has seen it.
+    assert_eq!(progress(&mut bench), Progress::BadReading);
+    bench.change(|parameters| {
+        parameters.operating = 0;
+        parameters.acknowledge = Command { value: 2, count: 1 };
+    });
+    assert_eq!(bench.stay().alarms, 0);
+}
+
+#[test]
+fn a_gap_in_the_code_is_found() {
+    let mut bench = diagnosed(SensorType::MultiTurn);
+    bench.stay();
+    bench.step(10_001);
+    assert_eq!(progress(&mut bench), Progress::BadReading);
+}
+
+#[test]
+fn a_stuck_bit_is_found_over_two_turns() {
+    let format = Format::new(4, 8, Coding::Gray, false, Parity::None).unwrap();
+    for bit in 0..8 {
+        for level in [0, 1] {
+            let mut bench = diagnosed(SensorType::MultiTurn);
+            bench.change(|parameters| parameters.format = format);
+            let mut last = Progress::Off;
+            for total in 0..1200 {
+                let mut frame = frame(format, total);
+                frame.bits = frame.bits & !(4 << bit) | (level << (2 + bit));
+                last = bench.receive(Some(frame)).channels[0].commissioning;
+            }
+            assert_eq!(last, Progress::StuckBit, "bit {bit} at {level}");
+        }
+    }
+}
+
+#[test]
+fn an_index_that_does_not_come_is_found() {
+    let mut bench = diagnosed(SensorType::Incremental);
+    bench.stay();
+    for _ in 0..9 {
+        bench.total += 1000;
+        bench.stay();
+    }
+    assert_eq!(progress(&mut bench), Progress::BadIndex);
+}
+
+#[test]
+fn an_index_at_the_wrong_distance_is_found() {
+    let mut bench = diagnosed(SensorType::Incremental);
+    bench.change(|parameters| parameters.channels[0].resolution = 4000.try_into().unwrap());
+    (0..10).for_each(|_| _ = bench.step(1000));
+    assert_eq!(progress(&mut bench), Progress::BadIndex);
+}
+
+#[test]
+fn too_fast_is_found() {
+    let mut bench = diagnosed(SensorType::Incremental);
+    bench.stay();
+    bench.step(10_001);
+    assert_eq!(progress(&mut bench), Progress::TooFast);
+}

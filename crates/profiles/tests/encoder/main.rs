@@ -1,0 +1,9 @@
+//! The whole encoder, from what the hardware reads to the snapshot.
+
+mod bench;
+mod commissioning;
+mod motion;
+mod power;
+mod preset;
+mod random;
+mod supervision;

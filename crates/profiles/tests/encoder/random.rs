@@ -1,0 +1,131 @@
+//! Anything at all: nothing overflows (tests run with overflow checks), and values stay in their ranges.
+
+use std::num::{NonZeroU16, NonZeroU32};
+
+use profiles::encoder::{
+    Area, Board, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Frame, Kept, Limits, Module,
+    Parameters, Parity, RawEncoder, SensorType, Start,
+};
+use proptest::prelude::*;
+
+fn any_channel() -> impl Strategy<Value = ChannelParameters> {
+    let cam = any::<(i32, i32, u16)>().prop_map(|(low, high, hysteresis)| Cam { low, high, hysteresis });
+    let cams = (prop::array::uniform8(cam), any::<(u8, u8)>());
+    let sensor = (0..=9_u8, any::<(NonZeroU32, NonZeroU16, u32)>());
+    (sensor, cams, any::<(i32, i32, u32)>(), 0..3_u8).prop_map(
+        |((kind, (resolution, counted, fastest)), (cams, (enable, polarity)), (low, high, value), count)| {
+            ChannelParameters {
+                kind: SensorType::from_code(kind),
+                resolution,
+                counted,
+                fastest: if fastest % 2 == 0 { 0 } else { fastest },
+                preset: Command { value, count },
+                cams: Cams { cams, enable, polarity },
+                area: Area { low, high },
+            }
+        },
+    )
+}
+
+fn any_format() -> impl Strategy<Value = Format> {
+    (0..=16_u8, 1..=16_u8, any::<(bool, bool)>(), 0..3_u8).prop_map(
+        |(turns, steps, (gray, alarm), parity)| {
+            let coding = if gray { Coding::Gray } else { Coding::Binary };
+            let parity = [Parity::None, Parity::Even, Parity::Odd][usize::from(parity)];
+            Format::new(turns, steps, coding, alarm, parity).unwrap()
+        },
+    )
+}
+
+fn any_parameters() -> impl Strategy<Value = Parameters> {
+    let units = (0..16_u16, any::<(u32, u32, u32, u32)>());
+    let rest = (any_format(), any::<(bool, i32, i32, i32)>(), any::<[u16; 4]>(), any::<(u32, u32)>());
+    (units, prop::array::uniform2(any_channel()), rest).prop_map(
+        |(
+            (operating, (per_revolution, range, step, speed_step)),
+            channels,
+            (format, module, limits, last),
+        )| {
+            let (index, offset, low, high) = module;
+            let [lowest_supply, highest_supply, highest_current, lowest_battery] = limits;
+            let (operating_time, value) = last;
+            Parameters {
+                operating,
+                per_revolution,
+                range,
+                step,
+                speed_step,
+                channels,
+                format,
+                index,
+                module: Module { offset, low, high },
+                limits: Limits {
+                    lowest_supply,
+                    highest_supply,
+                    highest_current,
+                    lowest_battery,
+                    operating_time,
+                },
+                acknowledge: Command { value, count: u8::from(index) },
+            }
+        },
+    )
+}
+
+fn any_raw() -> impl Strategy<Value = RawEncoder> {
+    let frame = (any::<u64>(), 0..70_u32).prop_map(|(bits, clocks)| Frame { bits, clocks });
+    (any::<(u16, Option<u16>)>(), prop::option::of(frame), any::<[Option<u16>; 3]>(), any::<(bool, bool)>())
+        .prop_map(|((counter, index), ssi, [supply, current, battery], (watchdog_reset, memory_error))| {
+            RawEncoder {
+                counter,
+                index,
+                ssi,
+                board: Board { supply, current, battery, watchdog_reset, memory_error },
+            }
+        })
+}
+
+fn any_start() -> impl Strategy<Value = Start> {
+    let kept = prop::collection::vec(any::<u8>(), Kept::SIZE)
+        .prop_map(|bytes| Start::Kept(Kept::from_bytes(bytes.as_slice().try_into().unwrap())));
+    prop_oneof![Just(Start::First), Just(Start::Damaged), kept]
+}
+
+proptest! {
+    #[test]
+    fn nothing_overflows(
+        start in any_start(),
+        life in prop::collection::vec((any_parameters(), prop::collection::vec(any_raw(), 0..20)), 1..6),
+    ) {
+        let mut encoder = Encoder::new(start);
+        for (parameters, samples) in life {
+            encoder.apply(&parameters);
+            for raw in samples {
+                let snapshot = encoder.sample(&raw);
+                for (values, own) in snapshot.channels.iter().zip(&parameters.channels) {
+                    let range = parameters.sensor(own).map_or(1 << 32, |sensor| parameters.scale(&sensor).range().get());
+                    prop_assert!(u64::from(values.position) < range);
+                    prop_assert_eq!(values.cams & !own.cams.enable, 0);
+                }
+            }
+            let kept = encoder.kept();
+            prop_assert_eq!(Kept::from_bytes(&kept.to_bytes()), kept);
+        }
+    }
+
+    /// Whatever was kept, a start with it and with the same parameters keeps the same.
+    #[test]
+    fn keeping_loses_nothing(parameters in any_parameters(), samples in prop::collection::vec(any_raw(), 0..20)) {
+        let mut encoder = Encoder::default();
+        encoder.apply(&parameters);
+        for raw in samples {
+            encoder.sample(&raw);
+        }
+        let kept = encoder.kept();
+        let mut again = Encoder::new(Start::Kept(kept));
+        again.apply(&parameters);
+        for ((first, second), own) in kept.channels.iter().zip(again.kept().channels).zip(&parameters.channels) {
+            prop_assert!(*first == second || own.kind.is_none_or(|kind| !kind.is_kept()));
+        }
+    }
+}
