@@ -124,12 +124,10 @@ impl MockFlash {
         for index in 0..self.words.len() {
             let random = self.next_random();
             let word = &mut self.words[index];
-            let reads = match self.weak {
-                Weak::Before => word.before,
-                Weak::After => word.after,
-                Weak::Random => random,
-                Weak::Either if random & 1 == 0 => word.before,
-                Weak::Either => word.after,
+            let reads = match (self.weak, random & 1) {
+                (Weak::Random, _) => random,
+                (Weak::Before, _) | (Weak::Either, 0) => word.before,
+                (Weak::After | Weak::Either, _) => word.after,
             };
             word.value = (word.value & !word.weak) | (reads & word.weak);
         }
