@@ -7,8 +7,8 @@
 //! | 3 | 0: it was copied, and need not be again while the application is whole |
 //!
 //! The two words that decide are zeros, because zeros may be programmed once more over a word that a cut left half
-//! programmed, and then hold for good. To revoke is to program zeros over everything: it comes before every erase of
-//! staging, so no erase that is cut can bring a record back.
+//! programmed, and then hold for good. To revoke is to program zeros over everything, the last word first: it comes before
+//! every erase of staging, so no erase that is cut can bring a record back.
 
 use crate::flash::{Flash, first, program};
 use crate::refusal::Refusal;
@@ -68,8 +68,10 @@ impl Record {
         program(flash, self.0.saturating_add(DONE), &ZERO)
     }
 
-    /// Nothing is to be copied, for good.
+    /// Nothing is to be copied, for good. First the record says that there is no need: were the magic cut before that, it
+    /// could read well, a copy begin, and the magic be gone in the middle of it.
     pub(crate) fn revoke<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
+        self.done(flash)?;
         program(flash, self.0, &[0; RECORD_LEN as usize])
     }
 }

@@ -7,7 +7,8 @@ use crate::refusal::Refusal;
 /// A NOR flash with sectors of different sizes whose erase goes on by itself. `embedded_storage::NorFlash` can say
 /// neither: it has one `ERASE_SIZE`, and its `erase` returns when all is done.
 ///
-/// Offsets count from the start of the flash.
+/// Offsets count from the start of the flash. What is read is what the cells hold: a driver flushes the caches after it has
+/// programmed or erased, for everything is read back.
 pub trait Flash: ReadNorFlash {
     /// Programs whole words of 32 bits at a multiple of 4. The words were erased before, or all of `bytes` are 0:
     /// zeros may be programmed over anything, as a bit may go from 1 to 0 without an erase (RM0390, 3.5.2; RM0090,

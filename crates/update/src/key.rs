@@ -7,7 +7,10 @@ pub const KEY_LEN: usize = 32;
 
 /// The public half of the DEVELOPMENT key. Its secret half is in the repository
 /// (`tools/sign/keys/DEVELOPMENT-KEY-KNOWN-TO-EVERYBODY.pem`): a node that trusts it runs what anybody signs.
-pub const DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY: [u8; KEY_LEN] = [0; KEY_LEN];
+pub const DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY: [u8; KEY_LEN] = [
+    0xFB, 0x87, 0x4B, 0xC8, 0xD1, 0x9E, 0xEB, 0x05, 0xB1, 0x01, 0x6F, 0x27, 0xC2, 0x7C, 0xCD, 0x9E, 0x98,
+    0x53, 0x25, 0xCA, 0x80, 0xD8, 0x06, 0x8B, 0xDA, 0x9B, 0x5F, 0x44, 0xA3, 0x9F, 0xE4, 0x66,
+];
 
 /// The key that this bootloader trusts. To be replaced before anything is sold: the feature `production` does not
 /// compile with the development key.

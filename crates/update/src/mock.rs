@@ -30,6 +30,14 @@ pub enum Weak {
     After,
     /// Each by chance, drawn again at every power-up.
     Random,
+    /// All of a word by chance as before or as after, drawn again at every power-up: what makes a word that was cut once
+    /// look whole and once not.
+    Either,
+}
+
+impl Weak {
+    /// All of them.
+    pub const ALL: [Weak; 4] = [Weak::Before, Weak::After, Weak::Random, Weak::Either];
 }
 
 /// What may be programmed.
@@ -116,10 +124,10 @@ impl MockFlash {
         for index in 0..self.words.len() {
             let random = self.next_random();
             let word = &mut self.words[index];
-            let reads = match self.weak {
-                Weak::Before => word.before,
-                Weak::After => word.after,
-                Weak::Random => random,
+            let reads = match (self.weak, random & 1) {
+                (Weak::Random, _) => random,
+                (Weak::Before, _) | (Weak::Either, 0) => word.before,
+                (Weak::After | Weak::Either, _) => word.after,
             };
             word.value = (word.value & !word.weak) | (reads & word.weak);
         }

@@ -22,7 +22,8 @@ pub enum Next {
     Erasing,
     /// A step of at most 64 words programmed or 1 KiB read: 1 ms typical, 7 ms most.
     Step,
-    /// The check of the signature: 0.11 s of computing at 144 MHz, in which the flash is not used.
+    /// The check of the signature: 30 to 60 ms of computing at 144 MHz. Answer the bus from an interrupt meanwhile, or
+    /// let the master wait so long.
     LongStep,
 }
 
