@@ -1,7 +1,7 @@
 """A running `cargo sim`, and what the tests hear of it.
 
-Virtual time runs as fast as the host can (`--speed max`), so no test may look at a clock of the host: what is
-asserted are the virtual time stamps that come with every frame.
+Virtual time runs as fast as the host can unless a test asks for the speed of a real board, so no test may look at a
+clock of the host: what is asserted are the virtual time stamps that come with every frame.
 """
 
 import json
@@ -23,12 +23,12 @@ BOOT_UP = b"\x00"
 class Simulator:
     """The `sim` program with one pressure node, served on free ports."""
 
-    def __init__(self, *flags: str):
+    def __init__(self, *flags: str, speed: str = "max"):
         images = Path(os.environ["NODE_IMAGES"])
         for name in ("bootloader", "firmware"):
             assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images` builds it"
         command = [os.environ["SIM_COMMAND"], "--bootloader", images / "bootloader", "--firmware", images / "firmware"]
-        command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", "max", "--json", *flags]
+        command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.socketcand = self._port(r"socketcand on 127\.0\.0\.1:(\d+)")
         self.slcan = self._port(r"slcan on 127\.0\.0\.1:(\d+)")

@@ -55,7 +55,7 @@ impl<'a, C: Channel> Client<'a, C> {
         self.begin();
         let size = match self.exchange(Request::Upload(at))? {
             Response::Uploaded(of, bytes) if of == at => return Ok(bytes.as_slice().to_vec()),
-            Response::UploadSegmented(of, size) if of == at => size,
+            Response::UploadSegmented(of, Some(size)) if of == at => size,
             other => return Err(unexpected(other)),
         };
         let mut value = vec![];
@@ -103,7 +103,7 @@ impl<'a, C: Channel> Client<'a, C> {
     pub fn read_blocks(&mut self, at: Multiplexer, block_size: u8) -> Result<Vec<u8>, Failure> {
         self.begin();
         let size = match self.exchange(Request::BlockUpload { at, crc: true, block_size, threshold: 0 })? {
-            Response::BlockUpload(of, size) if of == at => size as usize,
+            Response::BlockUpload { at: of, crc: true, size: Some(size) } if of == at => size as usize,
             other => return Err(unexpected(other)),
         };
         self.send(Request::BlockUploadStart);

@@ -81,6 +81,22 @@ fn the_staging_slot_holds_any_image_of_the_application_slot() {
     assert!(regions["STAGING"].len() >= regions["IMAGE_HEADER"].len() + regions["APPLICATION"].len());
 }
 
+/// What the bootloader erases is what memory.x says, sector by sector.
+#[test]
+fn the_update_knows_the_areas_and_their_sectors() {
+    let regions = regions();
+    let layout = update::Layout::STM32F4;
+    let application = regions["IMAGE_HEADER"].start..regions["APPLICATION"].end;
+    assert_eq!(regions["IMAGE_HEADER"].len(), update::HEADER_LEN);
+    for (area, region) in
+        [(layout.application(), application), (layout.staging(), regions["STAGING"].clone())]
+    {
+        assert_eq!(FLASH + area.start()..FLASH + area.end(), region);
+        let inside = sector_starts().into_iter().filter(|start| region.contains(start));
+        assert!(area.sectors().map(|sector| FLASH + sector.start).eq(inside));
+    }
+}
+
 #[test]
 fn the_parameter_store_has_two_pages_of_one_size() {
     let pages = regions()["PARAMETERS"].clone();

@@ -5,6 +5,7 @@ mod eds;
 mod images;
 mod native;
 mod python;
+mod sign;
 mod sim;
 mod steps;
 mod target;
@@ -36,6 +37,13 @@ enum Command {
     },
     /// Write eds/*.eds and docs/object-dictionary.md from the dictionary tables
     Eds,
+    /// Make signing keys and sign images for the field update (docs/update.md; `cargo xtask sign --help`)
+    #[command(disable_help_flag = true)]
+    Sign {
+        /// Arguments of the signing tool
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
+    },
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
     Test {
         /// Run only the steps whose name contains this text
@@ -49,6 +57,7 @@ fn main() -> ExitCode {
         Command::Images => images::build().map(|_| ExitCode::SUCCESS),
         Command::Sim { flags } => sim::run(&flags),
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
+        Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {

@@ -19,6 +19,12 @@ pub(crate) fn ensure_emulator_tools() -> Result<()> {
     ensure_packages(&missing, "the emulator's CPU library is built with them")
 }
 
+/// Sees to it that there is a tshark to judge what was said on the bus.
+pub(crate) fn ensure_tshark() -> Result<()> {
+    let missing: &[&str] = if exists("tshark") { &[] } else { &["tshark"] };
+    ensure_packages(missing, "the tests have it decode what was said on the bus")
+}
+
 /// Installs Debian packages as root; for anyone else prints the one command that does it, and stops.
 pub(crate) fn ensure_packages(packages: &[&str], reason: &str) -> Result<()> {
     if packages.is_empty() {

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use crate::command::{cargo, root, run};
 use crate::steps::Steps;
@@ -10,7 +10,7 @@ use crate::target::Toolchain;
 use crate::{images, native, python, sim};
 
 /// The packages that only build for the embedded target.
-const IMAGES: [&str; 3] = ["firmware", "bootloader", "mechanics-images"];
+const IMAGES: [&str; 4] = ["firmware", "bootloader", "mechanics-images", "panic-free"];
 
 /// Runs the steps.
 fn run_all(steps: &mut Steps) -> Result<()> {
@@ -22,6 +22,7 @@ fn run_all(steps: &mut Steps) -> Result<()> {
     steps.run("images", || images::build().map(|_| ()))?;
     steps.run("lint images", lint_images)?;
     steps.run("other chips", other_chips)?;
+    steps.run("no panic", no_panic)?;
     steps.run("test host", || run(with_images(&mut host("test"))))?;
     steps.run("test python", test_python)
 }
@@ -45,7 +46,19 @@ fn host(verb: &str) -> Command {
 
 fn lint_images() -> Result<()> {
     let toolchain = Toolchain::ensure()?;
-    let packages = ["--release", "-p", "firmware", "-p", "bootloader", "-p", "mechanics-images", "-p", "bsp"];
+    let packages = [
+        "--release",
+        "-p",
+        "firmware",
+        "-p",
+        "bootloader",
+        "-p",
+        "mechanics-images",
+        "-p",
+        "panic-free",
+        "-p",
+        "bsp",
+    ];
     run(toolchain.cargo("clippy", &packages).args(["--", "-D", "warnings"]))?;
     run(toolchain.cargo("doc", &packages).arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"))
 }
@@ -61,7 +74,20 @@ fn other_chips() -> Result<()> {
     Ok(())
 }
 
+/// Links everything that comes from the bus with a panic handler that cannot link; and shows that it would not link.
+fn no_panic() -> Result<()> {
+    let toolchain = Toolchain::ensure()?;
+    let package = ["--release", "-p", "panic-free"];
+    run(&mut toolchain.cargo("build", &package))?;
+    let control = toolchain.cargo("build", &package).args(["--features", "with-a-panic"]).output()?;
+    let says = String::from_utf8_lossy(&control.stderr);
+    let is_refused = !control.status.success() && says.contains("a_panic_path_is_left");
+    ensure!(is_refused, "an image with a panic path has linked:\n{says}");
+    Ok(())
+}
+
 fn test_python() -> Result<()> {
+    native::ensure_tshark()?;
     let sim = sim::build()?;
     let python = python::ensure()?;
     run(with_images(&mut Command::new(python))

@@ -81,7 +81,7 @@ mod tests {
     #[test]
     fn it_waits_longer_each_time_until_the_bus_is_good() {
         let (mut back_off, mut now) = (BackOff::default(), Instant(500_000));
-        let waits: Vec<_> = (0..9).map(|_| wait(&mut back_off, &mut now)).collect();
+        let waits = [(); 9].map(|()| wait(&mut back_off, &mut now));
         assert_eq!(waits, [50, 100, 200, 400, 800, 1600, 3200, 3200, 3200]);
         now = now + GOOD;
         assert_eq!(wait(&mut back_off, &mut now), 50);

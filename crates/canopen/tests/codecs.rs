@@ -75,13 +75,14 @@ fn response() -> impl Strategy<Value = Response> {
         multiplexer().prop_map(Response::Downloaded),
         any::<bool>().prop_map(|toggle| Response::DownloadedSegment { toggle }),
         (multiplexer(), short()).prop_map(|(at, data)| Response::Uploaded(at, data)),
-        (multiplexer(), any::<u32>()).prop_map(|(at, size)| Response::UploadSegmented(at, size)),
+        (multiplexer(), any::<Option<u32>>()).prop_map(|(at, size)| Response::UploadSegmented(at, size)),
         segment().prop_map(Response::UploadedSegment),
         (multiplexer(), any::<u32>()).prop_map(|(at, code)| Response::Abort(at, code)),
         (multiplexer(), block_size()).prop_map(|(at, size)| Response::BlockDownload(at, size)),
         (any::<u8>(), block_size()).prop_map(|(last, size)| Response::BlockAcknowledge(last, size)),
         Just(Response::BlockDownloaded),
-        (multiplexer(), any::<u32>()).prop_map(|(at, size)| Response::BlockUpload(at, size)),
+        (multiplexer(), any::<bool>(), any::<Option<u32>>())
+            .prop_map(|(at, crc, size)| Response::BlockUpload { at, crc, size }),
         block_end().prop_map(Response::BlockUploadEnd),
     ]
 }

@@ -32,6 +32,7 @@ pub use canopen::{Frame, Instant, NodeId, QueueFull, Transmit};
 pub use measurement::{Measurement, Parameters, Snapshot};
 pub use parcel::Parcel;
 pub use personality::Personality;
+pub use profiles::encoder::{Kept, RawEncoder, Start};
 pub use profiles::pressure::{FactoryCalibration, RawSample};
 pub use protocol::Protocol;
 pub use setup::{REVISION, Setup, VENDOR_ID};

@@ -38,13 +38,20 @@ impl Parcel {
     /// What to tell the client: `Hardware` when the flash has failed, `DeviceState` when there is no room left until the
     /// node is restarted.
     pub fn deliver<F: NorFlash>(&self, store: &mut Store<F>) -> Result<(), Abort> {
+        let [communication, application] = [Group::Communication, Group::Application];
         let changes: Vec<Change<'_>, 2> = match self.job {
             None => Vec::new(),
             Some(Job::Configure(_) | Job::Set(_)) => {
-                Vec::from_iter([set(Group::Device, DeviceRecord::VERSION, &self.device)])
+                some([Some(set(Group::Device, DeviceRecord::VERSION, &self.device))])
             }
-            Some(Job::Save(selection)) => groups(selection).map(|group| self.change(group)).collect(),
-            Some(Job::Restore(selection)) => groups(selection).map(Change::Restore).collect(),
+            Some(Job::Save(selection)) => some(
+                [communication, application]
+                    .map(|group| selects(selection, group).then(|| self.change(group))),
+            ),
+            Some(Job::Restore(selection)) => some(
+                [communication, application]
+                    .map(|group| selects(selection, group).then_some(Change::Restore(group))),
+            ),
         };
         store.save(&changes).map_err(|error| match error {
             Error::RestartNeeded => Abort::DeviceState,
@@ -69,10 +76,20 @@ const fn set(group: Group, version: u16, value: &[u8]) -> Change<'_> {
     Change::Set { group, version, value }
 }
 
-fn groups(selection: Selection) -> impl Iterator<Item = Group> {
-    let groups = [
-        (dictionary::Group::Communication, Group::Communication),
-        (dictionary::Group::Application, Group::Application),
-    ];
-    groups.into_iter().filter(move |(of, _)| selection.contains(*of)).map(|(_, group)| group)
+fn selects(selection: Selection, group: Group) -> bool {
+    let of = if group == Group::Communication {
+        dictionary::Group::Communication
+    } else {
+        dictionary::Group::Application
+    };
+    selection.contains(of)
+}
+
+/// Those that are there, of at most two.
+fn some<const N: usize>(changes: [Option<Change<'_>>; N]) -> Vec<Change<'_>, 2> {
+    let mut all = Vec::new();
+    for change in changes.into_iter().flatten() {
+        let _ = all.push(change);
+    }
+    all
 }

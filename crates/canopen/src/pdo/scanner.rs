@@ -86,7 +86,9 @@ impl Scanner {
     ) {
         *self = Scanner { settings, ..Scanner::new() };
         if settings.is_some() {
-            self.watched.extend(watched.take(WATCHED));
+            for watched in watched.take(WATCHED) {
+                let _ = self.watched.push(watched);
+            }
         }
     }
 

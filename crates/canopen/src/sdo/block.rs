@@ -71,7 +71,8 @@ impl BlockEnd {
     }
 
     /// Of data of this length.
-    pub(super) fn of(len: usize, crc: u16) -> BlockEnd {
+    #[must_use]
+    pub fn of(len: usize, crc: u16) -> BlockEnd {
         let tail = if len == 0 { 0 } else { (len - 1) % 7 + 1 };
         BlockEnd { unused: u8::try_from(7 - tail).unwrap_or(0), crc }
     }

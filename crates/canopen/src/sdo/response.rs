@@ -12,22 +12,29 @@ pub enum Response {
         /// Of the segment.
         toggle: bool,
     },
-    /// Read: all the data, one to four bytes.
+    /// Read: all the data, one to four bytes; all four where the server leaves the size to the type.
     Uploaded(Multiplexer, Bytes<4>),
-    /// Read: segments follow, of this many bytes in all.
-    UploadSegmented(Multiplexer, u32),
+    /// Read: segments follow, of this many bytes in all where the server says so.
+    UploadSegmented(Multiplexer, Option<u32>),
     /// Read: the next segment.
     UploadedSegment(Segment),
     /// Refused or given up.
     Abort(Multiplexer, u32),
-    /// Write in blocks: ready for the first. The server checks the CRC at the end.
+    /// Write in blocks: ready for the first. Not every server checks the CRC at the end; it comes all the same.
     BlockDownload(Multiplexer, BlockSize),
     /// Write in blocks: a block has arrived up to this segment (0 for none), send the next in this size.
     BlockAcknowledge(u8, BlockSize),
     /// Write in blocks: written.
     BlockDownloaded,
-    /// Read in blocks: ready to send this many bytes; the end will carry a CRC.
-    BlockUpload(Multiplexer, u32),
+    /// Read in blocks: ready to send.
+    BlockUpload {
+        /// What is read.
+        at: Multiplexer,
+        /// The end will carry a CRC.
+        crc: bool,
+        /// Bytes in all, where the server says so.
+        size: Option<u32>,
+    },
     /// Read in blocks: that was all. (Its segments are a [`BlockSegment`](super::BlockSegment) each.)
     BlockUploadEnd(BlockEnd),
 }
@@ -40,13 +47,14 @@ impl Response {
         match frame[0] >> 5 {
             0 => Some(Response::UploadedSegment(Segment::parse(frame))),
             1 => Some(Response::DownloadedSegment { toggle: frame[0] & 0x10 != 0 }),
-            2 => Response::parse_upload(multiplexer, frame),
+            2 => Some(Response::parse_upload(multiplexer, frame)),
             3 => Some(Response::Downloaded(multiplexer)),
             4 => Some(Response::Abort(multiplexer, u32::from_le_bytes(tail(frame)))),
             5 => Response::parse_block_download(multiplexer, frame),
             6 if frame[0] & 1 != 0 => Some(Response::BlockUploadEnd(BlockEnd::parse(frame))),
-            6 if frame[0] & 6 == 6 => {
-                Some(Response::BlockUpload(multiplexer, u32::from_le_bytes(tail(frame))))
+            6 => {
+                let size = (frame[0] & 2 != 0).then(|| u32::from_le_bytes(tail(frame)));
+                Some(Response::BlockUpload { at: multiplexer, crc: frame[0] & 4 != 0, size })
             }
             _ => None,
         }
@@ -54,18 +62,19 @@ impl Response {
 
     fn parse_block_download(multiplexer: Multiplexer, frame: [u8; 8]) -> Option<Response> {
         match frame[0] & 0x07 {
-            0b100 => Some(Response::BlockDownload(multiplexer, BlockSize::new(frame[4])?)),
+            0b000 | 0b100 => Some(Response::BlockDownload(multiplexer, BlockSize::new(frame[4])?)),
             0b010 => Some(Response::BlockAcknowledge(frame[1], BlockSize::new(frame[2])?)),
             0b001 => Some(Response::BlockDownloaded),
             _ => None,
         }
     }
 
-    fn parse_upload(multiplexer: Multiplexer, frame: [u8; 8]) -> Option<Response> {
+    fn parse_upload(multiplexer: Multiplexer, frame: [u8; 8]) -> Response {
         match frame[0] & 0x03 {
-            0b11 => Some(Response::Uploaded(multiplexer, Bytes::new(tail(frame), 4 - (frame[0] >> 2 & 3)))),
-            0b01 => Some(Response::UploadSegmented(multiplexer, u32::from_le_bytes(tail(frame)))),
-            _ => None,
+            0b11 => Response::Uploaded(multiplexer, Bytes::new(tail(frame), 4 - (frame[0] >> 2 & 3))),
+            0b10 => Response::Uploaded(multiplexer, Bytes::new(tail(frame), 4)),
+            0b01 => Response::UploadSegmented(multiplexer, Some(u32::from_le_bytes(tail(frame)))),
+            _ => Response::UploadSegmented(multiplexer, None),
         }
     }
 
@@ -78,13 +87,19 @@ impl Response {
             Response::Uploaded(multiplexer, bytes) => {
                 multiplexer.frame(0x43 | (4 - bytes.len().max(1)) << 2, bytes.padded())
             }
-            Response::UploadSegmented(multiplexer, size) => multiplexer.frame(0x41, size.to_le_bytes()),
+            Response::UploadSegmented(multiplexer, size) => {
+                let command = 0x40 | u8::from(size.is_some());
+                multiplexer.frame(command, size.unwrap_or(0).to_le_bytes())
+            }
             Response::UploadedSegment(segment) => segment.encode(0x00),
             Response::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),
             Response::BlockDownload(multiplexer, size) => multiplexer.frame(0xA4, [size.get(), 0, 0, 0]),
             Response::BlockAcknowledge(sequence, size) => [0xA2, sequence, size.get(), 0, 0, 0, 0, 0],
             Response::BlockDownloaded => [0xA1, 0, 0, 0, 0, 0, 0, 0],
-            Response::BlockUpload(multiplexer, size) => multiplexer.frame(0xC6, size.to_le_bytes()),
+            Response::BlockUpload { at, crc, size } => {
+                let command = 0xC0 | u8::from(crc) << 2 | u8::from(size.is_some()) << 1;
+                at.frame(command, size.unwrap_or(0).to_le_bytes())
+            }
             Response::BlockUploadEnd(end) => end.encode(0xC1),
         }
     }

@@ -197,7 +197,7 @@ impl Server {
         }
         let source = Source::open(at, &mut self.buffer, objects)?;
         self.transfer = Transfer::Upload(Upload::new(source));
-        Ok(Some(Response::UploadSegmented(at, source.size())))
+        Ok(Some(Response::UploadSegmented(at, Some(source.size()))))
     }
 
     fn upload_segment(&mut self, toggle: bool, objects: &mut impl Objects) -> Answer {
@@ -295,7 +295,7 @@ impl Server {
         }
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
         self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
-        Ok(Some(Response::BlockUpload(at, source.size())))
+        Ok(Some(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
     }
 
     fn sender(&mut self) -> Result<&mut Sender, Abort> {

@@ -318,7 +318,7 @@ impl Bench {
         let at = Multiplexer { index, sub };
         match self.ask(Request::Upload(at)).unwrap() {
             Response::Uploaded(of, bytes) if of == at => Ok(bytes.as_slice().to_vec()),
-            Response::UploadSegmented(of, size) if of == at => Ok(self.read_segments(size)),
+            Response::UploadSegmented(of, Some(size)) if of == at => Ok(self.read_segments(size)),
             Response::Abort(of, code) if of == at => Err(code),
             other => panic!("{other:?}"),
         }

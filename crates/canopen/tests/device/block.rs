@@ -102,7 +102,9 @@ impl Client {
     /// A block upload that asks again for what is missing; the data and the end of the transfer.
     fn upload(&mut self, at: Multiplexer, block_size: u8) -> (Vec<u8>, BlockEnd) {
         let request = Request::BlockUpload { at, crc: true, block_size, threshold: 0 };
-        let Some(Response::BlockUpload(_, size)) = self.bench.ask(request) else { panic!() };
+        let Some(Response::BlockUpload { crc: true, size: Some(size), .. }) = self.bench.ask(request) else {
+            panic!()
+        };
         let mut data = vec![];
         self.request(Request::BlockUploadStart);
         for _ in 0..3000 {
@@ -186,9 +188,9 @@ fn a_short_value_may_switch_to_another_transfer() {
     let at = Multiplexer { index: 0x6100, sub: 0 };
     let request = |at, threshold| Request::BlockUpload { at, crc: true, block_size: 10, threshold };
     assert!(matches!(bench.ask(request(at, 4)), Some(Response::Uploaded(..))));
-    assert!(matches!(bench.ask(request(at, 1)), Some(Response::BlockUpload(_, 2))));
+    assert!(matches!(bench.ask(request(at, 1)), Some(Response::BlockUpload { size: Some(2), .. })));
     let name = Multiplexer { index: 0x1008, sub: 0 };
-    assert!(matches!(bench.ask(request(name, 26)), Some(Response::UploadSegmented(_, 26))));
+    assert!(matches!(bench.ask(request(name, 26)), Some(Response::UploadSegmented(_, Some(26)))));
 }
 
 #[test]

@@ -1,0 +1,104 @@
+//! What to do at a start.
+
+use crate::commit::{Commit, Record};
+use crate::flash::Flash;
+use crate::header::Header;
+use crate::image::{self, CrcCheck};
+use crate::refusal::Refusal;
+use crate::status::Status;
+use crate::target::Target;
+use crate::trial::Trial;
+
+/// What a start has to go by besides the flash.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Start {
+    /// The application was told to enter the bootloader (1F51h = 0 or 2).
+    pub stay: bool,
+    /// The crashes of the application, this reset counted.
+    pub trial: Trial,
+}
+
+/// What to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// Start the application; this is its header.
+    Start(Header),
+    /// A checked image waits in staging: [`crate::Updater::install`], then ask again. If the answer is the same then, the
+    /// copy has failed; stay with what [`crate::Updater::status`] says.
+    Copy,
+    /// Stay in the bootloader.
+    Stay(Stay),
+}
+
+/// Why the bootloader stays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stay {
+    /// It was asked to.
+    Asked,
+    /// There is no application that may be started, for this reason.
+    NoProgram(Refusal),
+    /// The application has crashed so often.
+    Crashes(u8),
+}
+
+impl Stay {
+    /// What 1F57h reads until an update begins.
+    #[must_use]
+    pub fn status(self) -> Status {
+        match self {
+            Stay::Asked => Status::GOOD,
+            Stay::NoProgram(_) => Status::refused(Refusal::NoProgram),
+            Stay::Crashes(count) => Status::refused(Refusal::Crashes { count }),
+        }
+    }
+}
+
+/// Decides at every start. It reads the application once for its CRC, 1.9 million instructions for the longest, so the
+/// clock should be fast by then; the signature was checked before the image came to where it is. It writes only where a commit was cut: a record that may read otherwise next time is revoked, so what
+/// this start decides holds for good.
+///
+/// `flash` must not be busy.
+pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {
+    let commit = commit(flash, target);
+    let crashes = start.trial.crashes();
+    if commit == Commit::Pending {
+        return Decision::Copy;
+    }
+    if start.stay {
+        return Decision::Stay(Stay::Asked);
+    }
+    if crashes >= Trial::LIMIT {
+        return Decision::Stay(Stay::Crashes(crashes));
+    }
+    match application(flash, target) {
+        Ok(header) => Decision::Start(header),
+        // The mark that the copy is done may have been cut, read as not programmed, and the copy begun again. Now it
+        // reads as programmed, but the image that it speaks of is still in staging.
+        Err(_) if commit == Commit::Done => Decision::Copy,
+        Err(refusal) => Decision::Stay(Stay::NoProgram(refusal)),
+    }
+}
+
+/// What the commit record says, after a torn one was revoked.
+fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
+    let record = Record(target.layout.record());
+    let commit = record.read(flash).unwrap_or(Commit::None);
+    if commit == Commit::Torn {
+        // Should it fail, the next start tries again.
+        let _ = record.revoke(flash);
+    }
+    commit
+}
+
+/// The header of the application, when all of it is there and it is one of this node.
+///
+/// # Errors
+/// Why it may not be started.
+pub fn application<F: Flash>(flash: &mut F, target: &Target) -> Result<Header, Refusal> {
+    let area = target.layout.application();
+    let header = image::header(flash, area)?;
+    target.admit(&header)?;
+    let mut check = CrcCheck::new(&header, area);
+    while !check.step(flash, |_| ())? {}
+    Ok(header)
+}

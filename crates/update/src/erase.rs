@@ -1,0 +1,68 @@
+//! The erase of an area, sector by sector, and the proof that it is erased.
+
+use core::ops::Range;
+
+use crate::area::Area;
+use crate::flash::{Flash, read_step};
+use crate::refusal::Refusal;
+
+/// An erase under way.
+#[derive(Clone, Debug)]
+pub(crate) struct Erase {
+    area: Area,
+    /// Sectors whose erase was begun.
+    begun: usize,
+    at_work: bool,
+    /// What is not known to be erased yet.
+    rest: Range<u32>,
+}
+
+/// Whether there is more to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Erasing {
+    /// Step again.
+    Goes,
+    /// All is erased.
+    Done,
+}
+
+impl Erase {
+    pub(crate) fn new(area: Area) -> Erase {
+        Erase { area, begun: 0, at_work: false, rest: area.start()..area.end() }
+    }
+
+    /// Whether the flash was at work at the last step.
+    pub(crate) fn is_at_work(&self) -> bool {
+        self.at_work
+    }
+
+    /// Sectors are never skipped because they read as erased: an erase that was cut can look like that.
+    pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<Erasing, Refusal> {
+        self.at_work = flash.is_busy().map_err(|_| Refusal::NotCleared)?;
+        if self.at_work {
+            return Ok(Erasing::Goes);
+        }
+        match self.area.sectors().nth(self.begun) {
+            Some(sector) => self.begin(flash, sector.start),
+            None => self.prove(flash),
+        }
+    }
+
+    fn begin<F: Flash>(&mut self, flash: &mut F, sector: u32) -> Result<Erasing, Refusal> {
+        flash.start_erase(sector).map_err(|_| Refusal::NotCleared)?;
+        (self.begun, self.at_work) = (self.begun.saturating_add(1), true);
+        Ok(Erasing::Goes)
+    }
+
+    fn prove<F: Flash>(&mut self, flash: &mut F) -> Result<Erasing, Refusal> {
+        let mut erased = true;
+        self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
+            erased &= bytes.iter().all(|byte| *byte == 0xFF);
+        })?;
+        match (erased, self.rest.is_empty()) {
+            (false, _) => Err(Refusal::NotCleared),
+            (true, false) => Ok(Erasing::Goes),
+            (true, true) => Ok(Erasing::Done),
+        }
+    }
+}

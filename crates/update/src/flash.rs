@@ -1,0 +1,86 @@
+//! What the update needs of a flash.
+
+use embedded_storage::nor_flash::ReadNorFlash;
+
+use crate::refusal::Refusal;
+
+/// A NOR flash with sectors of different sizes whose erase goes on by itself. `embedded_storage::NorFlash` can say
+/// neither: it has one `ERASE_SIZE`, and its `erase` returns when all is done.
+///
+/// Offsets count from the start of the flash. What is read is what the cells hold: a driver flushes the caches after it has
+/// programmed or erased, for everything is read back.
+pub trait Flash: ReadNorFlash {
+    /// Programs whole words of 32 bits at a multiple of 4. The words were erased before, or all of `bytes` are 0:
+    /// zeros may be programmed over anything, as a bit may go from 1 to 0 without an erase (RM0390, 3.5.2; RM0090,
+    /// 3.6.3) and a word has no check bits.
+    ///
+    /// # Errors
+    /// The flash reports that it did not program.
+    fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error>;
+
+    /// Begins to erase the sector that starts at `offset`.
+    ///
+    /// # Errors
+    /// The flash refuses to erase it.
+    fn start_erase(&mut self, offset: u32) -> Result<(), Self::Error>;
+
+    /// Whether an erase is still going on; the flash is not read or programmed meanwhile.
+    ///
+    /// # Errors
+    /// The erase has ended and failed.
+    fn is_busy(&mut self) -> Result<bool, Self::Error>;
+}
+
+impl<F: Flash> Flash for &mut F {
+    fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        (**self).program(offset, bytes)
+    }
+
+    fn start_erase(&mut self, offset: u32) -> Result<(), Self::Error> {
+        (**self).start_erase(offset)
+    }
+
+    fn is_busy(&mut self) -> Result<bool, Self::Error> {
+        (**self).is_busy()
+    }
+}
+
+/// Bytes that are programmed in one step: 64 words, 1 ms (16 us a word) and 6.4 ms at most.
+pub(crate) const CHUNK: usize = CHUNK_LEN as usize;
+/// The same, as a distance in flash.
+pub(crate) const CHUNK_LEN: u32 = 256;
+/// Bytes that are read and checked in one step.
+pub(crate) const STEP: u32 = 4 * CHUNK_LEN;
+
+/// Hands `range` to `take` in pieces of at most [`CHUNK`] bytes, as far as one step goes. Returns where to go on.
+pub(crate) fn read_step<F: Flash>(
+    flash: &mut F,
+    range: core::ops::Range<u32>,
+    mut take: impl FnMut(&[u8]),
+) -> Result<u32, Refusal> {
+    let end = range.end.min(range.start.saturating_add(STEP));
+    let mut at = range.start;
+    while at < end {
+        let mut buffer = [0; CHUNK];
+        let piece = first(&mut buffer, end.saturating_sub(at));
+        flash.read(at, piece).map_err(|_| Refusal::Unspecified)?;
+        take(piece);
+        at = at.saturating_add(CHUNK_LEN);
+    }
+    Ok(end)
+}
+
+/// At most `len` bytes of `buffer`.
+pub(crate) fn first(buffer: &mut [u8], len: u32) -> &mut [u8] {
+    let len = buffer.len().min(len as usize);
+    buffer.split_at_mut(len).0
+}
+
+/// Programs at most [`CHUNK`] bytes, and reads them back.
+pub(crate) fn program<F: Flash>(flash: &mut F, at: u32, bytes: &[u8]) -> Result<(), Refusal> {
+    flash.program(at, bytes).map_err(|_| Refusal::Write)?;
+    let mut buffer = [0; CHUNK];
+    let read = first(&mut buffer, u32::try_from(bytes.len()).unwrap_or(u32::MAX));
+    flash.read(at, read).map_err(|_| Refusal::Unspecified)?;
+    if read == bytes { Ok(()) } else { Err(Refusal::Write) }
+}

@@ -1,0 +1,95 @@
+//! An image in flash: its header, and the checks of its code in steps.
+
+use core::ops::Range;
+
+use crc::Digest;
+
+use crate::area::Area;
+use crate::checksum;
+use crate::flash::{Flash, read_step};
+use crate::header::{HEADER, HEADER_LEN, Header};
+use crate::key::KEY_LEN;
+use crate::refusal::Refusal;
+use crate::signature::Message;
+use crate::target::{Target, image_len};
+
+/// The header at the start of `area`.
+pub(crate) fn header<F: Flash>(flash: &mut F, area: Area) -> Result<Header, Refusal> {
+    let mut bytes = [0; HEADER_LEN];
+    flash.read(area.start(), &mut bytes).map_err(|_| Refusal::Unspecified)?;
+    Header::parse(&bytes)
+}
+
+/// Where the code of an image in `area` is.
+pub(crate) fn code(header: &Header, area: Area) -> Range<u32> {
+    let start = area.start();
+    start.saturating_add(HEADER)..start.saturating_add(image_len(header))
+}
+
+/// The header of the staged image, when it may take the place of the application: it is for this node and does not turn
+/// the security counter back.
+pub(crate) fn candidate<F: Flash>(flash: &mut F, target: &Target) -> Result<Header, Refusal> {
+    let staged = header(flash, target.layout.staging())?;
+    target.admit(&staged)?;
+    let least = header(flash, target.layout.application()).map_or(0, |header| header.description().counter);
+    if staged.description().counter < least { Err(Refusal::Counter { least }) } else { Ok(staged) }
+}
+
+/// A check of the CRC under way.
+#[derive(Clone)]
+pub(crate) struct CrcCheck {
+    expected: u32,
+    rest: Range<u32>,
+    digest: Digest<'static, u32>,
+}
+
+impl CrcCheck {
+    pub(crate) fn new(header: &Header, area: Area) -> CrcCheck {
+        CrcCheck { expected: header.code_crc(), rest: code(header, area), digest: checksum::begin() }
+    }
+
+    /// Whether all has been seen; only then the CRC is judged.
+    pub(crate) fn step<F: Flash>(
+        &mut self,
+        flash: &mut F,
+        mut also: impl FnMut(&[u8]),
+    ) -> Result<bool, Refusal> {
+        self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
+            self.digest.update(bytes);
+            also(bytes);
+        })?;
+        if !self.rest.is_empty() {
+            return Ok(false);
+        }
+        if self.digest.clone().finalize() == self.expected { Ok(true) } else { Err(Refusal::CodeCrc) }
+    }
+}
+
+/// A check of everything that can be said of the staged image under way.
+pub(crate) struct FullCheck {
+    header: Header,
+    crc: CrcCheck,
+    message: Message,
+}
+
+impl FullCheck {
+    pub(crate) fn new<F: Flash>(flash: &mut F, target: &Target) -> Result<FullCheck, Refusal> {
+        let header = candidate(flash, target)?;
+        let crc = CrcCheck::new(&header, target.layout.staging());
+        Ok(FullCheck { header, crc, message: Message::of(&header) })
+    }
+
+    /// Whether only the signature is left to be judged.
+    pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
+        self.crc.step(flash, |bytes| self.message.add(bytes))
+    }
+
+    /// The long step: the signature.
+    pub(crate) fn finish(self, key: &[u8; KEY_LEN]) -> Result<Header, Refusal> {
+        if self.message.has_signature(self.header.signature(), key) {
+            Ok(self.header)
+        } else {
+            Err(Refusal::Signature)
+        }
+    }
+}

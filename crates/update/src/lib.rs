@@ -1,0 +1,80 @@
+//! Field update of the application over CAN (CiA 302-3), safe against a power cut at any moment and against images that
+//! are damaged, for another device, too old, or not signed. docs/update.md has the format of an image, the states, and
+//! what a cut at each point does.
+//!
+//! The bootloader asks [`boot`] at every start, and gives an [`Updater`] the commands of the master and a [`Flash`]:
+//!
+//! ```
+//! use update::{Decision, Flash, Header, Next, Start, Status, Stay, Target, Updater, boot};
+//!
+//! /// What a bootloader does at a start: the application to be started, or what 1F57h reads while it stays.
+//! fn decide<F: Flash>(flash: &mut F, target: Target, start: Start) -> Result<Header, Status> {
+//!     if boot(flash, &target, start) == Decision::Copy {
+//!         let mut updater = Updater::new(&mut *flash, target, Status::GOOD);
+//!         let _ = updater.install(); // a refusal shows in the status
+//!         while updater.poll() != Next::Nothing { /* serve the bus */ }
+//!         if updater.status() != Status::GOOD {
+//!             return Err(updater.status());
+//!         }
+//!     }
+//!     match boot(flash, &target, start) {
+//!         Decision::Start(header) => Ok(header),
+//!         Decision::Stay(stay) => Err(stay.status()),
+//!         Decision::Copy => Err(Stay::Asked.status()),
+//!     }
+//! }
+//! ```
+//!
+//! | from the bus | call | 1F57h until the next |
+//! |---|---|---|
+//! | 1F51h = 3 | [`Updater::clear`], then [`Updater::poll`] | busy, then 0 |
+//! | download to 1F50h begins | [`Updater::begin`] | 0, or 4 without a clear before |
+//! | its bytes | [`Updater::receive`] | 0, or why the header is refused |
+//! | it ends | [`Updater::finish`], then [`Updater::poll`] | busy while it is checked, then 0 or why it is refused |
+//! | 1F51h = 1, or at once | [`Updater::install`], then [`Updater::poll`], then [`boot`] | busy while it is copied, then 0 |
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(clippy::pedantic)]
+#![cfg_attr(
+    not(any(test, feature = "mock")),
+    warn(
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        clippy::unwrap_used,
+        clippy::expect_used
+    )
+)]
+
+#[cfg(any(test, feature = "mock"))]
+extern crate std;
+
+mod area;
+mod boot;
+mod checksum;
+mod commit;
+mod copy;
+mod erase;
+mod flash;
+mod header;
+mod image;
+pub mod key;
+#[cfg(feature = "mock")]
+pub mod mock;
+mod receive;
+mod refusal;
+mod signature;
+mod status;
+mod target;
+mod trial;
+mod updater;
+
+pub use area::{Area, Layout};
+pub use boot::{Decision, Start, Stay, application, boot};
+pub use flash::Flash;
+pub use header::{Description, HEADER_LEN, Header, SIGNATURE_LEN, SIGNED_LEN, Version};
+pub use refusal::Refusal;
+pub use signature::CONTEXT;
+pub use status::Status;
+pub use target::Target;
+pub use trial::{Reset, Trial};
+pub use updater::{Next, Phase, Updater};

@@ -1,0 +1,86 @@
+//! How often the application has crashed since it last said that it is well.
+
+/// The count, kept in RAM that survives a reset (region `RETAINED` of memory.x).
+///
+/// The bootloader takes it from RAM at every start, counts the reset, puts it back, and asks [`crate::boot`]. The
+/// application [confirms](Trial::confirmed) once it is on the bus and measures. A start that is asked for (1F51h = 1)
+/// confirms too: it is another try.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Trial(u8);
+
+/// Why the chip was reset, as far as it matters here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reset {
+    /// Power came: RAM holds nothing.
+    Power,
+    /// Somebody asked for it: an NMT command, 1F51h, the debugger.
+    Asked,
+    /// A fault, a panic or the watchdog.
+    Crash,
+}
+
+impl Trial {
+    /// So many crashes without a confirmation keep the bootloader from starting the application.
+    pub const LIMIT: u8 = 3;
+
+    /// The count in a word of RAM; 0 when the word is none, as after power-up.
+    #[must_use]
+    pub fn from_word(word: u32) -> Trial {
+        let [count, ..] = word.to_le_bytes();
+        let trial = Trial(count);
+        if trial.word() == word { trial } else { Trial(0) }
+    }
+
+    /// The word to keep: the count, and its complement in the other three bytes.
+    #[must_use]
+    pub fn word(self) -> u32 {
+        u32::from_le_bytes([self.0, !self.0, !self.0, !self.0])
+    }
+
+    /// The count after a reset.
+    #[must_use]
+    pub fn after(self, reset: Reset) -> Trial {
+        match reset {
+            Reset::Power => Trial(0),
+            Reset::Asked => self,
+            Reset::Crash => Trial(self.0.saturating_add(1)),
+        }
+    }
+
+    /// The application is well.
+    #[must_use]
+    pub fn confirmed(self) -> Trial {
+        Trial(0)
+    }
+
+    /// Crashes since the last confirmation.
+    #[must_use]
+    pub fn crashes(self) -> u8 {
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ram_holds_after_power_up_counts_nothing() {
+        for word in [0, u32::MAX, 0x5555_5555, 0xFFFF_FF01, 3] {
+            assert_eq!(Trial::from_word(word).crashes(), 0);
+        }
+        for count in 0..=u8::MAX {
+            assert_eq!(Trial::from_word(Trial(count).word()), Trial(count));
+        }
+    }
+
+    #[test]
+    fn only_crashes_count_and_only_until_a_confirmation() {
+        let trial =
+            [Reset::Crash, Reset::Asked, Reset::Crash].into_iter().fold(Trial::default(), Trial::after);
+        assert_eq!(trial.crashes(), 2);
+        assert_eq!(trial.confirmed().after(Reset::Crash).crashes(), 1);
+        assert_eq!(trial.after(Reset::Power).crashes(), 0);
+        assert_eq!(Trial(u8::MAX).after(Reset::Crash).crashes(), u8::MAX);
+    }
+}

@@ -1,0 +1,171 @@
+//! A small node with sectors of different sizes, images for it, and what bootloader and master do with them.
+#![allow(dead_code, reason = "each test file uses a part")]
+
+use update::mock::{MockFlash, splitmix};
+use update::{
+    Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Start, Status, Target,
+    Updater, Version, boot,
+};
+
+/// Sectors of the mock: bootloader; application in two; staging in two.
+pub(crate) const SECTORS: [usize; 5] = [256, 1024, 2048, 2048, 2048];
+pub(crate) const APPLICATION: usize = 256;
+pub(crate) const STAGING: usize = 256 + 3072;
+const APPLICATION_AREA: Area = Area::new(256, &[1024, 2048]);
+const STAGING_AREA: Area = Area::new(256 + 3072, &[2048, 2048]);
+
+pub(crate) const PRODUCT: u32 = 0x0001_8271;
+pub(crate) const REVISION: u8 = 2;
+
+/// The key that the test node trusts.
+pub(crate) fn keys() -> salty::Keypair {
+    salty::Keypair::from(&[7; 32])
+}
+
+pub(crate) fn target() -> Target {
+    let layout = Layout::new(APPLICATION_AREA, STAGING_AREA).unwrap();
+    Target { layout, product: PRODUCT, hardware: REVISION, key: keys().public.to_bytes() }
+}
+
+/// A header and its code, as far as they make sense; [`Image::bytes`] is what goes over the bus.
+#[derive(Clone)]
+pub(crate) struct Image {
+    pub(crate) header: Header,
+    pub(crate) code: Vec<u8>,
+}
+
+pub(crate) fn description(version: u16, counter: u32) -> Description {
+    let version = Version { major: version, minor: 2, patch: 3 };
+    Description { product: PRODUCT, hardware: 1 << REVISION, version, counter }
+}
+
+impl Image {
+    /// An image of `len` bytes of noise, signed.
+    pub(crate) fn new(description: Description, len: usize) -> Image {
+        let seed = u64::from(description.version.major);
+        Image::of(description, noise(seed, len))
+    }
+
+    pub(crate) fn of(description: Description, code: Vec<u8>) -> Image {
+        let header = Header::describe(description, &code).unwrap();
+        Image { header, code }.signed_by(&keys())
+    }
+
+    pub(crate) fn signed_by(self, keys: &salty::Keypair) -> Image {
+        let hash = self.hash();
+        self.with_signature(keys.sign_prehashed(&hash, Some(CONTEXT)))
+    }
+
+    pub(crate) fn hash(&self) -> [u8; 64] {
+        salty::Sha512::new().updated(&self.header.signed_part()).updated(&self.code).finalize()
+    }
+
+    pub(crate) fn with_signature(self, signature: salty::Signature) -> Image {
+        Image { header: self.header.with_signature(signature.to_bytes()), ..self }
+    }
+
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        [&self.header.encode()[..], &self.code].concat()
+    }
+}
+
+/// The images of most tests: their lengths end within a chunk, and within different sectors.
+pub(crate) fn image_a() -> Image {
+    Image::new(description(1, 5), 404)
+}
+
+pub(crate) fn image_b() -> Image {
+    Image::new(description(2, 5), 620)
+}
+
+/// `len` bytes that look random and are the same each time.
+pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
+    (0..len as u64).map(|i| splitmix(seed << 16 ^ i).to_le_bytes()[3]).collect()
+}
+
+/// A flash in which `image` was installed by an update.
+pub(crate) fn flash_with(image: &Image, seed: u64) -> MockFlash {
+    let mut flash = MockFlash::new(&SECTORS, seed);
+    update(&mut flash, &image.bytes()).unwrap();
+    flash
+}
+
+/// Polls until nothing is left to do.
+pub(crate) fn run(updater: &mut Updater<&mut MockFlash>) -> Result<(), Refusal> {
+    for _ in 0..10_000 {
+        if updater.poll() == Next::Nothing {
+            return outcome(updater);
+        }
+        assert_eq!(updater.status(), Status::BUSY);
+    }
+    panic!("it does not end");
+}
+
+fn outcome(updater: &mut Updater<&mut MockFlash>) -> Result<(), Refusal> {
+    if updater.status() == Status::GOOD { Ok(()) } else { Err(Refusal::Unspecified) }
+}
+
+/// What a master does up to the end of the download, in pieces of odd sizes.
+pub(crate) fn download(updater: &mut Updater<&mut MockFlash>, image: &[u8]) -> Result<(), Refusal> {
+    updater.clear()?;
+    run(updater)?;
+    updater.begin(u32::try_from(image.len()).ok())?;
+    for (piece, len) in pieces(image) {
+        assert!(len <= 889);
+        updater.receive(piece)?;
+    }
+    updater.finish()?;
+    run(updater)
+}
+
+/// Pieces of 1, 889 (a block of 127 segments), 7 and 250 bytes in turn.
+fn pieces(mut image: &[u8]) -> impl Iterator<Item = (&[u8], usize)> {
+    let mut sizes = [1, 889, 7, 250].into_iter().cycle();
+    std::iter::from_fn(move || {
+        let len = sizes.next()?.min(image.len());
+        let (piece, rest) = image.split_at(len);
+        image = rest;
+        (len > 0).then_some((piece, len))
+    })
+}
+
+/// A whole update.
+pub(crate) fn update(flash: &mut MockFlash, image: &[u8]) -> Result<(), Refusal> {
+    stage(flash, image)?;
+    install(flash)
+}
+
+/// The first part of an update, up to the commit.
+pub(crate) fn stage(flash: &mut MockFlash, image: &[u8]) -> Result<(), Refusal> {
+    download(&mut Updater::new(flash, target(), Status::GOOD), image)
+}
+
+/// The second part, the copy.
+pub(crate) fn install(flash: &mut MockFlash) -> Result<(), Refusal> {
+    let mut updater = Updater::new(flash, target(), Status::GOOD);
+    updater.install()?;
+    run(&mut updater)
+}
+
+/// What the bootloader does at a start: the decision, after a copy that was left to do.
+pub(crate) fn start(flash: &mut MockFlash) -> Decision {
+    if boot(flash, &target(), Start::default()) == Decision::Copy {
+        // A refusal shows in the next decision.
+        let _ = install(flash);
+    }
+    boot(flash, &target(), Start::default())
+}
+
+/// Whether the application area holds exactly this image.
+pub(crate) fn holds(flash: &MockFlash, image: &Image) -> bool {
+    let bytes = image.bytes();
+    flash.bytes()[APPLICATION..APPLICATION + bytes.len()] == bytes
+}
+
+/// Asserts that `image` starts, all of it.
+pub(crate) fn assert_starts(flash: &mut MockFlash, image: &Image) {
+    assert_eq!(start(flash), Decision::Start(image.header));
+    assert!(holds(flash, image), "the code too");
+}
+
+pub(crate) const HEADER: usize = HEADER_LEN;

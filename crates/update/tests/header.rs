@@ -1,0 +1,101 @@
+//! The header in bytes and back.
+
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use update::{Description, HEADER_LEN, Header, Refusal, SIGNATURE_LEN, SIGNED_LEN, Version};
+
+fn description() -> impl Strategy<Value = Description> {
+    let version = any::<[u16; 3]>().prop_map(|[major, minor, patch]| Version { major, minor, patch });
+    (any::<u32>(), any::<u32>(), version, any::<u32>())
+        .prop_map(|(product, hardware, version, counter)| Description { product, hardware, version, counter })
+}
+
+fn signature() -> impl Strategy<Value = [u8; SIGNATURE_LEN]> {
+    any::<[[u8; 32]; 2]>().prop_map(|halves| halves.concat().try_into().unwrap())
+}
+
+fn header() -> impl Strategy<Value = Header> {
+    let code = prop::collection::vec(any::<[u8; 4]>(), 1..50).prop_map(|words| words.concat());
+    (description(), code, signature()).prop_map(|(description, code, signature)| {
+        Header::describe(description, &code).unwrap().with_signature(signature)
+    })
+}
+
+/// 500 cases from a fixed seed.
+fn check<T: std::fmt::Debug>(strategy: impl Strategy<Value = T>, test: impl Fn(T)) {
+    let config = Config { cases: 500, failure_persistence: None, ..Config::default() };
+    let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+    let outcome = TestRunner::new_with_rng(config, rng).run(&strategy, |value| {
+        test(value);
+        Ok(())
+    });
+    outcome.unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+fn what_is_encoded_is_parsed() {
+    check(header(), |header| assert_eq!(Header::parse(&header.encode()), Ok(header)));
+}
+
+#[test]
+fn a_change_of_any_byte_is_refused() {
+    check((header(), 0..HEADER_LEN, 1..=u8::MAX), |(header, at, change)| {
+        let mut bytes = header.encode();
+        bytes[at] ^= change;
+        assert!(Header::parse(&bytes).is_err(), "byte {at}");
+    });
+}
+
+/// Whatever is accepted, with a good CRC over anything, is what the parsed value encodes to: nothing is left open.
+#[test]
+fn what_is_parsed_encodes_to_the_same_bytes() {
+    let words = prop::collection::vec((0..HEADER_LEN / 4 - 1, any::<[u8; 4]>()), 0..3);
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+    check((header(), words), |(header, words)| {
+        let mut bytes = header.encode();
+        for (at, word) in words {
+            bytes[at * 4..at * 4 + 4].copy_from_slice(&word);
+        }
+        let sum = crc.checksum(&bytes[..HEADER_LEN - 4]);
+        bytes[HEADER_LEN - 4..].copy_from_slice(&sum.to_le_bytes());
+        match Header::parse(&bytes) {
+            Ok(header) => assert_eq!(header.encode(), bytes),
+            Err(refusal) => assert!(matches!(refusal, Refusal::HeaderContent | Refusal::UnknownFormat)),
+        }
+    });
+}
+
+#[test]
+fn noise_is_no_header() {
+    let noise = prop::collection::vec(any::<u8>(), HEADER_LEN);
+    check(noise, |bytes| {
+        assert_eq!(Header::parse(&bytes.try_into().unwrap()), Err(Refusal::UnknownFormat));
+    });
+}
+
+/// The layout that docs/update.md prints.
+#[test]
+fn the_fields_are_where_the_table_says() {
+    let version = Version { major: 0x0102, minor: 0x0304, patch: 0x0506 };
+    let about = Description { product: 0x1112_1314, hardware: 0x2122_2324, version, counter: 0x3132_3334 };
+    let header = Header::describe(about, b"123456781234").unwrap().with_signature([0xA5; 64]);
+    let bytes = header.encode();
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    assert_eq!(&bytes[..8], b"CNFW\x01\0\0\0");
+    assert_eq!((word(8), word(12)), (0x1112_1314, 0x2122_2324));
+    assert_eq!(&bytes[16..24], [0x02, 0x01, 0x04, 0x03, 0x06, 0x05, 0, 0]);
+    assert_eq!((word(24), word(28), word(32)), (12, header.code_crc(), 0x3132_3334));
+    assert!(bytes[36..SIGNED_LEN].iter().all(|byte| *byte == 0));
+    assert_eq!((SIGNED_LEN, &bytes[444..508]), (444, &[0xA5; 64][..]));
+    assert_eq!(word(508), header.crc());
+    assert_eq!(version.to_string(), "258.772.1286");
+}
+
+/// The check value of CRC-32/ISO-HDLC (catalogue of parametrised CRC algorithms), of a message of whole words.
+#[test]
+fn the_crc_is_the_one_of_zip() {
+    let about = Description { product: 0, hardware: 0, version: Version::default(), counter: 0 };
+    assert_eq!(Header::describe(about, b"1234").unwrap().code_crc(), 0x9BE3_E0A3);
+    assert!(Header::describe(about, b"123").is_none());
+    assert!(Header::describe(about, b"").is_none());
+}

@@ -1,0 +1,169 @@
+//! The power is cut at every flash operation of whole updates, and again in the recovery.
+
+mod common;
+
+use common::{Image, SECTORS, flash_with, holds, image_a, image_b, install, noise, stage, start, update};
+use update::mock::{MockFlash, Weak};
+use update::{Decision, Refusal, Stay};
+
+/// What starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Runs {
+    Old,
+    New,
+    Nothing,
+}
+
+/// A node before an update, and the update.
+struct Case {
+    before: MockFlash,
+    /// The same node with the new image committed and not copied: cuts in the copy begin here, to save time.
+    committed: MockFlash,
+    old: Option<Image>,
+    new: Image,
+}
+
+impl Case {
+    fn new(before: MockFlash, old: Option<Image>) -> Case {
+        let (mut committed, new) = (before.clone(), image_b());
+        stage(&mut committed, &new.bytes()).unwrap();
+        Case { before, committed, old, new }
+    }
+
+    /// A node that runs A, which came by an update.
+    fn from_a_to_b() -> Case {
+        Case::new(flash_with(&image_a(), 1), Some(image_a()))
+    }
+
+    /// A node that was never programmed.
+    fn from_nothing_to_b() -> Case {
+        Case::new(MockFlash::new(&SECTORS, 1), None)
+    }
+
+    /// Flash operations of the whole update.
+    fn operations(&self) -> u32 {
+        let mut flash = self.committed.clone();
+        install(&mut flash).unwrap();
+        flash.operations() - self.before.operations()
+    }
+
+    /// The flash after the power was cut in this operation of the update.
+    fn cut(&self, operation: u32, weak: Weak) -> MockFlash {
+        let commit = self.committed.operations() - self.before.operations();
+        let mut flash = if operation < commit { self.before.clone() } else { self.committed.clone() };
+        flash.cut_after(if operation < commit { operation } else { operation - commit }, weak);
+        let outcome =
+            if operation < commit { stage(&mut flash, &self.new.bytes()) } else { install(&mut flash) };
+        assert!(outcome.is_err() && flash.is_down());
+        flash.power_up();
+        flash
+    }
+
+    /// Starts the node; the answer must be one of the whole images, or nothing where there was nothing.
+    fn start(&self, flash: &mut MockFlash) -> Runs {
+        match (start(flash), &self.old) {
+            (Decision::Start(header), Some(old)) if header == old.header && holds(flash, old) => Runs::Old,
+            (Decision::Start(header), _) if header == self.new.header && holds(flash, &self.new) => Runs::New,
+            (Decision::Stay(Stay::NoProgram(Refusal::UnknownFormat)), None) => Runs::Nothing,
+            (decision, _) => panic!("neither old nor new: {decision:?}"),
+        }
+    }
+
+    /// Starts the node, and again: what one start decides holds.
+    fn settle(&self, flash: &mut MockFlash) -> Runs {
+        let runs = self.start(flash);
+        flash.power_up();
+        assert_eq!(self.start(flash), runs, "decided once");
+        runs
+    }
+
+    /// Cuts everywhere, in each of the ways.
+    fn cut_everywhere(&self, ways: &[Weak], mut check: impl FnMut(MockFlash)) {
+        for operation in 0..self.operations() {
+            for weak in ways {
+                check(self.cut(operation, *weak));
+            }
+        }
+    }
+}
+
+/// Every cut of a case, and a second download after every seventh that did not leave the new image.
+fn check_every_cut(case: &Case, ways: &[Weak]) -> [u32; 3] {
+    let mut count = [0; 3];
+    let mut again = 0;
+    case.cut_everywhere(ways, |mut flash| {
+        let runs = case.settle(&mut flash);
+        count[runs as usize] += 1;
+        again += u32::from(runs != Runs::New);
+        if runs != Runs::New && again % 7 == 0 {
+            update(&mut flash, &case.new.bytes()).unwrap();
+            assert_eq!(case.settle(&mut flash), Runs::New);
+        }
+    });
+    let [old, new, nothing] = count;
+    let cuts = old + new + nothing;
+    println!("{cuts} cuts: {old} left the old image, {new} the new one, {nothing} none where there was none");
+    count
+}
+
+#[test]
+fn after_a_cut_anywhere_the_old_or_the_new_image_starts() {
+    let [old, new, nothing] = check_every_cut(&Case::from_a_to_b(), &Weak::ALL);
+    assert!(old > 500 && new > 500 && nothing == 0);
+}
+
+#[test]
+fn after_a_cut_in_the_first_update_the_image_starts_or_the_node_waits_for_the_next() {
+    let [old, new, nothing] = check_every_cut(&Case::from_nothing_to_b(), &[Weak::Random]);
+    assert!(old == 0 && new > 250 && nothing > 250);
+}
+
+#[test]
+fn a_second_cut_in_the_recovery_changes_nothing() {
+    let mut cuts = 0_u32;
+    let case = Case::from_a_to_b();
+    case.cut_everywhere(&[Weak::Either], |first| {
+        let mut flash = first.clone();
+        let runs = case.start(&mut flash);
+        let recovery = flash.operations() - first.operations();
+        if recovery == 0 {
+            return;
+        }
+        let mut flash = first;
+        let operation = chance(cuts) % recovery;
+        flash.cut_after(operation, Weak::ALL[cuts as usize % 4]);
+        start(&mut flash);
+        assert!(flash.is_down());
+        flash.power_up();
+        let again = case.settle(&mut flash);
+        // A torn commit that was not revoked yet may read well after all.
+        assert!(again == runs || recovery <= 4, "{runs:?} became {again:?}");
+        cuts += 1;
+    });
+    println!("{cuts} second cuts in the recovery");
+    assert!(cuts > 250);
+}
+
+/// A number that looks random and is the same each time.
+fn chance(seed: u32) -> u32 {
+    u32::from_le_bytes(noise(u64::from(seed), 4).try_into().unwrap())
+}
+
+#[test]
+fn a_cut_in_the_update_that_follows_a_cut_loses_nothing() {
+    let mut cuts = 0_u32;
+    let case = Case::from_a_to_b();
+    let total = case.operations();
+    for seed in 0..50 {
+        let mut flash = case.before.clone();
+        for round in 0..4 {
+            let at = chance(seed * 4 + round) % total;
+            flash.cut_after(at, Weak::ALL[at as usize % 4]);
+            assert!(update(&mut flash, &case.new.bytes()).is_err());
+            flash.power_up();
+            case.settle(&mut flash);
+            cuts += 1;
+        }
+    }
+    println!("{cuts} cuts, four updates in a row");
+}

@@ -1,0 +1,143 @@
+//! Everything that a node does with what comes from the bus, the sensors and the flash, linked with a panic handler that
+//! cannot link: `cargo xtask test --only "no panic"` builds it for the target. It is never run.
+//!
+//! What the optimiser proves unreachable is gone from the image; a panic that is left names the missing symbol.
+#![no_std]
+#![no_main]
+
+use canopen::{Frame, Instant, QueueFull, Transmit};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+use node::{BusEvent, Fault, Measurement, Parcel, Protocol, RawEncoder, RawSample, Setup, Snapshot, Start};
+use storage::{Pages, Store, View};
+
+unsafe extern "C" {
+    /// Defined nowhere.
+    fn a_panic_path_is_left() -> !;
+    /// The outside, of which the optimiser must know nothing.
+    safe fn send(id: u16, bytes: *const u8, len: usize) -> bool;
+    safe fn room() -> usize;
+    safe fn read(offset: u32, to: *mut u8, len: usize) -> bool;
+    safe fn program(offset: u32, from: *const u8, len: usize) -> bool;
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    // SAFETY: the linker never lets it be called.
+    unsafe { a_panic_path_is_left() }
+}
+
+/// A transmit queue.
+struct Queue;
+
+impl Transmit for Queue {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        if send(frame.id(), frame.data().as_ptr(), frame.len()) { Ok(()) } else { Err(QueueFull) }
+    }
+
+    fn room(&self) -> usize {
+        room()
+    }
+}
+
+/// A flash of two pages of 16 KiB.
+struct Flash;
+
+impl ErrorType for Flash {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for Flash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        if read(offset, bytes.as_mut_ptr(), bytes.len()) { Ok(()) } else { Err(NorFlashErrorKind::Other) }
+    }
+
+    fn capacity(&self) -> usize {
+        32 * 1024
+    }
+}
+
+impl NorFlash for Flash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = 16 * 1024;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        if program(from, core::ptr::null(), (to - from) as usize) {
+            Ok(())
+        } else {
+            Err(NorFlashErrorKind::Other)
+        }
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        if program(offset, bytes.as_ptr(), bytes.len()) { Ok(()) } else { Err(NorFlashErrorKind::Other) }
+    }
+}
+
+/// Start-up: the parameter store is read and made ready.
+#[unsafe(no_mangle)]
+extern "C" fn start(protocol: &mut Protocol, setup: &Setup, store: &mut Option<Store<Flash>>, now: u64) {
+    *protocol = Protocol::new(setup);
+    let Ok(mut view) = View::open(Flash, Pages::new(0, 16 * 1024)) else { return };
+    protocol.load(&mut view);
+    *store = Store::prepare(view).ok();
+    protocol.start(Instant(now), &mut Queue);
+}
+
+/// Everything that comes from the bus, and time.
+#[unsafe(no_mangle)]
+extern "C" fn communicate(protocol: &mut Protocol, frame: &Frame, now: u64, ids: &mut u32) {
+    let now = Instant(now);
+    protocol.on_process_frame(frame, now, &mut Queue);
+    protocol.on_service_frame(frame, now, &mut Queue);
+    protocol.poll_process(now, &mut Queue);
+    protocol.poll_services(now, &mut Queue);
+    while protocol.take_request().is_some() {}
+    *ids = protocol.process_ids().chain(protocol.service_ids()).map(u32::from).sum();
+}
+
+/// Faults.
+#[unsafe(no_mangle)]
+extern "C" fn fail(protocol: &mut Protocol, fault: &Fault, event: &BusEvent, active: bool, now: u64) {
+    protocol.set_fault(*fault, active, Instant(now), &mut Queue);
+    protocol.bus_event(*event, Instant(now), &mut Queue);
+}
+
+/// The measurement, and its way into the dictionary.
+#[unsafe(no_mangle)]
+extern "C" fn measure(
+    protocol: &mut Protocol,
+    measurement: &mut Measurement,
+    raw: &RawSample,
+    encoder: &RawEncoder,
+    now: u64,
+) {
+    if let Some(parameters) = protocol.take_parameters() {
+        measurement.apply(&parameters);
+    }
+    let snapshot: Snapshot = measurement.sample(raw, encoder);
+    protocol.publish(&snapshot, Instant(now), &mut Queue);
+}
+
+/// What the encoder keeps, out and in again.
+#[unsafe(no_mangle)]
+extern "C" fn power_cycle(measurement: &mut Measurement) {
+    *measurement = Measurement::new(Start::Kept(measurement.kept()));
+}
+
+/// Storing.
+#[unsafe(no_mangle)]
+extern "C" fn keep(protocol: &mut Protocol, parcel: &mut Parcel, store: &mut Store<Flash>, now: u64) {
+    if protocol.pack(parcel) {
+        let result = parcel.deliver(store);
+        protocol.finish(parcel, result, Instant(now), &mut Queue);
+    }
+}
+
+/// The negative control.
+#[cfg(feature = "with-a-panic")]
+#[unsafe(no_mangle)]
+extern "C" fn index(values: &[u8; 4], at: usize) -> u8 {
+    values[at]
+}

@@ -1,0 +1,216 @@
+//! Live values of a node: from its TPDOs where they are in one, else by reading them now and then.
+
+use std::collections::VecDeque;
+
+use canopen::nmt::{Command, State};
+use canopen::sdo::Multiplexer;
+use canopen::{Duration, Instant, NodeId};
+use eds::DataType;
+use thiserror::Error;
+
+use crate::bus::{BusError, Received};
+use crate::heartbeat::{self, Heartbeat};
+use crate::object::at;
+use crate::sdo::{self, Client, Options};
+use crate::tpdo::{self, Tpdo};
+use crate::value::{Value, guess};
+use crate::{Catalogue, Network, nmt, unit};
+
+/// Something whose value is followed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Signal {
+    /// The object.
+    pub at: Multiplexer,
+    /// Its name; empty where none is known.
+    pub name: String,
+    /// Its unit; empty where none is known.
+    pub unit: String,
+    /// The TPDO that has it, from 1; `None` for one that is read.
+    pub tpdo: Option<u16>,
+    data_type: Option<DataType>,
+}
+
+/// A value at a time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// When it was on the bus, by the clock of the adapter where it has one. Only differences mean something.
+    pub at: Instant,
+    /// Which signal, by its place in [`Acquisition::signals`].
+    pub signal: usize,
+    /// The value.
+    pub value: Value,
+}
+
+/// How values are acquired.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    /// Whose.
+    pub node: NodeId,
+    /// How patient the transfers are.
+    pub options: Options,
+    /// How often what is in no TPDO is read.
+    pub period: Duration,
+    /// Whether to start the node once it is known what it sends: TPDOs come in the state operational only.
+    pub start: bool,
+}
+
+/// Why there are no more values.
+#[derive(Debug, Error)]
+pub enum Interruption {
+    /// A value could not be read.
+    #[error(transparent)]
+    Sdo(#[from] sdo::Error),
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
+
+/// An acquisition under way.
+pub struct Acquisition<'n> {
+    network: &'n mut Network,
+    setup: Setup,
+    tpdos: Vec<Tpdo>,
+    signals: Vec<Signal>,
+    ready: VecDeque<Sample>,
+    /// When the polled signals are read next.
+    due: Instant,
+    /// Of the node, once a heartbeat has told it.
+    state: Option<State>,
+}
+
+impl<'n> Acquisition<'n> {
+    /// Follows these objects; all that are in TPDOs when there are none.
+    ///
+    /// # Errors
+    /// Those of SDO, and a bus that is lost.
+    pub fn open(
+        network: &'n mut Network,
+        setup: Setup,
+        catalogue: &Catalogue,
+        objects: &[Multiplexer],
+    ) -> Result<Acquisition<'n>, Interruption> {
+        let mut client = Client::new(network, setup.node, setup.options);
+        let tpdos = tpdo::read(&mut client)?;
+        let mapped = tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|mapped| at(mapped.index, mapped.sub));
+        let objects = if objects.is_empty() { mapped.collect() } else { objects.to_vec() };
+        let mut signals = Vec::new();
+        for at in objects {
+            signals.push(signal(&mut client, catalogue, &tpdos, at)?);
+        }
+        network.forget();
+        if setup.start {
+            nmt::send(network, Command::Start, Some(setup.node))?;
+        }
+        let due = network.now();
+        Ok(Acquisition { network, setup, tpdos, signals, ready: VecDeque::new(), due, state: None })
+    }
+
+    /// What is followed.
+    #[must_use]
+    pub fn signals(&self) -> &[Signal] {
+        &self.signals
+    }
+
+    /// Why there may be no values: the node sends no TPDOs in its state. `None` where nothing speaks against them.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        let state = self.state.filter(|state| !state.has_pdos())?;
+        let has_mapped = self.signals.iter().any(|signal| signal.tpdo.is_some());
+        let (node, state) = (self.setup.node.get(), heartbeat::words(state));
+        has_mapped.then(|| format!("node {node} is {state} and sends no TPDOs; --start starts it"))
+    }
+
+    /// The time of this side, for [`next`](Acquisition::next).
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.network.now()
+    }
+
+    /// The time on the bus, as samples have it. `None` before the first frame.
+    #[must_use]
+    pub fn bus_time(&self) -> Option<Instant> {
+        self.network.bus_time()
+    }
+
+    /// The next sample; `None` when there was none until then.
+    ///
+    /// # Errors
+    /// Those of SDO, and a bus that is lost.
+    pub fn next(&mut self, until: Instant) -> Result<Option<Sample>, Interruption> {
+        let has_polled = self.signals.iter().any(|signal| signal.tpdo.is_none());
+        while self.ready.is_empty() {
+            if has_polled && self.network.now() >= self.due {
+                self.poll()?;
+                continue;
+            }
+            let wake = if has_polled { until.min(self.due) } else { until };
+            match self.network.receive(wake)? {
+                Some(received) => self.take(&received),
+                None if self.network.now() >= until => break,
+                None => (),
+            }
+        }
+        Ok(self.ready.pop_front())
+    }
+
+    /// Takes the values that a frame has.
+    fn take(&mut self, received: &Received) {
+        let frame = &received.frame;
+        if let Some(heard) = Heartbeat::parse(frame).filter(|heard| heard.node == self.setup.node) {
+            self.state = Some(heard.state);
+        }
+        for tpdo in self.tpdos.iter().filter(|tpdo| tpdo.id == frame.id()) {
+            for (at, bytes) in tpdo.values(frame.data()) {
+                let is_it = |signal: &Signal| signal.at == at && signal.tpdo == Some(tpdo.number);
+                let Some(signal) = self.signals.iter().position(is_it) else { continue };
+                let value = self.signals[signal].decode(&bytes);
+                self.ready.push_back(Sample { at: received.at, signal, value });
+            }
+        }
+    }
+
+    /// Reads all that are in no TPDO.
+    fn poll(&mut self) -> Result<(), sdo::Error> {
+        // Behind a slow bus the readings become fewer; they do not pile up.
+        self.due = self.network.now().max(self.due) + self.setup.period;
+        for number in 0..self.signals.len() {
+            let signal = &self.signals[number];
+            if signal.tpdo.is_some() {
+                continue;
+            }
+            let bytes = Client::new(self.network, self.setup.node, self.setup.options).upload(signal.at)?;
+            let at = self.network.bus_time().unwrap_or(self.network.now());
+            self.ready.push_back(Sample { at, signal: number, value: signal.decode(&bytes) });
+        }
+        Ok(())
+    }
+}
+
+impl Signal {
+    /// A signal that is read and not in a TPDO.
+    #[must_use]
+    pub fn polled(at: Multiplexer, name: &str, unit: &str) -> Signal {
+        Signal { at, name: name.to_owned(), unit: unit.to_owned(), tpdo: None, data_type: None }
+    }
+
+    fn decode(&self, bytes: &[u8]) -> Value {
+        Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes)))
+    }
+}
+
+fn signal(
+    client: &mut Client,
+    catalogue: &Catalogue,
+    tpdos: &[Tpdo],
+    at: Multiplexer,
+) -> Result<Signal, sdo::Error> {
+    let is_in =
+        |tpdo: &&Tpdo| tpdo.mapping.iter().any(|mapped| (mapped.index, mapped.sub) == (at.index, at.sub));
+    Ok(Signal {
+        at,
+        name: catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default(),
+        unit: unit::of(client, catalogue, at)?,
+        tpdo: tpdos.iter().find(is_in).map(|tpdo| tpdo.number),
+        data_type: catalogue.data_type(at),
+    })
+}

@@ -1,0 +1,173 @@
+//! slcan: the line protocol of the LAWICEL CAN232 and CANUSB adapters ("CANUSB Manual", version 1.0, chapter 3).
+//!
+//! A command ends with a carriage return. Success is answered with a carriage return, refusal with a bell; adapters
+//! differ in which commands they answer at all, so nothing waits for an answer.
+
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+use std::io::{self, ErrorKind};
+
+use canopen::{Frame, Instant};
+
+use super::socketcand::hex_bytes;
+use super::stream::Stream;
+use super::{Bus, BusError, Received, clock};
+
+/// Bit rates of S0 to S8 in kbit/s.
+const BIT_RATES: [u16; 9] = [10, 20, 50, 100, 125, 250, 500, 800, 1000];
+/// The longest line of an adapter is an extended frame with a time stamp: 30 characters.
+const LONGEST: usize = 64;
+
+/// Reads a line without its carriage return; `None` where it is no base frame.
+fn parse(line: &str) -> Option<Frame> {
+    let (kind, rest) = line.split_at_checked(1)?;
+    let (id, rest) = rest.split_at_checked(3)?;
+    let (len, rest) = rest.split_at_checked(1)?;
+    let (id, len) = (u16::from_str_radix(id, 16).ok()?, u8::from_str_radix(len, 16).ok()?);
+    match kind {
+        "r" => Frame::remote(id, len),
+        // A time stamp may follow the data.
+        "t" => Frame::new(id, &hex_bytes(rest.get(..2 * usize::from(len))?)?),
+        _ => None,
+    }
+}
+
+/// The line that sends a frame.
+fn format(frame: &Frame) -> String {
+    let kind = if frame.is_remote() { 'r' } else { 't' };
+    let mut line = format!("{kind}{:03X}{}", frame.id(), frame.len());
+    for byte in frame.data() {
+        // Writing to a string cannot fail.
+        let _ = write!(line, "{byte:02X}");
+    }
+    line + "\r"
+}
+
+/// Leaves the bus if it was on it, sets the bit rate, goes on the bus. The empty lines end what an earlier user left
+/// unfinished.
+fn opening(bit_rate: u16) -> io::Result<String> {
+    let index = BIT_RATES.iter().position(|&rate| rate == bit_rate);
+    let index = index.ok_or_else(|| {
+        let message = format!("slcan has these bit rates in kbit/s: {BIT_RATES:?}");
+        io::Error::new(ErrorKind::InvalidInput, message)
+    })?;
+    Ok(format!("\r\rC\rS{index}\rO\r"))
+}
+
+/// Cuts a stream of bytes into frames.
+#[derive(Default)]
+struct Splitter(Vec<u8>);
+
+impl Splitter {
+    fn push(&mut self, bytes: &[u8], frames: &mut VecDeque<Frame>) {
+        for &byte in bytes {
+            match byte {
+                b'\r' | b'\x07' => {
+                    frames.extend(parse(&String::from_utf8_lossy(&std::mem::take(&mut self.0))));
+                }
+                // The acknowledge of a sent frame has no carriage return of its own with some adapters.
+                b'z' | b'Z' if self.0.is_empty() => (),
+                _ if self.0.len() < LONGEST => self.0.push(byte),
+                _ => (),
+            }
+        }
+    }
+}
+
+/// An adapter that is on the bus.
+pub(super) struct Slcan {
+    stream: Stream,
+    splitter: Splitter,
+    frames: VecDeque<Frame>,
+}
+
+impl Slcan {
+    pub(super) fn connect(host: &str, bit_rate: u16) -> io::Result<Slcan> {
+        Slcan::open(Stream::connect(host)?, bit_rate)
+    }
+
+    pub(super) fn open_serial(device: &str, bit_rate: u16) -> io::Result<Slcan> {
+        Slcan::open(Stream::serial(device)?, bit_rate)
+    }
+
+    fn open(mut stream: Stream, bit_rate: u16) -> io::Result<Slcan> {
+        stream.write(&opening(bit_rate)?).map_err(io::Error::other)?;
+        Ok(Slcan { stream, splitter: Splitter::default(), frames: VecDeque::new() })
+    }
+}
+
+impl Drop for Slcan {
+    /// An adapter that stays open would fill its buffer for the next user.
+    fn drop(&mut self) {
+        let _ = self.stream.write("C\r");
+    }
+}
+
+impl Bus for Slcan {
+    fn now(&self) -> Instant {
+        clock::now()
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.stream.write(&format(frame))
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
+        loop {
+            if let Some(frame) = self.frames.pop_front() {
+                return Ok(Some(Received { frame, at: self.now() }));
+            }
+            let bytes = self.stream.read(until)?;
+            self.splitter.push(&bytes, &mut self.frames);
+            if bytes.is_empty() && self.now() >= until {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(text: &str) -> Vec<Frame> {
+        let (mut splitter, mut out) = (Splitter::default(), VecDeque::new());
+        splitter.push(text.as_bytes(), &mut out);
+        out.into()
+    }
+
+    #[test]
+    fn frames_between_answers() {
+        let text = "\r\rz\rt0812FE01\rzt7010\r\x07r7011\rF00\rt081201FE1234\rZ\r";
+        let expected = [
+            Frame::new(0x81, &[0xFE, 1]).unwrap(),
+            Frame::new(0x701, &[]).unwrap(),
+            Frame::remote(0x701, 1).unwrap(),
+            Frame::new(0x81, &[1, 0xFE]).unwrap(),
+        ];
+        assert_eq!(frames(text), expected);
+    }
+
+    #[test]
+    fn what_is_no_base_frame_is_passed_over() {
+        for text in ["T000001230\r", "t8000\r", "t1239\r", "t12311\r", "t123\r", "t1231+1\r", "\u{e9}t1230\r"]
+        {
+            assert_eq!(frames(text), [], "{text}");
+        }
+        let noise = "y".repeat(1000) + "\rt1230\r";
+        assert_eq!(frames(&noise), [Frame::new(0x123, &[]).unwrap()]);
+    }
+
+    #[test]
+    fn frames_to_send() {
+        assert_eq!(format(&Frame::new(0x601, &[0x40, 0, 0x10]).unwrap()), "t6013400010\r");
+        assert_eq!(format(&Frame::remote(0x701, 1).unwrap()), "r7011\r");
+    }
+
+    #[test]
+    fn opening_sets_the_bit_rate() {
+        assert_eq!(opening(250).unwrap(), "\r\rC\rS5\rO\r");
+        assert_eq!(opening(1000).unwrap(), "\r\rC\rS8\rO\r");
+        assert!(opening(300).unwrap_err().to_string().contains("250"));
+    }
+}

@@ -1,0 +1,101 @@
+//! A SocketCAN interface of this host.
+
+use std::io::{self, ErrorKind};
+use std::thread;
+use std::time::Duration;
+
+use canopen::{Frame, Instant};
+use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Id, Socket, StandardId};
+
+use super::stream::is_time_out;
+use super::{Bus, BusError, Received, clock};
+
+/// The shortest time that a read waits; 0 would be for ever.
+const SHORTEST: Duration = Duration::from_millis(1);
+/// The queue of the interface is full (`ENOBUFS`); it holds ten frames by default. Tried again after this time.
+const FULL: Duration = Duration::from_millis(1);
+/// How often, before the bus counts as lost: nobody acknowledges.
+const TRIES: usize = 2000;
+
+/// An open interface.
+pub(super) struct SocketCan {
+    socket: CanSocket,
+}
+
+impl SocketCan {
+    pub(super) fn open(interface: &str) -> io::Result<SocketCan> {
+        Ok(SocketCan { socket: CanSocket::open(interface)? })
+    }
+}
+
+impl Bus for SocketCan {
+    fn now(&self) -> Instant {
+        clock::now()
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let Some(frame) = to_host(frame) else { return Ok(()) };
+        for _ in 0..TRIES {
+            match self.socket.write_frame(&frame) {
+                Err(error) if is_full(&error) => thread::sleep(FULL),
+                result => return result.map_err(BusError::Lost),
+            }
+        }
+        Err(BusError::Lost(io::Error::new(ErrorKind::TimedOut, "the queue of the interface stays full")))
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
+        loop {
+            let limit = clock::left(until).max(SHORTEST);
+            match self.socket.set_read_timeout(limit).and_then(|()| self.socket.read_frame()) {
+                Ok(frame) => {
+                    if let Some(frame) = from_host(&frame) {
+                        return Ok(Some(Received { frame, at: self.now() }));
+                    }
+                }
+                Err(error) if is_time_out(&error) => (),
+                Err(error) => return Err(BusError::Lost(error)),
+            }
+            if self.now() >= until {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+fn is_full(error: &io::Error) -> bool {
+    const ENOBUFS: i32 = 105;
+    error.raw_os_error() == Some(ENOBUFS) || error.kind() == ErrorKind::WouldBlock
+}
+
+/// `None` for an extended identifier, and for an error frame.
+fn from_host(frame: &CanFrame) -> Option<Frame> {
+    let Id::Standard(id) = frame.id() else { return None };
+    match frame {
+        CanFrame::Data(frame) => Frame::new(id.as_raw(), frame.data()),
+        CanFrame::Remote(frame) => Frame::remote(id.as_raw(), u8::try_from(frame.dlc()).ok()?),
+        CanFrame::Error(_) => None,
+    }
+}
+
+fn to_host(frame: &Frame) -> Option<CanFrame> {
+    let id = StandardId::new(frame.id())?;
+    if frame.is_remote() { CanFrame::new_remote(id, frame.len()) } else { CanFrame::new(id, frame.data()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use socketcan::ExtendedId;
+
+    use super::*;
+
+    #[test]
+    fn base_frames_cross_unchanged_and_extended_ones_do_not() {
+        let frames = [Frame::new(0x181, &[1, 2, 3]), Frame::new(0x7FF, &[]), Frame::remote(0x701, 8)];
+        for frame in frames.map(Option::unwrap) {
+            assert_eq!(from_host(&to_host(&frame).unwrap()), Some(frame));
+        }
+        let extended = CanFrame::new(ExtendedId::new(0x181).unwrap(), &[1]).unwrap();
+        assert_eq!(from_host(&extended), None);
+    }
+}

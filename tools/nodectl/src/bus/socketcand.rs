@@ -1,0 +1,228 @@
+//! The client of a socketcand daemon: frames as text between angle brackets over TCP.
+//!
+//! Follows doc/protocol.md of <https://github.com/linux-can/socketcand>, in raw mode: every frame is reported.
+
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+use std::io::{self, ErrorKind};
+use std::net::ToSocketAddrs;
+
+use canopen::{Duration, Frame, Instant};
+
+use super::stream::Stream;
+use super::{Bus, BusError, Received, clock};
+
+/// How long the daemon may take to answer.
+const ANSWER: Duration = Duration::from_millis(3000);
+/// Without a bracket in so many bytes, what arrives is not the protocol.
+const LONGEST: usize = 4096;
+
+/// A message of the daemon.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Message {
+    Hi,
+    Ok,
+    Error(String),
+    Frame(Received),
+    /// Anything that this client has no use for: error frames, extended identifiers, statistics.
+    Other,
+}
+
+/// Reads one message without its brackets.
+fn parse(text: &str) -> Message {
+    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+    match words.as_slice() {
+        ["hi"] => Message::Hi,
+        ["ok"] => Message::Ok,
+        ["error", reason @ ..] => Message::Error(reason.join(" ")),
+        ["frame", id, time, bytes @ ..] => frame(id, time, |id| Frame::new(id, &hex_bytes(&bytes.concat())?)),
+        ["rtr", id, time, len] => frame(id, time, |id| Frame::remote(id, len.parse().ok()?)),
+        _ => Message::Other,
+    }
+}
+
+fn frame(id: &str, time: &str, frame: impl FnOnce(u16) -> Option<Frame>) -> Message {
+    // Eight digits are an extended identifier, whatever its value.
+    let id = u16::from_str_radix(id, 16).ok().filter(|_| id.len() <= 3);
+    let received = || Some(Received { frame: frame(id?)?, at: instant(time)? });
+    received().map_or(Message::Other, Message::Frame)
+}
+
+/// `SECONDS.MICROSECONDS`
+fn instant(text: &str) -> Option<Instant> {
+    let (seconds, micros) = text.split_once('.')?;
+    let seconds: u64 = seconds.parse().ok()?;
+    Some(Instant(seconds.checked_mul(1_000_000)?.checked_add(micros.parse().ok()?)?))
+}
+
+/// Pairs of hexadecimal digits.
+pub(super) fn hex_bytes(text: &str) -> Option<Vec<u8>> {
+    let pair = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
+    let is_plain = text.len().is_multiple_of(2) && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    is_plain.then(|| text.as_bytes().chunks(2).map(pair).collect())?
+}
+
+/// The message that sends a frame.
+fn format(frame: &Frame) -> String {
+    let (id, len) = (frame.id(), frame.len());
+    if frame.is_remote() {
+        return format!("< sendrtr {id:03X} {len} >");
+    }
+    let mut text = format!("< send {id:03X} {len} ");
+    for byte in frame.data() {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02X} ");
+    }
+    text + ">"
+}
+
+/// Cuts a stream of bytes into messages.
+#[derive(Default)]
+struct Splitter(Vec<u8>);
+
+impl Splitter {
+    /// Takes bytes; what they complete goes to `messages`.
+    fn push(&mut self, bytes: &[u8], messages: &mut VecDeque<Message>) {
+        for &byte in bytes {
+            match byte {
+                b'<' => self.0.clear(),
+                b'>' => messages.push_back(parse(&String::from_utf8_lossy(&std::mem::take(&mut self.0)))),
+                _ if self.0.len() < LONGEST => self.0.push(byte),
+                _ => (),
+            }
+        }
+    }
+}
+
+/// A connection in raw mode.
+pub(super) struct Socketcand {
+    stream: Stream,
+    splitter: Splitter,
+    messages: VecDeque<Message>,
+}
+
+impl Socketcand {
+    /// Connects and opens a bus there.
+    pub(super) fn connect(host: impl ToSocketAddrs, bus: &str) -> io::Result<Socketcand> {
+        let stream = Stream::connect(host)?;
+        let mut this = Socketcand { stream, splitter: Splitter::default(), messages: VecDeque::new() };
+        this.expect(&Message::Hi)?;
+        for command in [format!("< open {bus} >"), "< rawmode >".to_owned()] {
+            this.stream.write(&command).map_err(io::Error::other)?;
+            this.expect(&Message::Ok)?;
+        }
+        Ok(this)
+    }
+
+    fn expect(&mut self, wanted: &Message) -> io::Result<()> {
+        let until = self.now() + ANSWER;
+        while let Some(message) = self.message(until).map_err(io::Error::other)? {
+            match message {
+                Message::Error(reason) => return Err(io::Error::other(reason)),
+                message if message == *wanted => return Ok(()),
+                _ => (),
+            }
+        }
+        Err(io::Error::new(ErrorKind::TimedOut, "no socketcand answers there"))
+    }
+
+    fn message(&mut self, until: Instant) -> Result<Option<Message>, BusError> {
+        loop {
+            if let Some(message) = self.messages.pop_front() {
+                return Ok(Some(message));
+            }
+            let bytes = self.stream.read(until)?;
+            self.splitter.push(&bytes, &mut self.messages);
+            if bytes.is_empty() && self.now() >= until {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+impl Bus for Socketcand {
+    fn now(&self) -> Instant {
+        clock::now()
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.stream.write(&format(frame))
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
+        while let Some(message) = self.message(until)? {
+            match message {
+                Message::Frame(received) => return Ok(Some(received)),
+                Message::Error(reason) => return Err(BusError::Lost(io::Error::other(reason))),
+                _ => (),
+            }
+        }
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn messages(pieces: &[&str]) -> Vec<Message> {
+        let (mut splitter, mut out) = (Splitter::default(), VecDeque::new());
+        for piece in pieces {
+            splitter.push(piece.as_bytes(), &mut out);
+        }
+        out.into()
+    }
+
+    fn received(id: u16, bytes: &[u8], at: u64) -> Message {
+        Message::Frame(Received { frame: Frame::new(id, bytes).unwrap(), at: Instant(at) })
+    }
+
+    #[test]
+    fn frames_however_they_are_cut() {
+        let text =
+            "< hi >< ok >< frame 123 1.000002 DEADBEEF >< frame 080 12.500000  >< frame 701 0.1 05 06 >";
+        let expected = [
+            Message::Hi,
+            Message::Ok,
+            received(0x123, &[0xDE, 0xAD, 0xBE, 0xEF], 1_000_002),
+            received(0x080, &[], 12_500_000),
+            received(0x701, &[5, 6], 1),
+        ];
+        assert_eq!(messages(&[text]), expected);
+        let letters: Vec<String> = text.chars().map(String::from).collect();
+        assert_eq!(messages(&letters.iter().map(String::as_str).collect::<Vec<_>>()), expected);
+        let remote = Received { frame: Frame::remote(0x701, 1).unwrap(), at: Instant(1) };
+        assert_eq!(messages(&["< rtr 701 0.000001 1 >"]), [Message::Frame(remote)]);
+    }
+
+    #[test]
+    fn what_is_no_base_frame_is_passed_over() {
+        for text in [
+            "< frame 00000123 1.0 01 >",
+            "< frame 800 1.0 01 >",
+            "< frame 123 1.0 010203040506070809 >",
+            "< frame 123 1.0 0 >",
+            "< frame 123 now 01 >",
+            "< frame 123 1.0 +1 >",
+            "< rtr 123 1.0 9 >",
+            "< stat 1 2 3 4 >",
+            "< >",
+        ] {
+            assert_eq!(messages(&[text]), [Message::Other], "{text}");
+        }
+        assert_eq!(messages(&["< error no such bus >"]), [Message::Error("no such bus".into())]);
+    }
+
+    #[test]
+    fn noise_is_bounded_and_ends_with_the_next_bracket() {
+        let noise = "x".repeat(10 * LONGEST);
+        assert_eq!(messages(&[&noise, "< ok >"]), [Message::Ok]);
+    }
+
+    #[test]
+    fn frames_to_send() {
+        assert_eq!(format(&Frame::new(0x601, &[0x40, 0, 0x10]).unwrap()), "< send 601 3 40 00 10 >");
+        assert_eq!(format(&Frame::new(0x80, &[]).unwrap()), "< send 080 0 >");
+        assert_eq!(format(&Frame::remote(0x701, 1).unwrap()), "< sendrtr 701 1 >");
+    }
+}

@@ -1,0 +1,83 @@
+//! Bytes that come and go over TCP or a serial port, with deadlines.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+use canopen::Instant;
+use serialport::SerialPort;
+
+use super::BusError;
+use super::clock;
+
+/// How long a host may take to accept a connection.
+const CONNECT: Duration = Duration::from_secs(3);
+/// The shortest time that a read waits; 0 would be for ever.
+const SHORTEST: Duration = Duration::from_millis(1);
+
+/// Something to read from with a limit.
+trait Port: Read + Write {
+    fn limit(&mut self, time: Duration) -> io::Result<()>;
+}
+
+impl Port for TcpStream {
+    fn limit(&mut self, time: Duration) -> io::Result<()> {
+        self.set_read_timeout(Some(time))
+    }
+}
+
+impl Port for Box<dyn SerialPort> {
+    fn limit(&mut self, time: Duration) -> io::Result<()> {
+        Ok(self.set_timeout(time)?)
+    }
+}
+
+/// An open connection.
+pub(super) struct Stream {
+    port: Box<dyn Port>,
+}
+
+impl Stream {
+    /// Connects to the first address of a host that accepts.
+    pub(super) fn connect(host: impl ToSocketAddrs) -> io::Result<Stream> {
+        let mut failure = io::Error::new(ErrorKind::NotFound, "no such host");
+        for address in host.to_socket_addrs()? {
+            match TcpStream::connect_timeout(&address, CONNECT) {
+                Ok(stream) => {
+                    // A request is one small write that must not wait for the next.
+                    stream.set_nodelay(true)?;
+                    return Ok(Stream { port: Box::new(stream) });
+                }
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+
+    /// Opens a serial port. The line speed means nothing to the USB adapters that are common today.
+    pub(super) fn serial(device: &str) -> io::Result<Stream> {
+        let port = serialport::new(device, 115_200).timeout(SHORTEST).open()?;
+        Ok(Stream { port: Box::new(port) })
+    }
+
+    pub(super) fn write(&mut self, text: &str) -> Result<(), BusError> {
+        self.port.write_all(text.as_bytes()).and_then(|()| self.port.flush()).map_err(BusError::Lost)
+    }
+
+    /// Some bytes; none at the deadline.
+    pub(super) fn read(&mut self, until: Instant) -> Result<Vec<u8>, BusError> {
+        let mut buffer = [0; 4096];
+        let limit = clock::left(until).max(SHORTEST);
+        match self.port.limit(limit).and_then(|()| self.port.read(&mut buffer)) {
+            Ok(0) => Err(BusError::Lost(ErrorKind::UnexpectedEof.into())),
+            Ok(count) => Ok(buffer[..count].to_vec()),
+            Err(error) if is_time_out(&error) => Ok(Vec::new()),
+            Err(error) => Err(BusError::Lost(error)),
+        }
+    }
+}
+
+/// What a read says at its limit depends on the system.
+pub(super) fn is_time_out(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}

@@ -1,0 +1,104 @@
+//! What is known about the objects of a node: names, types and units, from a data sheet.
+
+use canopen::sdo::Multiplexer;
+use eds::{DEVICES, DataType, Eds, Entry, LookupError};
+
+/// The first index that is not of the communication profile, which is the same in all devices (CiA 301).
+const FIRST_OF_VENDOR: u16 = 0x2000;
+
+/// The data sheet of a device, and the communication profile for what it leaves out or where there is none.
+#[derive(Clone, Debug)]
+pub struct Catalogue {
+    sheet: Eds,
+    common: Eds,
+}
+
+impl Catalogue {
+    /// Of a device with a data sheet.
+    #[must_use]
+    pub fn new(sheet: Eds) -> Catalogue {
+        Catalogue { sheet, common: common() }
+    }
+
+    /// Of a device that nothing is known about.
+    #[must_use]
+    pub fn unknown() -> Catalogue {
+        Catalogue::new(common())
+    }
+
+    /// The data sheet of a device of this project with this identity (1018h:1 and 2).
+    #[must_use]
+    pub fn built_in(vendor: u32, product: u32) -> Option<Catalogue> {
+        let is_it =
+            |sheet: &Eds| (sheet.device.vendor_number, sheet.device.product_number) == (vendor, product);
+        DEVICES.iter().map(eds::Device::eds).find(is_it).map(Catalogue::new)
+    }
+
+    /// The object that a person means, by address or by name. An address that no data sheet has is one all the same.
+    ///
+    /// # Errors
+    /// When no object has the name, or more than one.
+    pub fn find(&self, query: &str) -> Result<Multiplexer, LookupError> {
+        match self.sheet.find(query) {
+            Ok(entry) => Ok(Multiplexer { index: entry.index, sub: entry.sub }),
+            Err(LookupError::Address(at)) => Ok(at),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// What is known about an object.
+    #[must_use]
+    pub fn entry(&self, at: Multiplexer) -> Option<&Entry> {
+        self.sheet.get(at.index, at.sub).or_else(|| self.common.get(at.index, at.sub))
+    }
+
+    /// Its name with that of its record: `Identity/Vendor-ID`.
+    #[must_use]
+    pub fn name(&self, at: Multiplexer) -> Option<String> {
+        let of = |eds: &Eds| eds.get(at.index, at.sub).map(|entry| eds.path(entry));
+        of(&self.sheet).or_else(|| of(&self.common))
+    }
+
+    /// Its data type.
+    #[must_use]
+    pub fn data_type(&self, at: Multiplexer) -> Option<DataType> {
+        self.entry(at).map(|entry| entry.data_type)
+    }
+
+    /// Its physical unit; empty where none is known.
+    #[must_use]
+    pub fn unit(&self, at: Multiplexer) -> &str {
+        self.entry(at).map_or("", |entry| &entry.unit)
+    }
+}
+
+fn common() -> Eds {
+    let mut eds = DEVICES.first().map(eds::Device::eds).unwrap_or_default();
+    eds.objects.retain(|&index, _| index < FIRST_OF_VENDOR);
+    eds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::at;
+
+    #[test]
+    fn the_devices_of_the_project_are_known() {
+        let pressure = Catalogue::built_in(node::VENDOR_ID, 1).expect("the pressure transmitter");
+        assert_eq!(pressure.find("Pressure process value"), Ok(at(0x6130, 1)));
+        assert_eq!(pressure.data_type(at(0x6130, 1)), Some(DataType(0x08)));
+        assert!(Catalogue::built_in(0xFFFF_FFFF, 1).is_none());
+    }
+
+    #[test]
+    fn the_communication_profile_is_known_of_every_device() {
+        let unknown = Catalogue::unknown();
+        assert_eq!(unknown.find("producer heartbeat time"), Ok(at(0x1017, 0)));
+        assert_eq!(unknown.name(at(0x1018, 1)).as_deref(), Some("Identity/Vendor-ID"));
+        assert_eq!(unknown.unit(at(0x1017, 0)), "ms");
+        assert_eq!(unknown.find("6130:1"), Ok(at(0x6130, 1)));
+        assert_eq!(unknown.name(at(0x6130, 1)), None);
+        assert!(unknown.find("Pressure process value").is_err());
+    }
+}

@@ -1,0 +1,117 @@
+//! Why a command failed, and the exit code that says so.
+
+use std::io;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::acquisition::Interruption;
+use crate::bus::BusError;
+use crate::sdo::{self, Cause};
+use crate::{lss, update};
+
+/// For the end of the help text.
+pub(super) const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  a node refused: SDO abort, LSS error code
+  2  the command line is wrong
+  3  no answer in time, or one against the protocol
+  4  the bus cannot be opened, or is lost
+  5  the node did not accept the new program, or has another than it was given
+  6  the program is not for this node; nothing was changed
+  7  a file cannot be read or written";
+
+/// Why a command failed.
+#[derive(Debug, Error)]
+pub enum Failure {
+    /// The command line makes no sense.
+    #[error("{0}")]
+    Usage(String),
+    /// A transfer failed.
+    #[error(transparent)]
+    Sdo(#[from] sdo::Error),
+    /// LSS failed.
+    #[error(transparent)]
+    Lss(#[from] lss::Error),
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A node was not updated.
+    #[error(transparent)]
+    Update(#[from] update::Error),
+    /// Some nodes were not updated; each was told already.
+    #[error("{failed} of {all} nodes were not updated")]
+    Nodes {
+        /// How many were not.
+        failed: usize,
+        /// How many there are.
+        all: usize,
+        /// Of the first that was not.
+        exit_code: u8,
+    },
+    /// Somebody did not answer.
+    #[error("{0}")]
+    Silence(String),
+    /// A file cannot be read or written.
+    #[error("{path}: {reason}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+    /// The result cannot be written.
+    #[error("cannot write the result: {0}")]
+    Output(#[from] io::Error),
+}
+
+impl Failure {
+    /// A file that cannot be used.
+    pub(super) fn file(path: &std::path::Path, reason: impl ToString) -> Failure {
+        Failure::File { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// The exit code of the process.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Failure::Usage(_) => 2,
+            Failure::Sdo(error) => sdo_code(error),
+            Failure::Lss(lss::Error::Refused { .. }) => 1,
+            Failure::Lss(lss::Error::NoAnswer { .. }) | Failure::Silence(_) => 3,
+            Failure::Bus(_) | Failure::Lss(lss::Error::Bus(_)) => 4,
+            Failure::Update(error) => update_code(error),
+            Failure::Nodes { exit_code, .. } => *exit_code,
+            Failure::File { .. } | Failure::Output(_) => 7,
+        }
+    }
+}
+
+fn sdo_code(error: &sdo::Error) -> u8 {
+    match error.cause {
+        Cause::Abort(_) => 1,
+        Cause::NoAnswer | Cause::Unexpected | Cause::Crc => 3,
+        Cause::Bus(_) => 4,
+    }
+}
+
+/// The exit code of a node that was not updated.
+pub(super) fn update_code(error: &update::Error) -> u8 {
+    match error {
+        update::Error::Sdo(error) => sdo_code(error),
+        update::Error::Bus(_) => 4,
+        update::Error::Stuck { .. } | update::Error::Lost { .. } => 3,
+        update::Error::Flash { .. } | update::Error::Identification { .. } => 5,
+        update::Error::Product { .. } | update::Error::Older { .. } => 6,
+    }
+}
+
+impl From<Interruption> for Failure {
+    fn from(interruption: Interruption) -> Failure {
+        match interruption {
+            Interruption::Sdo(error) => error.into(),
+            Interruption::Bus(error) => error.into(),
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! `nodectl info`
+
+use std::fmt;
+
+use canopen::{Duration, NodeId};
+use clap::Args;
+use serde::Serialize;
+
+use super::output::hex;
+use super::{Failure, Session};
+use crate::heartbeat::{self, Heartbeat};
+use crate::object::at;
+use crate::update::{Program, Status};
+use crate::value;
+
+/// Longer than one heartbeat takes to come.
+const MARGIN: Duration = Duration::from_millis(200);
+/// 1000h of a bootloader: "BOOT".
+const BOOT: u32 = 0x424F_4F54;
+
+/// Tells what nodes are: identity, versions, state, errors, program.
+#[derive(Debug, Args)]
+pub(super) struct Info {}
+
+#[derive(Serialize)]
+struct Report {
+    node: u8,
+    device_type: Option<u32>,
+    name: Option<String>,
+    hardware_version: Option<String>,
+    software_version: Option<String>,
+    vendor: Option<u32>,
+    product: Option<u32>,
+    revision: Option<u32>,
+    serial: Option<u32>,
+    heartbeat_ms: Option<u32>,
+    state: Option<&'static str>,
+    error_register: Option<u32>,
+    errors: Vec<u32>,
+    program: Option<ProgramReport>,
+}
+
+/// Of a node that can be updated (CiA 302-3).
+#[derive(Serialize)]
+struct ProgramReport {
+    running: bool,
+    identification: Option<u32>,
+    status: Option<String>,
+}
+
+impl Info {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        for node in session.options.node.list()? {
+            let report = report(session, node)?;
+            session.print(&report)?;
+        }
+        Ok(())
+    }
+}
+
+fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
+    let heartbeat_ms = number(session, node, 0x1017, 0)?;
+    Ok(Report {
+        node: node.get(),
+        device_type: number(session, node, 0x1000, 0)?,
+        name: text(session, node, 0x1008)?,
+        hardware_version: text(session, node, 0x1009)?,
+        software_version: text(session, node, 0x100A)?,
+        vendor: number(session, node, 0x1018, 1)?,
+        product: number(session, node, 0x1018, 2)?,
+        revision: number(session, node, 0x1018, 3)?,
+        serial: number(session, node, 0x1018, 4)?,
+        heartbeat_ms,
+        state: state(session, node, heartbeat_ms)?,
+        error_register: number(session, node, 0x1001, 0)?,
+        errors: errors(session, node)?,
+        program: program(session, node)?,
+    })
+}
+
+/// What the next heartbeat says; nothing where there is none.
+fn state(session: &mut Session, node: NodeId, period: Option<u32>) -> Result<Option<&'static str>, Failure> {
+    let Some(period) = period.filter(|&period| period > 0) else { return Ok(None) };
+    let time = Duration(MARGIN.0 + Duration::from_millis(period.into()).0);
+    Ok(Heartbeat::wait(&mut session.network, node, time, |_| true)?.map(heartbeat::words))
+}
+
+fn errors(session: &mut Session, node: NodeId) -> Result<Vec<u32>, Failure> {
+    let count = number(session, node, 0x1003, 0)?.and_then(|count| u8::try_from(count).ok()).unwrap_or(0);
+    let mut errors = Vec::new();
+    for sub in 1..=count {
+        errors.extend(number(session, node, 0x1003, sub)?);
+    }
+    Ok(errors)
+}
+
+fn program(session: &mut Session, node: NodeId) -> Result<Option<ProgramReport>, Failure> {
+    if session.optional(node, at(0x1F51, 1))?.is_none() {
+        return Ok(None);
+    }
+    let options = session.options.sdo();
+    let mut program = Program::new(&mut session.network, node, options);
+    Ok(Some(ProgramReport {
+        running: program.is_running()?,
+        identification: program.identification()?,
+        status: program.status()?.as_ref().map(Status::to_string),
+    }))
+}
+
+fn number(session: &mut Session, node: NodeId, index: u16, sub: u8) -> Result<Option<u32>, Failure> {
+    let bytes = session.optional(node, at(index, sub))?;
+    Ok(bytes.map(|bytes| bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))))
+}
+
+fn text(session: &mut Session, node: NodeId, index: u16) -> Result<Option<String>, Failure> {
+    Ok(session.optional(node, at(index, 0))?.map(|bytes| value::text(&bytes)))
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "-".to_owned());
+        let is_boot = self.device_type == Some(BOOT);
+        write!(f, "node {}: {}", self.node, or_dash(&self.name))?;
+        let note = if is_boot { " (bootloader)" } else { "" };
+        write!(f, "\n  device type       {}{note}", hex(self.device_type))?;
+        write!(f, "\n  hardware version  {}", or_dash(&self.hardware_version))?;
+        write!(f, "\n  software version  {}", or_dash(&self.software_version))?;
+        write!(f, "\n  vendor            {}", hex(self.vendor))?;
+        write!(f, "\n  product           {}", hex(self.product))?;
+        write!(f, "\n  revision          {}", hex(self.revision))?;
+        write!(f, "\n  serial number     {}", hex(self.serial))?;
+        write!(f, "\n  state             {}", self.state.unwrap_or("- (no heartbeat)"))?;
+        let register = self.error_register.map_or_else(|| "-".to_owned(), |value| format!("{value:02X}h"));
+        write!(f, "\n  error register    {register}")?;
+        for error in &self.errors {
+            // CiA 301, 7.5.2.4: the error code is the low half, the rest is the manufacturer's.
+            write!(f, "\n  error             {:04X}h, {:04X}h", error & 0xFFFF, error >> 16)?;
+        }
+        self.program.iter().try_for_each(|program| write!(f, "\n  program           {program}"))
+    }
+}
+
+impl fmt::Display for ProgramReport {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let state = if self.running { "running" } else { "stopped" };
+        write!(f, "{state}, identification {}", hex(self.identification))?;
+        self.status.iter().try_for_each(|status| write!(f, ", flash {status}"))
+    }
+}

@@ -1,0 +1,83 @@
+//! The command line: one file for each command.
+
+mod failure;
+mod info;
+mod lss;
+mod monitor;
+mod nmt;
+mod node_set;
+mod options;
+mod output;
+mod read;
+mod record;
+mod scan;
+mod session;
+mod store;
+mod update;
+mod write;
+
+use clap::{Parser, Subcommand};
+
+pub use failure::Failure;
+pub use options::Options;
+pub use output::Output;
+pub use session::Session;
+
+/// Talks to CANopen nodes: read, write, watch, configure, update.
+///
+/// Results go to the standard output, progress and errors to the standard error output.
+#[derive(Debug, Parser)]
+#[command(name = "nodectl", version, max_term_width = 100, after_help = failure::EXIT_CODES)]
+pub struct Cli {
+    /// For every command.
+    #[command(flatten)]
+    pub options: Options,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Scan(scan::Scan),
+    Info(info::Info),
+    Read(read::Read),
+    Write(write::Write),
+    Monitor(monitor::Monitor),
+    Record(record::Record),
+    Save(store::Save),
+    Restore(store::Restore),
+    Nmt(nmt::Nmt),
+    Lss(lss::Lss),
+    Update(update::Update),
+}
+
+impl Cli {
+    /// Does the command, on the bus of the options.
+    ///
+    /// # Errors
+    /// Why it failed.
+    pub fn run(&self, output: Output) -> Result<(), Failure> {
+        let mut session = Session::open(&self.options, output)?;
+        self.run_in(&mut session)
+    }
+
+    /// Does the command in a session that is open.
+    ///
+    /// # Errors
+    /// Why it failed.
+    pub fn run_in(&self, session: &mut Session) -> Result<(), Failure> {
+        match &self.command {
+            Command::Scan(scan) => scan.run(session),
+            Command::Info(info) => info.run(session),
+            Command::Read(read) => read.run(session),
+            Command::Write(write) => write.run(session),
+            Command::Monitor(monitor) => monitor.run(session),
+            Command::Record(record) => record.run(session),
+            Command::Save(save) => save.run(session),
+            Command::Restore(restore) => restore.run(session),
+            Command::Nmt(nmt) => nmt.run(session),
+            Command::Lss(lss) => lss.run(session),
+            Command::Update(update) => update.run(session),
+        }
+    }
+}

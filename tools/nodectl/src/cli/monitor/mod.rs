@@ -1,0 +1,130 @@
+//! `nodectl monitor`
+
+mod screen;
+mod view;
+
+use std::fmt;
+
+use canopen::sdo::Multiplexer;
+use canopen::{Duration, Instant};
+use clap::Args;
+use serde::Serialize;
+
+use self::view::View;
+use super::read::place;
+use super::{Failure, Output, Session};
+use crate::acquisition::{Acquisition, Sample, Setup, Signal};
+use crate::object::Place;
+use crate::value::Value;
+
+/// After so long without a value somebody wonders.
+const SILENCE: Duration = Duration::from_millis(2000);
+
+/// Shows live values, with a plot where the output is a terminal; else one line for each value.
+#[derive(Debug, Args)]
+pub(super) struct Monitor {
+    #[command(flatten)]
+    source: Source,
+
+    /// End after so many values.
+    #[arg(long, value_name = "N")]
+    count: Option<usize>,
+
+    /// What the plot shows, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 30)]
+    window: u32,
+}
+
+/// Which values, and how they are got.
+#[derive(Debug, Args)]
+pub(super) struct Source {
+    /// Objects by index or name; all that are in TPDOs if none is given. What is in a TPDO is taken from it.
+    #[arg(value_name = "OBJECT")]
+    objects: Vec<String>,
+
+    /// How often what is in no TPDO is read, in milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 100)]
+    period: u32,
+
+    /// Start the node first: TPDOs come in the state operational only.
+    #[arg(long)]
+    start: bool,
+}
+
+impl Source {
+    /// The values of the session's node, and where results go.
+    pub(super) fn open<'s>(
+        &self,
+        session: &'s mut Session,
+    ) -> Result<(Acquisition<'s>, &'s mut Output), Failure> {
+        let node = session.options.node.one()?;
+        let catalogue = session.catalogue(node)?;
+        let objects: Result<Vec<_>, Failure> =
+            self.objects.iter().map(|query| session.find(node, query)).collect();
+        let period = Duration::from_millis(self.period.max(1).into());
+        let setup = Setup { node, options: session.options.sdo(), period, start: self.start };
+        let acquisition = Acquisition::open(&mut session.network, setup, &catalogue, &objects?)?;
+        if acquisition.signals().is_empty() {
+            let message = "the node has no TPDO that is switched on: name the objects";
+            return Err(Failure::Usage(message.to_owned()));
+        }
+        Ok((acquisition, &mut session.output))
+    }
+}
+
+/// A value on a line.
+#[derive(Serialize)]
+struct Line<'a> {
+    time: f64,
+    #[serde(rename = "object", serialize_with = "place")]
+    at: Multiplexer,
+    name: &'a str,
+    value: &'a Value,
+    unit: &'a str,
+}
+
+impl Monitor {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        if session.output.is_interactive() {
+            let (mut acquisition, _) = self.source.open(session)?;
+            let view = View::new(acquisition.signals(), self.window.max(1).into());
+            return screen::run(&mut acquisition, view, self.count);
+        }
+        self.print_lines(session)
+    }
+
+    fn print_lines(&self, session: &mut Session) -> Result<(), Failure> {
+        let (mut acquisition, output) = self.source.open(session)?;
+        let signals = acquisition.signals().to_vec();
+        let (mut start, mut left, mut hinted) = (None, self.count.unwrap_or(usize::MAX), false);
+        while left > 0 {
+            let until = acquisition.now() + SILENCE;
+            let Some(sample) = acquisition.next(until)? else {
+                let hint = acquisition.hint().filter(|_| !std::mem::replace(&mut hinted, true));
+                hint.iter().for_each(|hint| eprintln!("{hint}"));
+                continue;
+            };
+            let start = *start.get_or_insert(sample.at);
+            output.print(&line(&signals[sample.signal], &sample, start))?;
+            left -= 1;
+        }
+        Ok(())
+    }
+}
+
+fn line<'a>(signal: &'a Signal, sample: &'a Sample, start: Instant) -> Line<'a> {
+    Line {
+        time: super::record::seconds_between(start, sample.at),
+        at: signal.at,
+        name: &signal.name,
+        value: &sample.value,
+        unit: &signal.unit,
+    }
+}
+
+impl fmt::Display for Line<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Line { time, at, name, value, unit } = self;
+        write!(f, "{time:10.6} {} {name} = {value} {unit}", Place(*at))
+    }
+}

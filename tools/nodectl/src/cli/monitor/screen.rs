@@ -1,0 +1,86 @@
+//! The terminal: draws the view and reads the keys.
+
+use std::io;
+use std::time::Duration;
+
+use canopen::Instant;
+use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::DefaultTerminal;
+
+use super::view::View;
+use crate::acquisition::Acquisition;
+use crate::cli::Failure;
+
+/// How often the screen is drawn.
+const REFRESH: canopen::Duration = canopen::Duration::from_millis(100);
+
+/// The terminal, given back when the value is dropped.
+struct Terminal(DefaultTerminal);
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        ratatui::restore();
+    }
+}
+
+/// Shows values until `q` is pressed, or so many have come.
+pub(super) fn run(
+    acquisition: &mut Acquisition,
+    mut view: View,
+    count: Option<usize>,
+) -> Result<(), Failure> {
+    let mut terminal = Terminal(ratatui::try_init()?);
+    let mut left = count.unwrap_or(usize::MAX);
+    while left > 0 {
+        let due = acquisition.now() + REFRESH;
+        left = left.saturating_sub(acquire(acquisition, &mut view, due, left)?);
+        let hint = acquisition.hint();
+        terminal.0.draw(|frame| view.draw(frame, hint.as_deref()))?;
+        if is_over(&mut view)? {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Takes values until an instant, at most so many; how many they were.
+fn acquire(
+    acquisition: &mut Acquisition,
+    view: &mut View,
+    until: Instant,
+    most: usize,
+) -> Result<usize, Failure> {
+    let mut taken = 0;
+    while taken < most && acquisition.now() < until {
+        if let Some(sample) = acquisition.next(until)? {
+            view.take(&sample);
+            taken += 1;
+        }
+    }
+    Ok(taken)
+}
+
+/// Reads the keys; whether one of them ends it.
+fn is_over(view: &mut View) -> io::Result<bool> {
+    while event::poll(Duration::ZERO)? {
+        if let Event::Key(key) = event::read()?
+            && key.kind != KeyEventKind::Release
+            && on_key(key, view)
+        {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+fn on_key(key: KeyEvent, view: &mut View) -> bool {
+    match key.code {
+        KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => return true,
+        KeyCode::Char('q') | KeyCode::Esc => return true,
+        KeyCode::Up => view.choose(-1),
+        KeyCode::Down => view.choose(1),
+        KeyCode::Char(' ') => view.hold(),
+        _ => (),
+    }
+    false
+}

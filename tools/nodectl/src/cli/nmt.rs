@@ -1,0 +1,99 @@
+//! `nodectl nmt`
+
+use std::fmt;
+
+use canopen::nmt::{self, State};
+use canopen::{Duration, NodeId};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::node_set::NodeSet;
+use super::{Failure, Session};
+use crate::heartbeat::{self, Heartbeat};
+use crate::nmt::{reset, send};
+
+/// How long a node may take to boot.
+const BOOT: Duration = Duration::from_millis(10_000);
+
+/// Changes the state of nodes.
+#[derive(Debug, Args)]
+pub(super) struct Nmt {
+    command: Command,
+
+    /// Do not wait until a node that is reset has booted, or a heartbeat tells the new state.
+    #[arg(long)]
+    no_wait: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Command {
+    /// To operational.
+    Start,
+    /// To stopped.
+    Stop,
+    /// To pre-operational.
+    Preop,
+    /// Restart the node.
+    Reset,
+    /// Restart its communication.
+    ResetComm,
+}
+
+#[derive(Serialize)]
+struct Done {
+    node: u8,
+    state: Option<&'static str>,
+}
+
+impl Nmt {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let (command, wanted) = self.command.meaning();
+        let nodes = match &session.options.node {
+            NodeSet::All => return Ok(send(&mut session.network, command, None)?),
+            NodeSet::These(_) => session.options.node.list()?,
+        };
+        for node in nodes {
+            match wanted {
+                _ if self.no_wait => send(&mut session.network, command, Some(node))?,
+                None => restart(session, command, node)?,
+                Some(wanted) => change(session, command, node, wanted)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+fn restart(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
+    if !reset(&mut session.network, command, node, BOOT)? {
+        return Err(Failure::Silence(format!("node {}: no boot-up message", node.get())));
+    }
+    session.print(&Done { node: node.get(), state: Some("booted") })
+}
+
+/// A node that sends no heartbeat cannot tell.
+fn change(session: &mut Session, command: nmt::Command, node: NodeId, wanted: State) -> Result<(), Failure> {
+    send(&mut session.network, command, Some(node))?;
+    let time = session.options.timeout().max(Duration::from_millis(1500));
+    let state = Heartbeat::wait(&mut session.network, node, time, |state| state == wanted)?;
+    session.print(&Done { node: node.get(), state: state.map(heartbeat::words) })
+}
+
+impl Command {
+    /// The command, and the state it leads to; none for a restart.
+    fn meaning(self) -> (nmt::Command, Option<State>) {
+        match self {
+            Command::Start => (nmt::Command::Start, Some(State::Operational)),
+            Command::Stop => (nmt::Command::Stop, Some(State::Stopped)),
+            Command::Preop => (nmt::Command::EnterPreOperational, Some(State::PreOperational)),
+            Command::Reset => (nmt::Command::ResetNode, None),
+            Command::ResetComm => (nmt::Command::ResetCommunication, None),
+        }
+    }
+}
+
+impl fmt::Display for Done {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let state = self.state.unwrap_or("sent; no heartbeat tells the state");
+        write!(f, "node {}: {state}", self.node)
+    }
+}

@@ -1,0 +1,54 @@
+//! The options of every command.
+
+use std::path::PathBuf;
+
+use canopen::Duration;
+use clap::Args;
+
+use super::node_set::NodeSet;
+use crate::bus::Address;
+use crate::sdo;
+
+/// The options of every command.
+#[derive(Clone, Debug, Args)]
+pub struct Options {
+    /// The bus: socketcan:IFACE, socketcand://HOST:PORT/BUS, slcan:DEVICE or slcan://HOST:PORT.
+    #[arg(long, global = true, env = "NODECTL_BUS", default_value = "socketcand://127.0.0.1:29536/vcan0")]
+    pub bus: Address,
+
+    /// Bit rate in kbit/s, for slcan adapters; the others have theirs.
+    #[arg(long, global = true, env = "NODECTL_BIT_RATE", value_name = "KBIT/S", default_value_t = 250)]
+    pub bit_rate: u16,
+
+    /// Node-ID, for update and info several (1,2,5-8), for nmt also "all".
+    #[arg(long, short, global = true, env = "NODECTL_NODE", default_value = "1")]
+    pub node: NodeSet,
+
+    /// Data sheet of the node; else the one of this project with its vendor-ID and product code.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub eds: Option<PathBuf>,
+
+    /// Results as JSON: one value, or one a line where there are many.
+    #[arg(long, global = true)]
+    pub json: bool,
+
+    /// How long a node may take to answer, in milliseconds.
+    #[arg(long, global = true, value_name = "MS", default_value_t = 1000)]
+    pub timeout: u32,
+
+    /// How often a transfer without an answer is begun anew.
+    #[arg(long, global = true, value_name = "N", default_value_t = 1)]
+    pub retries: u8,
+}
+
+impl Options {
+    /// For transfers.
+    pub(super) fn sdo(&self) -> sdo::Options {
+        sdo::Options { timeout: self.timeout(), retries: self.retries }
+    }
+
+    /// How long to wait for an answer.
+    pub(super) fn timeout(&self) -> Duration {
+        Duration::from_millis(self.timeout.into())
+    }
+}

@@ -1,0 +1,52 @@
+//! Results: text for people, JSON for scripts.
+
+use std::fmt::Display;
+use std::io::{self, IsTerminal, Write};
+
+use serde::Serialize;
+
+/// Where results go, and how.
+pub struct Output {
+    to: Box<dyn Write>,
+    json: bool,
+}
+
+impl Output {
+    /// The standard output.
+    #[must_use]
+    pub fn standard(json: bool) -> Output {
+        Output::new(io::stdout(), json)
+    }
+
+    /// Anywhere.
+    pub fn new(to: impl Write + 'static, json: bool) -> Output {
+        Output { to: Box::new(to), json }
+    }
+
+    /// Whether a person looks on.
+    pub(super) fn is_interactive(&self) -> bool {
+        !self.json && io::stdout().is_terminal()
+    }
+
+    /// Prints a result.
+    pub(super) fn print(&mut self, result: &(impl Serialize + Display)) -> io::Result<()> {
+        if self.json {
+            serde_json::to_writer(&mut self.to, result)?;
+        } else {
+            write!(self.to, "{result}")?;
+        }
+        writeln!(self.to)?;
+        self.to.flush()
+    }
+
+    /// Writes bytes as they are.
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.to.write_all(bytes)?;
+        self.to.flush()
+    }
+}
+
+/// An identification or a code as people write it.
+pub(super) fn hex(value: Option<u32>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:08X}h"))
+}

@@ -1,0 +1,79 @@
+//! `nodectl scan`
+
+use std::fmt;
+
+use canopen::NodeId;
+use clap::Args;
+use serde::Serialize;
+
+use super::output::hex;
+use super::{Failure, Session};
+use crate::object::at;
+use crate::scan::{Presence, scan};
+use crate::{heartbeat, value};
+
+/// Lists the nodes that answer, or that send a heartbeat.
+#[derive(Debug, Args)]
+pub(super) struct Scan {
+    /// How long to listen after the last question, in milliseconds; heartbeats usually come once a second.
+    #[arg(long, value_name = "MS", default_value_t = 1200)]
+    listen: u32,
+}
+
+#[derive(Serialize)]
+struct Found {
+    nodes: Vec<Row>,
+}
+
+#[derive(Serialize)]
+struct Row {
+    node: u8,
+    state: Option<&'static str>,
+    device_type: Option<u32>,
+    vendor: Option<u32>,
+    product: Option<u32>,
+    name: Option<String>,
+}
+
+impl Scan {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let time = canopen::Duration::from_millis(self.listen.into());
+        let found = scan(&mut session.network, time)?;
+        let mut nodes = Vec::new();
+        for (node, presence) in found {
+            nodes.push(row(session, node, presence)?);
+        }
+        session.print(&Found { nodes })
+    }
+}
+
+/// A node that does not answer SDO (it may be stopped) is a row all the same.
+fn row(session: &mut Session, node: NodeId, presence: Presence) -> Result<Row, Failure> {
+    let mut row = Row {
+        node: node.get(),
+        state: presence.state.map(heartbeat::words),
+        device_type: presence.device_type,
+        vendor: None,
+        product: None,
+        name: None,
+    };
+    if presence.device_type.is_some() {
+        row.vendor = session.word(node, at(0x1018, 1))?;
+        row.product = session.word(node, at(0x1018, 2))?;
+        row.name = session.optional(node, at(0x1008, 0))?.map(|bytes| value::text(&bytes));
+    }
+    Ok(row)
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "node  state            device type  vendor     product    name")?;
+        for row in &self.nodes {
+            let Row { node, state, device_type, vendor, product, name } = row;
+            write!(f, "\n{node:>4}  {:<15}  ", state.unwrap_or("-"))?;
+            write!(f, "{:<11}  {:<9}  {:<9}  ", hex(*device_type), hex(*vendor), hex(*product))?;
+            write!(f, "{}", name.as_deref().unwrap_or("-"))?;
+        }
+        Ok(())
+    }
+}

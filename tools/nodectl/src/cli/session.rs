@@ -1,0 +1,100 @@
+//! What the commands share: the bus, and what is known about the nodes.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::fs;
+use std::path::Path;
+
+use canopen::NodeId;
+use canopen::sdo::Multiplexer;
+use eds::Eds;
+use serde::Serialize;
+
+use super::{Failure, Options, Output};
+use crate::object::at;
+use crate::sdo::{self, Client};
+use crate::{Catalogue, Network};
+
+/// An open bus, and what is known about the nodes on it.
+pub struct Session {
+    pub(super) network: Network,
+    pub(super) options: Options,
+    pub(super) output: Output,
+    catalogues: BTreeMap<NodeId, Catalogue>,
+}
+
+impl Session {
+    /// Goes on the bus of the options.
+    ///
+    /// # Errors
+    /// The bus cannot be opened.
+    pub fn open(options: &Options, output: Output) -> Result<Session, Failure> {
+        let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
+        let network = Network::open(move || address.open(bit_rate))?;
+        Ok(Session::with(network, options, output))
+    }
+
+    /// On a bus that is open.
+    #[must_use]
+    pub fn with(network: Network, options: &Options, output: Output) -> Session {
+        Session { network, options: options.clone(), output, catalogues: BTreeMap::new() }
+    }
+
+    /// The client of a node.
+    pub(super) fn client(&mut self, node: NodeId) -> Client<'_> {
+        Client::new(&mut self.network, node, self.options.sdo())
+    }
+
+    /// What is known about a node: from the file of the options, else by its identity.
+    pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Catalogue, Failure> {
+        if let Some(known) = self.catalogues.get(&node) {
+            return Ok(known.clone());
+        }
+        let catalogue = match self.options.eds.clone() {
+            Some(path) => Catalogue::new(sheet(&path)?),
+            None => self.identify(node)?.unwrap_or_else(Catalogue::unknown),
+        };
+        Ok(self.catalogues.entry(node).or_insert(catalogue).clone())
+    }
+
+    fn identify(&mut self, node: NodeId) -> Result<Option<Catalogue>, Failure> {
+        let (vendor, product) = (self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?);
+        Ok(vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)))
+    }
+
+    /// An UNSIGNED32; `None` where the node has no such object.
+    pub(super) fn word(&mut self, node: NodeId, at: Multiplexer) -> Result<Option<u32>, Failure> {
+        Ok(self.optional(node, at)?.and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes))
+    }
+
+    /// The bytes of an object; `None` where the node does not have it, or not for us.
+    pub(super) fn optional(&mut self, node: NodeId, at: Multiplexer) -> Result<Option<Vec<u8>>, Failure> {
+        match self.client(node).upload(at) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if error.abort().is_some() => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// The object that a person means.
+    pub(super) fn find(&mut self, node: NodeId, query: &str) -> Result<Multiplexer, Failure> {
+        let found = self.catalogue(node)?.find(query);
+        found.map_err(|error| Failure::Usage(error.to_string()))
+    }
+
+    /// The error of a transfer with the name of its object.
+    pub(super) fn named(&mut self, error: sdo::Error) -> Failure {
+        let name = self.catalogues.get(&error.node).and_then(|catalogue| catalogue.name(error.at));
+        sdo::Error { name: error.name.clone().or(name), ..error }.into()
+    }
+
+    /// Prints a result.
+    pub(super) fn print(&mut self, result: &(impl Serialize + Display)) -> Result<(), Failure> {
+        Ok(self.output.print(result)?)
+    }
+}
+
+fn sheet(path: &Path) -> Result<Eds, Failure> {
+    let bytes = fs::read(path).map_err(|error| Failure::file(path, error))?;
+    Eds::from_bytes(&bytes).map_err(|error| Failure::file(path, error))
+}

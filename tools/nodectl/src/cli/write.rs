@@ -1,0 +1,69 @@
+//! `nodectl write`
+
+use std::fs;
+use std::path::PathBuf;
+
+use canopen::sdo::Multiplexer;
+use clap::Args;
+use eds::DataType;
+
+use super::read::{Reading, parse_type};
+use super::{Failure, Session};
+use crate::object::Place;
+use crate::value::Value;
+
+/// Writes an object, and prints what was written.
+#[derive(Debug, Args)]
+pub(super) struct Write {
+    /// Object by index (1017, 0x1018sub1) or by name ("Producer heartbeat time").
+    object: String,
+
+    /// The value: decimal or after 0x hexadecimal; text; bytes as pairs of hexadecimal digits.
+    #[arg(required_unless_present = "file", conflicts_with = "file", allow_hyphen_values = true)]
+    value: Option<String>,
+
+    /// Its data type, where no data sheet tells it: UNSIGNED32 or u32, REAL32 or r32 ...
+    #[arg(long = "type", value_name = "TYPE", value_parser = parse_type)]
+    data_type: Option<DataType>,
+
+    /// Write in blocks.
+    #[arg(long)]
+    block: bool,
+
+    /// The bytes of this file instead of a value.
+    #[arg(long, value_name = "FILE")]
+    file: Option<PathBuf>,
+}
+
+impl Write {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let node = session.options.node.one()?;
+        let at = session.find(node, &self.object)?;
+        let catalogue = session.catalogue(node)?;
+        let data_type = self.data_type.or_else(|| catalogue.data_type(at));
+        let bytes = self.bytes(at, data_type)?;
+        let mut client = session.client(node);
+        let written = if self.block {
+            client.block_download(at, &bytes, |_| ())
+        } else {
+            client.download(at, &bytes, |_| ())
+        };
+        written.map_err(|error| session.named(error))?;
+        let unit = crate::unit::of(&mut session.client(node), &catalogue, at)?;
+        session.print(&Reading::new(node.get(), at, &bytes, &catalogue, unit, data_type))
+    }
+
+    fn bytes(&self, at: Multiplexer, data_type: Option<DataType>) -> Result<Vec<u8>, Failure> {
+        if let Some(path) = &self.file {
+            return fs::read(path).map_err(|error| Failure::file(path, error));
+        }
+        let text = self.value.as_deref().unwrap_or_default();
+        let data_type = data_type.ok_or_else(|| {
+            Failure::Usage(format!("no data sheet tells the type of {}: give it with --type", Place(at)))
+        })?;
+        match Value::parse(text, data_type) {
+            Ok(value) => Ok(value.encode(data_type)),
+            Err(error) => Err(Failure::Usage(format!("{}: {error}", Place(at)))),
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! The host's side of a CANopen bus.
+//!
+//! [`bus`] opens one, over SocketCAN, socketcand or slcan; [`Network`] is what the services share: [`sdo`], [`nmt`],
+//! [`heartbeat`], [`lss`]. On them stand [`update`] (CiA 302-3) and the command line tool of this crate.
+//!
+//! ```no_run
+//! use nodectl::{Network, object, sdo};
+//!
+//! let address: nodectl::bus::Address = "socketcand://127.0.0.1:29536/vcan0".parse()?;
+//! let mut network = Network::open(move || address.open(250))?;
+//! let node = canopen::NodeId::new(1).ok_or("a node-ID")?;
+//! let mut client = sdo::Client::new(&mut network, node, sdo::Options::default());
+//! let device_type = client.upload(object::at(0x1000, 0))?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod acquisition;
+pub mod bus;
+mod catalogue;
+pub mod cli;
+pub mod heartbeat;
+pub mod lss;
+mod network;
+pub mod nmt;
+pub mod object;
+pub mod scan;
+pub mod sdo;
+pub mod tpdo;
+pub mod unit;
+pub mod update;
+pub mod value;
+
+pub use catalogue::Catalogue;
+pub use network::Network;

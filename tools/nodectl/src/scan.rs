@@ -1,0 +1,69 @@
+//! Who is on the bus.
+
+use std::collections::BTreeMap;
+
+use canopen::nmt::State;
+use canopen::sdo::{Request, Response};
+use canopen::{Duration, Frame, NodeId};
+
+use crate::Network;
+use crate::bus::BusError;
+use crate::heartbeat::Heartbeat;
+use crate::object::at;
+
+/// Between two questions, so that no queue on the way overflows.
+const PACE: Duration = Duration::from_millis(2);
+
+/// What was heard of a node.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Presence {
+    /// Its device type (1000h), where it answered.
+    pub device_type: Option<u32>,
+    /// Its state, where a heartbeat was heard.
+    pub state: Option<State>,
+}
+
+/// Asks all node-IDs for their device type and listens this long after the last question.
+///
+/// # Errors
+/// The bus is lost.
+pub fn scan(network: &mut Network, time: Duration) -> Result<BTreeMap<NodeId, Presence>, BusError> {
+    let mut found = BTreeMap::new();
+    for node in (1..=127).filter_map(NodeId::new) {
+        let question = Request::Upload(at(0x1000, 0)).encode();
+        if let Some(frame) = Frame::new(0x600 + u16::from(node.get()), &question) {
+            network.send(&frame)?;
+        }
+        listen(network, PACE, &mut found)?;
+    }
+    listen(network, time, &mut found)?;
+    Ok(found)
+}
+
+fn listen(
+    network: &mut Network,
+    time: Duration,
+    found: &mut BTreeMap<NodeId, Presence>,
+) -> Result<(), BusError> {
+    let until = network.now() + time;
+    network.wait(until, |frame| {
+        if let Some(heartbeat) = Heartbeat::parse(frame) {
+            found.entry(heartbeat.node).or_default().state = Some(heartbeat.state);
+        }
+        if let Some((node, device_type)) = answer(frame) {
+            found.entry(node).or_default().device_type = device_type;
+        }
+        None::<()>
+    })?;
+    Ok(())
+}
+
+/// Who answers and what; an abort is an answer too.
+fn answer(frame: &Frame) -> Option<(NodeId, Option<u32>)> {
+    let node = u8::try_from(frame.id().checked_sub(0x580)?).ok().and_then(NodeId::new)?;
+    let device_type = match Response::parse(frame.data().try_into().ok()?)? {
+        Response::Uploaded(of, bytes) if of == at(0x1000, 0) => Some(u32::from_le_bytes(bytes.padded())),
+        _ => None,
+    };
+    Some((node, device_type))
+}

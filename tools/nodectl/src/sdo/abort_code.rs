@@ -1,0 +1,127 @@
+//! SDO abort codes in words.
+
+use std::fmt;
+
+use canopen::sdo::Abort;
+
+/// Why a server refused or gave up a transfer: any code, also those of other standards and of vendors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AbortCode(pub u32);
+
+/// CiA 301, 7.2.4.3.17.
+#[rustfmt::skip]
+const WORDS: [(u32, &str); 31] = [
+    (0x0503_0000, "toggle bit not alternated"),
+    (0x0504_0000, "SDO protocol timed out"),
+    (0x0504_0001, "command specifier not valid or unknown"),
+    (0x0504_0002, "invalid block size"),
+    (0x0504_0003, "invalid sequence number"),
+    (0x0504_0004, "CRC error"),
+    (0x0504_0005, "out of memory"),
+    (0x0601_0000, "access to this object is not supported"),
+    (0x0601_0001, "attempt to read a write-only object"),
+    (0x0601_0002, "attempt to write a read-only object"),
+    (0x0602_0000, "object does not exist"),
+    (0x0604_0041, "object cannot be mapped into the PDO"),
+    (0x0604_0042, "mapped objects would exceed the PDO length"),
+    (0x0604_0043, "incompatible with another parameter"),
+    (0x0604_0047, "internal incompatibility in the device"),
+    (0x0606_0000, "access failed because of a hardware error"),
+    (0x0607_0010, "length does not match the data type"),
+    (0x0607_0012, "too long for the data type"),
+    (0x0607_0013, "too short for the data type"),
+    (0x0609_0011, "sub-index does not exist"),
+    (0x0609_0030, "invalid value for the parameter"),
+    (0x0609_0031, "value too high"),
+    (0x0609_0032, "value too low"),
+    (0x0609_0036, "maximum is less than minimum"),
+    (0x060A_0023, "resource (SDO connection) not available"),
+    (0x0800_0000, "general error"),
+    (0x0800_0020, "data cannot be transferred or stored"),
+    (0x0800_0021, "data cannot be transferred or stored because of local control"),
+    (0x0800_0022, "data cannot be transferred or stored in the present device state"),
+    (0x0800_0023, "no object dictionary present"),
+    (0x0800_0024, "no data available"),
+];
+
+impl AbortCode {
+    /// What it means, where CiA 301 says so.
+    #[must_use]
+    pub fn words(self) -> Option<&'static str> {
+        WORDS.iter().find(|row| row.0 == self.0).map(|row| row.1)
+    }
+
+    /// Whether there is no such object or sub-index.
+    #[must_use]
+    pub fn is_absent(self) -> bool {
+        self == Abort::NoObject.into() || self == Abort::NoSubIndex.into()
+    }
+
+    /// Whether the server does not like the protocol and not the value: another kind of transfer may do.
+    #[must_use]
+    pub fn is_protocol(self) -> bool {
+        matches!(self.0 >> 16, 0x0503 | 0x0504)
+    }
+}
+
+impl From<Abort> for AbortCode {
+    fn from(abort: Abort) -> AbortCode {
+        AbortCode(abort.code())
+    }
+}
+
+/// `0609 0030h, invalid value for the parameter`
+impl fmt::Display for AbortCode {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let words = self.words().unwrap_or("a code that CiA 301 does not define");
+        write!(f, "{:04X} {:04X}h, {words}", self.0 >> 16, self.0 & 0xFFFF)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_is_sorted_without_doubles() {
+        assert!(WORDS.is_sorted_by(|a, b| a.0 < b.0));
+    }
+
+    #[test]
+    fn a_code_in_words() {
+        assert_eq!(AbortCode(0x0609_0030).to_string(), "0609 0030h, invalid value for the parameter");
+        assert_eq!(AbortCode(0x1234_5678).to_string(), "1234 5678h, a code that CiA 301 does not define");
+    }
+
+    #[test]
+    fn every_code_of_our_server_has_words() {
+        for abort in [
+            Abort::Toggle,
+            Abort::TimeOut,
+            Abort::Command,
+            Abort::BlockSize,
+            Abort::Sequence,
+            Abort::Crc,
+            Abort::Access,
+            Abort::WriteOnly,
+            Abort::ReadOnly,
+            Abort::NoObject,
+            Abort::NotMappable,
+            Abort::PdoLength,
+            Abort::Parameter,
+            Abort::Length,
+            Abort::TooLong,
+            Abort::TooShort,
+            Abort::NoSubIndex,
+            Abort::InvalidValue,
+            Abort::ValueTooHigh,
+            Abort::ValueTooLow,
+            Abort::General,
+            Abort::NotStored,
+            Abort::DeviceState,
+            Abort::NoData,
+        ] {
+            assert!(AbortCode::from(abort).words().is_some(), "{abort:?}");
+        }
+    }
+}

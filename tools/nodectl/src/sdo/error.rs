@@ -1,0 +1,91 @@
+//! What goes wrong with a transfer, and with which.
+
+use std::fmt;
+
+use canopen::NodeId;
+use canopen::sdo::{Abort, Multiplexer};
+use thiserror::Error;
+
+use super::AbortCode;
+use crate::bus::BusError;
+use crate::object::Place;
+
+/// A transfer that failed.
+#[derive(Debug, Error)]
+pub struct Error {
+    /// The node.
+    pub node: NodeId,
+    /// The object.
+    pub at: Multiplexer,
+    /// Its name, where it is known.
+    pub name: Option<String>,
+    /// Why.
+    #[source]
+    pub cause: Cause,
+}
+
+/// Why a transfer failed.
+#[derive(Debug, Error)]
+pub enum Cause {
+    /// The server refused or gave up.
+    #[error("{0}")]
+    Abort(AbortCode),
+    /// The server said nothing in time.
+    #[error("no answer")]
+    NoAnswer,
+    /// The server said what the protocol does not allow here.
+    #[error("the node answers against the protocol")]
+    Unexpected,
+    /// A block upload arrived with another CRC.
+    #[error("the data arrived with a CRC error")]
+    Crc,
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
+
+impl Cause {
+    /// What the client tells the server when it gives up; `None` where the server knows or nobody hears it.
+    pub(super) fn abort(&self) -> Option<Abort> {
+        match self {
+            Cause::Abort(_) | Cause::Bus(_) => None,
+            Cause::NoAnswer => Some(Abort::TimeOut),
+            Cause::Unexpected => Some(Abort::Command),
+            Cause::Crc => Some(Abort::Crc),
+        }
+    }
+}
+
+impl Error {
+    /// The abort code, where the server refused.
+    #[must_use]
+    pub fn abort(&self) -> Option<AbortCode> {
+        match self.cause {
+            Cause::Abort(code) => Some(code),
+            _ => None,
+        }
+    }
+
+    /// Whether the node has no such object.
+    #[must_use]
+    pub fn is_absent(&self) -> bool {
+        self.abort().is_some_and(AbortCode::is_absent)
+    }
+
+    /// Whether the node or the bus was not there: later it may work.
+    #[must_use]
+    pub fn is_silence(&self) -> bool {
+        matches!(self.cause, Cause::NoAnswer | Cause::Bus(BusError::Lost(_)))
+    }
+}
+
+/// `node 5, 1017h:0 "Producer heartbeat time": 0609 0030h, invalid value for the parameter`
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "node {}, {}", self.node.get(), Place(self.at))?;
+        if let Some(name) = &self.name {
+            write!(f, " \"{name}\"")?;
+        }
+        write!(f, ": {}", self.cause)
+    }
+}

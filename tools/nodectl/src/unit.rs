@@ -1,0 +1,71 @@
+//! Physical units (CiA 303-2), where an object of the node tells them.
+
+use canopen::sdo::Multiplexer;
+
+use crate::Catalogue;
+use crate::object::at;
+use crate::sdo::{Client, Error};
+
+/// The unit of a value: what the data sheet says, or what the object says that it names (6131h in CiA 404).
+///
+/// # Errors
+/// Those of SDO, but for a node that has no such object.
+pub fn of(client: &mut Client, catalogue: &Catalogue, of: Multiplexer) -> Result<String, Error> {
+    let unit = catalogue.unit(of);
+    let Some(told_by) = eds::address(unit) else { return Ok(unit.to_owned()) };
+    match client.upload(at(told_by.index, of.sub)) {
+        Ok(bytes) => {
+            Ok(bytes.try_into().map_or_else(|_| String::new(), |bytes| symbol(u32::from_le_bytes(bytes))))
+        }
+        Err(error) if error.abort().is_some() => Ok(String::new()),
+        Err(error) => Err(error),
+    }
+}
+
+/// The symbol of a code: unit in bits 16 to 23, prefix as a power of ten in bits 24 to 31.
+#[must_use]
+pub fn symbol(code: u32) -> String {
+    let [_, _, unit, prefix] = code.to_le_bytes();
+    let name = match unit {
+        0x05 => "K",
+        0x22 => "Pa",
+        0x2D => "\u{b0}C",
+        0x4E => "bar",
+        // Codes that CiA leaves to profiles, as CiA 404 uses them.
+        0xA0 => "mmHg",
+        0xA1 => "at",
+        0xA2 => "mmH2O",
+        0xA4 => "atm",
+        0xAB => "psi",
+        0xAC => "\u{b0}F",
+        _ => return format!("unit {code:08X}h"),
+    };
+    let prefix = match i8::from_le_bytes([prefix]) {
+        0 => String::new(),
+        -6 => "u".to_owned(),
+        -3 => "m".to_owned(),
+        3 => "k".to_owned(),
+        6 => "M".to_owned(),
+        power => format!("10^{power} "),
+    };
+    prefix + name
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_in_symbols() {
+        for (code, text) in [
+            (0x004E_0000, "bar"),
+            (0xFD4E_0000, "mbar"),
+            (0x0322_0000, "kPa"),
+            (0x002D_0000, "\u{b0}C"),
+            (0x0222_0000, "10^2 Pa"),
+            (0x0001_0000, "unit 00010000h"),
+        ] {
+            assert_eq!(symbol(code), text);
+        }
+    }
+}

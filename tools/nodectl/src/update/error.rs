@@ -1,0 +1,87 @@
+//! Why a node was not updated.
+
+use canopen::NodeId;
+use thiserror::Error;
+
+use super::Status;
+use crate::bus::BusError;
+use crate::sdo;
+
+/// Why a node was not updated. Unless it says otherwise, the node can be reached and tried again.
+#[derive(Debug, Error)]
+pub enum Error {
+    /// A transfer failed.
+    #[error(transparent)]
+    Sdo(#[from] sdo::Error),
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The image is for another product. Nothing was changed.
+    #[error("node {}: the image is for product {image:08X}h, the node is product {device:08X}h", .node.get())]
+    Product {
+        /// The node.
+        node: NodeId,
+        /// Product code of the image.
+        image: u32,
+        /// Product code of the node, 1018h:2.
+        device: u32,
+    },
+    /// The node runs something newer. Nothing was changed.
+    #[error("node {}: the node runs version {device}, which is newer than {image}", .node.get())]
+    Older {
+        /// The node.
+        node: NodeId,
+        /// Version of the image.
+        image: String,
+        /// Version of the node, 100Ah.
+        device: String,
+    },
+    /// The node did not take the program: 1F57h.
+    #[error("node {}, 1F57h:1 \"Flash status identification\": {status}", .node.get())]
+    Flash {
+        /// The node.
+        node: NodeId,
+        /// What the node says.
+        status: Status,
+    },
+    /// The node has another program than it was given: 1F56h.
+    #[error(
+        "node {}, 1F56h:1 \"Program software identification\": {found:08X}h after the download, not {expected:08X}h",
+        .node.get()
+    )]
+    Identification {
+        /// The node.
+        node: NodeId,
+        /// Of the image.
+        expected: u32,
+        /// Of the node.
+        found: u32,
+    },
+    /// The node did not stop, start or finish in time.
+    #[error("node {}: it does not {what}", .node.get())]
+    Stuck {
+        /// The node.
+        node: NodeId,
+        /// What it does not do.
+        what: &'static str,
+    },
+    /// The node went away and did not come back.
+    #[error("node {}: lost, and not back within {patience} s", .node.get())]
+    Lost {
+        /// The node.
+        node: NodeId,
+        /// How long was waited, in seconds.
+        patience: u64,
+    },
+}
+
+impl Error {
+    /// Whether the node or the bus went away: going on may help.
+    pub(super) fn is_silence(&self) -> bool {
+        match self {
+            Error::Sdo(error) => error.is_silence(),
+            Error::Bus(error) => matches!(error, BusError::Lost(_)),
+            _ => false,
+        }
+    }
+}

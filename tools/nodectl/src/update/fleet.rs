@@ -1,0 +1,34 @@
+//! Many nodes, one after the other: the bus is the limit.
+
+use std::collections::VecDeque;
+
+use canopen::{Duration, NodeId};
+
+use super::job::Job;
+use super::{Error, Image, Options, Outcome, Watcher};
+use crate::Network;
+
+/// How long a lost node may stay away while others wait for their turn. It gets another one after them.
+const SHORT: Duration = Duration::from_millis(5000);
+
+/// Updates nodes. One that fails does not keep the others from it; one that is lost is gone on with at the end.
+pub fn update(
+    network: &mut Network,
+    nodes: &[NodeId],
+    image: &Image,
+    options: &Options,
+    watcher: &mut dyn Watcher,
+) -> Vec<(NodeId, Result<Outcome, Error>)> {
+    let mut jobs: VecDeque<(Job, bool)> =
+        nodes.iter().map(|&node| (Job::new(node, image, options), false)).collect();
+    let mut results = Vec::new();
+    while let Some((mut job, is_second)) = jobs.pop_front() {
+        let can_wait = !is_second && !jobs.is_empty();
+        let patience = if can_wait { options.patience.min(SHORT) } else { options.patience };
+        match job.run(network, patience, watcher) {
+            Err(Error::Lost { .. }) if can_wait => jobs.push_back((job, true)),
+            result => results.push((job.node, result)),
+        }
+    }
+    results
+}

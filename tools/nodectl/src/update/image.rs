@@ -1,0 +1,128 @@
+//! The file with the new program.
+
+use ::update::{HEADER_LEN, Header, Version};
+use crc::{CRC_32_ISO_HDLC, Crc};
+use thiserror::Error;
+
+/// A file that is no image, or no longer a whole one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum ImageError {
+    /// It does not begin with the header of an image.
+    #[error("it is no image of this project: {0}")]
+    Header(::update::Refusal),
+    /// It has another length than its header says.
+    #[error("it has {found} bytes and should have {expected}")]
+    Length {
+        /// What the header says.
+        expected: usize,
+        /// What there is.
+        found: usize,
+    },
+    /// Its content is not what the header says.
+    #[error("its checksum is wrong")]
+    Checksum,
+}
+
+/// The new program, as it is downloaded.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// The content of the file.
+    pub bytes: Vec<u8>,
+    /// What it says of itself; `None` for one of a format that is not known here.
+    pub info: Option<ImageInfo>,
+}
+
+/// What an image says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageInfo {
+    /// The product that it is for, 1018h:2.
+    pub product: u32,
+    /// Its version.
+    pub version: Version,
+    /// What 1F56h:1 reads once the node has it.
+    pub identification: u32,
+}
+
+impl Image {
+    /// An image of this project, which must be whole. Whether its signature is good, the node decides.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(bytes: Vec<u8>) -> Result<Image, ImageError> {
+        let info = info(&bytes)?;
+        Ok(Image { bytes, info: Some(info) })
+    }
+
+    /// An image of any format: nothing about it can be checked here.
+    #[must_use]
+    pub fn opaque(bytes: Vec<u8>) -> Image {
+        Image { bytes, info: None }
+    }
+}
+
+fn info(bytes: &[u8]) -> Result<ImageInfo, ImageError> {
+    let short = ImageError::Length { expected: HEADER_LEN, found: bytes.len() };
+    let (head, code) = bytes.split_first_chunk::<HEADER_LEN>().ok_or(short)?;
+    let header = Header::parse(head).map_err(ImageError::Header)?;
+    let expected = HEADER_LEN + header.length() as usize;
+    if bytes.len() != expected {
+        return Err(ImageError::Length { expected, found: bytes.len() });
+    }
+    if Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(code) != header.code_crc() {
+        return Err(ImageError::Checksum);
+    }
+    let description = header.description();
+    let identification = header.code_crc();
+    Ok(ImageInfo { product: description.product, version: description.version, identification })
+}
+
+/// The version that a node tells in 100Ah: three numbers, and anything after them.
+pub(super) fn version(text: &str) -> Option<Version> {
+    let numbers = text.split(|c: char| c != '.' && !c.is_ascii_digit()).next()?;
+    let mut numbers = numbers.split('.').map(|number| number.parse().ok());
+    Some(Version { major: numbers.next()??, minor: numbers.next()??, patch: numbers.next()?? })
+}
+
+#[cfg(test)]
+mod tests {
+    use ::update::Description;
+
+    use super::*;
+
+    const VERSION: Version = Version { major: 1, minor: 2, patch: 3 };
+
+    fn file() -> Vec<u8> {
+        let description = Description { product: 1, hardware: 1, version: VERSION, counter: 0 };
+        let code = [0x5A; 100];
+        let header = Header::describe(description, &code).expect("a header");
+        [header.encode().as_slice(), &code].concat()
+    }
+
+    #[test]
+    fn a_whole_image_tells_what_it_is() {
+        let info = Image::parse(file()).unwrap().info.unwrap();
+        assert_eq!((info.product, info.version), (1, VERSION));
+    }
+
+    #[test]
+    fn anything_else_is_told_before_it_gets_on_the_bus() {
+        let mut wrong = file();
+        wrong[600] ^= 1;
+        assert_eq!(Image::parse(wrong).unwrap_err(), ImageError::Checksum);
+        let mut wrong = file();
+        wrong[0] ^= 1;
+        assert!(matches!(Image::parse(wrong), Err(ImageError::Header(_))));
+        let short = Image::parse(file()[..611].to_vec()).unwrap_err();
+        assert_eq!(short.to_string(), "it has 611 bytes and should have 612");
+        assert!(matches!(Image::parse(vec![1, 2, 3]), Err(ImageError::Length { expected: 512, found: 3 })));
+    }
+
+    #[test]
+    fn versions_as_nodes_tell_them() {
+        assert_eq!(version("1.2.3"), Some(VERSION));
+        assert_eq!(version("1.2.3-rc1 (abcdef)"), Some(VERSION));
+        for text in ["", "1.2", "v1.2.3", "loader 1", "1.2.x", "70000.1.1"] {
+            assert_eq!(version(text), None, "{text}");
+        }
+    }
+}

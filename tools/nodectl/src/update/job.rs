@@ -1,0 +1,322 @@
+//! The update of one node. What it has learned survives the loss of the node, so that it can be gone on with.
+
+use canopen::sdo::Multiplexer;
+use canopen::{Duration, NodeId};
+
+use super::image::version;
+use super::{Command, Error, Image, Program, Status, Step, Watcher};
+use crate::bus::BusError;
+use crate::object::at;
+use crate::sdo::{self, Client};
+use crate::{Network, value};
+
+/// Between two questions to a node that is busy.
+const POLL: Duration = Duration::from_millis(100);
+/// How long a node may take to restart.
+const RESTART: Duration = Duration::from_millis(15_000);
+/// How long it may take to erase, or to check.
+const FLASH: Duration = Duration::from_millis(60_000);
+/// How often clearing is tried.
+const CLEARS: usize = 3;
+/// How often one run goes on with a node that was lost.
+const RESUMES: usize = 10;
+
+/// How an update is done.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// How patient the transfers are.
+    pub sdo: sdo::Options,
+    /// How long a node that is lost may stay away.
+    pub patience: Duration,
+    /// Update also where the node runs this program already, or a newer one.
+    pub force: bool,
+}
+
+/// What has become of a node.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// Version before (100Ah), where a program ran.
+    pub old_version: Option<String>,
+    /// Identification before (1F56h).
+    pub old_identification: Option<u32>,
+    /// Version now.
+    pub new_version: Option<String>,
+    /// Identification now.
+    pub new_identification: Option<u32>,
+    /// Whether something was downloaded: the node had this program already if not.
+    pub is_changed: bool,
+}
+
+/// A program as it is on a node.
+#[derive(Clone, Debug, Default)]
+struct State {
+    is_running: bool,
+    version: Option<String>,
+    identification: Option<u32>,
+    /// What the loader says of it.
+    is_valid: bool,
+}
+
+/// How far a job has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    /// The node is as it was.
+    Untouched,
+    /// The old program is gone.
+    Cleared,
+    /// The new program has arrived and is good.
+    Complete,
+}
+
+/// The update of one node.
+pub(super) struct Job<'a> {
+    pub(super) node: NodeId,
+    image: &'a Image,
+    options: &'a Options,
+    before: Option<State>,
+    progress: Progress,
+}
+
+impl<'a> Job<'a> {
+    pub(super) fn new(node: NodeId, image: &'a Image, options: &'a Options) -> Job<'a> {
+        Job { node, image, options, before: None, progress: Progress::Untouched }
+    }
+
+    /// Does it, and goes on when the node was away for no longer than `patience`.
+    pub(super) fn run(
+        &mut self,
+        network: &mut Network,
+        patience: Duration,
+        watcher: &mut dyn Watcher,
+    ) -> Result<Outcome, Error> {
+        let mut resumes = RESUMES;
+        loop {
+            match self.attempt(network, watcher) {
+                // What was never there is not lost.
+                Err(error) if error.is_silence() && self.before.is_some() && resumes > 0 => {
+                    resumes -= 1;
+                    watcher.step(self.node, Step::Lost);
+                    self.wait_for_return(network, patience)?;
+                    watcher.step(self.node, Step::Back);
+                }
+                result => return result,
+            }
+        }
+    }
+
+    /// Brings the node from any state to the new program.
+    fn attempt(&mut self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<Outcome, Error> {
+        watcher.step(self.node, Step::Identify);
+        let now = self.state(network)?;
+        if self.before.is_none() {
+            self.check(network, &now)?;
+            self.before = Some(now.clone());
+        }
+        let is_there = self.is_there(&now);
+        if !is_there {
+            self.replace(network, now.is_running, watcher)?;
+        }
+        if !(is_there && now.is_running) {
+            watcher.step(self.node, Step::Start);
+            self.program(network).restart(Command::Start)?;
+            self.wait_until_running(network, true, "start the new program")?;
+        }
+        let after = self.state(network)?;
+        Ok(self.outcome(after))
+    }
+
+    /// Refuses what would do harm, before anything is changed.
+    fn check(&self, network: &mut Network, now: &State) -> Result<(), Error> {
+        let Some(info) = &self.image.info else { return Ok(()) };
+        let device = self.word(network, at(0x1018, 2))?;
+        if device != info.product {
+            return Err(Error::Product { node: self.node, image: info.product, device });
+        }
+        let running = now.version.as_deref().and_then(version);
+        match &now.version {
+            Some(device) if running > Some(info.version) && !self.options.force => {
+                Err(Error::Older { node: self.node, image: info.version.to_string(), device: device.clone() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Puts the new program into the place of the old one.
+    fn replace(
+        &mut self,
+        network: &mut Network,
+        is_running: bool,
+        watcher: &mut dyn Watcher,
+    ) -> Result<(), Error> {
+        if is_running {
+            watcher.step(self.node, Step::Stop);
+            self.program(network).restart(Command::Stop)?;
+            self.wait_until_running(network, false, "stop its program")?;
+        }
+        self.progress = Progress::Cleared;
+        self.clear(network, watcher)?;
+        self.download(network, watcher)?;
+        watcher.step(self.node, Step::Verify);
+        self.wait_for_flash(network, is_good)?;
+        self.compare(network)?;
+        self.progress = Progress::Complete;
+        Ok(())
+    }
+
+    fn compare(&self, network: &mut Network) -> Result<(), Error> {
+        match (&self.image.info, self.program(network).identification()?) {
+            (Some(info), Some(found)) if found != info.identification => {
+                Err(Error::Identification { node: self.node, expected: info.identification, found })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Clears the program. Some nodes are still busy with themselves when they are asked first.
+    fn clear(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+        watcher.step(self.node, Step::Clear);
+        let mut tries = CLEARS;
+        while let Err(error) = self.program(network).command(Command::Clear) {
+            tries -= 1;
+            if tries == 0 || error.abort().is_none() {
+                return Err(error.into());
+            }
+            network.pause(POLL)?;
+        }
+        self.wait_for_flash(network, is_cleared)
+    }
+
+    /// In blocks; in segments where the node does not know those.
+    fn download(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+        let (node, total) = (self.node, self.image.bytes.len());
+        watcher.step(node, Step::Download);
+        let mut arrived = 0;
+        let blocks = self.program(network).download_blocks(&self.image.bytes, |done| {
+            arrived = done;
+            watcher.progress(node, done, total);
+        });
+        match blocks {
+            Err(error) if error.abort().is_some_and(sdo::AbortCode::is_protocol) => (),
+            result => return Ok(result?),
+        }
+        if arrived > 0 {
+            self.clear(network, watcher)?;
+        }
+        watcher.step(node, Step::DownloadSegments);
+        let progress = |done| watcher.progress(node, done, total);
+        Ok(self.program(network).download_segments(&self.image.bytes, progress)?)
+    }
+
+    /// Waits until the flash is no longer busy, and then for nothing but a status that `is_fine`.
+    fn wait_for_flash(&self, network: &mut Network, is_fine: impl Fn(Status) -> bool) -> Result<(), Error> {
+        let until = network.now() + FLASH;
+        while network.now() < until {
+            match self.program(network).status()? {
+                Some(status) if status.busy => network.pause(POLL)?,
+                Some(status) if !is_fine(status) => return Err(Error::Flash { node: self.node, status }),
+                _ => return Ok(()),
+            }
+        }
+        Err(Error::Stuck { node: self.node, what: "get done with its flash" })
+    }
+
+    /// Waits for the node to be back from a restart.
+    fn wait_until_running(
+        &self,
+        network: &mut Network,
+        wanted: bool,
+        what: &'static str,
+    ) -> Result<(), Error> {
+        let until = network.now() + RESTART;
+        while network.now() < until {
+            match self.program(network).is_running() {
+                Ok(is_running) if is_running == wanted => return Ok(()),
+                Err(error) if !error.is_silence() => return Err(error.into()),
+                _ => network.pause(POLL)?,
+            }
+        }
+        Err(Error::Stuck { node: self.node, what })
+    }
+
+    /// Waits for a node that is lost; opens the bus again when it is that.
+    fn wait_for_return(&self, network: &mut Network, patience: Duration) -> Result<(), Error> {
+        let until = network.now() + patience;
+        loop {
+            match self.program(network).is_running() {
+                Ok(_) => return Ok(()),
+                Err(sdo::Error { cause: sdo::Cause::Bus(BusError::Lost(_)), .. }) => reopen(network),
+                Err(error) if error.is_silence() => network.pause(POLL)?,
+                Err(error) => return Err(error.into()),
+            }
+            if network.now() >= until {
+                return Err(Error::Lost { node: self.node, patience: patience.0 / 1_000_000 });
+            }
+        }
+    }
+
+    fn state(&self, network: &mut Network) -> Result<State, Error> {
+        let is_running = self.program(network).is_running()?;
+        let identification = self.program(network).identification()?;
+        // The version of a loader is not that of the program.
+        let version = if is_running { self.text(network, at(0x100A, 0))? } else { None };
+        let is_valid = is_running || self.program(network).status()?.is_none_or(is_good);
+        Ok(State { is_running, version, identification, is_valid })
+    }
+
+    fn outcome(&self, after: State) -> Outcome {
+        let before = self.before.clone().unwrap_or_default();
+        Outcome {
+            old_version: before.version,
+            old_identification: before.identification,
+            new_version: after.version,
+            new_identification: after.identification,
+            is_changed: self.progress != Progress::Untouched,
+        }
+    }
+
+    /// Whether the node has the new program. A forced update finds it there after it has downloaded it.
+    fn is_there(&self, now: &State) -> bool {
+        let is_complete = self.progress == Progress::Complete;
+        match &self.image.info {
+            Some(info) => {
+                let is_it = now.is_valid && now.identification == Some(info.identification);
+                is_it && (is_complete || !self.options.force)
+            }
+            None => is_complete,
+        }
+    }
+
+    fn text(&self, network: &mut Network, at: Multiplexer) -> Result<Option<String>, Error> {
+        match Client::new(network, self.node, self.options.sdo).upload(at) {
+            Ok(bytes) => Ok(Some(value::text(&bytes))),
+            Err(error) if error.is_absent() => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn word(&self, network: &mut Network, at: Multiplexer) -> Result<u32, Error> {
+        let bytes = Client::new(network, self.node, self.options.sdo).upload(at)?;
+        Ok(bytes.try_into().map_or(0, u32::from_le_bytes))
+    }
+
+    fn program<'n>(&self, network: &'n mut Network) -> Program<'n> {
+        Program::new(network, self.node, self.options.sdo)
+    }
+}
+
+/// A bus that cannot be opened may be there later; the time to wait is the caller's.
+fn reopen(network: &mut Network) {
+    if network.reopen().is_err() {
+        std::thread::sleep(std::time::Duration::from_micros(POLL.0));
+    }
+}
+
+/// Whether there is a program that can be started.
+fn is_good(status: Status) -> bool {
+    status == Status::GOOD
+}
+
+/// Whether it is that of a flash without a program: nothing wrong, or no valid program.
+fn is_cleared(status: Status) -> bool {
+    !status.busy && status.code <= 1
+}

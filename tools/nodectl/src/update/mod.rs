@@ -1,0 +1,20 @@
+//! Replaces the program of nodes over the bus (CiA 302-3).
+//!
+//! The sequence is what masters in the field do: stop the program, clear it, download the new one, wait until the node
+//! has checked it, compare its identification, start it. Stopping and starting need not be acknowledged: the node
+//! restarts, and answers in its new state.
+
+mod error;
+mod fleet;
+mod image;
+mod job;
+mod program;
+mod watcher;
+
+pub use ::update::{Status, Version};
+pub use error::Error;
+pub use fleet::update;
+pub use image::{Image, ImageError, ImageInfo};
+pub use job::{Options, Outcome};
+pub use program::{Command, Program};
+pub use watcher::{Step, Watcher};

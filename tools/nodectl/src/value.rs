@@ -1,0 +1,237 @@
+//! Values: from bytes to text and back, by data type.
+
+use std::fmt;
+
+use eds::{Class, DataType};
+use serde::{Serialize, Serializer};
+use thiserror::Error;
+
+const UNICODE_STRING: DataType = DataType(0x0B);
+const VISIBLE_STRING: DataType = DataType(0x09);
+
+/// A value of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Of an integer type or BOOLEAN.
+    Integer(i128),
+    /// Of REAL32.
+    Real32(f32),
+    /// Of REAL64.
+    Real64(f64),
+    /// Of a string type.
+    Text(String),
+    /// Of any other type, or of none that fits.
+    Bytes(Vec<u8>),
+}
+
+/// A text that is no value of its type.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("\"{text}\" is not {expected}")]
+pub struct ValueError {
+    text: String,
+    expected: String,
+}
+
+impl Value {
+    /// The value in these bytes. More bytes than the type has are cut; fewer are shown as they are.
+    #[must_use]
+    pub fn decode(bytes: &[u8], data_type: DataType) -> Value {
+        let number = |class| decode_number(bytes, class).unwrap_or_else(|| Value::Bytes(bytes.to_vec()));
+        match data_type.class() {
+            Class::Text if data_type == UNICODE_STRING => Value::Text(decode_utf16(bytes)),
+            Class::Text => Value::Text(text(bytes)),
+            Class::Bytes => Value::Bytes(bytes.to_vec()),
+            class => number(class),
+        }
+    }
+
+    /// Reads a value of a type.
+    ///
+    /// Integers are decimal, or hexadecimal after `0x`. Bytes are pairs of hexadecimal digits, apart or not.
+    ///
+    /// # Errors
+    /// When it is none, or out of the range of the type.
+    pub fn parse(text: &str, data_type: DataType) -> Result<Value, ValueError> {
+        let value = match data_type.class() {
+            Class::Signed(bits) => integer(text, -(1 << (bits - 1)), (1 << (bits - 1)) - 1),
+            Class::Unsigned(1) => boolean(text),
+            Class::Unsigned(bits) => integer(text, 0, (1 << bits) - 1),
+            Class::Real(32) => text.trim().parse().ok().map(Value::Real32),
+            Class::Real(_) => text.trim().parse().ok().map(Value::Real64),
+            Class::Text => Some(Value::Text(text.to_owned())),
+            Class::Bytes => hex_bytes(text).map(Value::Bytes),
+        };
+        value.ok_or_else(|| ValueError { text: text.to_owned(), expected: expected(data_type) })
+    }
+
+    /// The bytes of the value of a type. It must be one: [`parse`](Value::parse) makes none that is not.
+    #[must_use]
+    pub fn encode(&self, data_type: DataType) -> Vec<u8> {
+        match self {
+            Value::Integer(value) => value.to_le_bytes()[..size(data_type.class())].to_vec(),
+            Value::Real32(value) => value.to_le_bytes().to_vec(),
+            Value::Real64(value) => value.to_le_bytes().to_vec(),
+            Value::Text(text) if data_type == UNICODE_STRING => {
+                text.encode_utf16().flat_map(u16::to_le_bytes).collect()
+            }
+            Value::Text(text) => text.as_bytes().to_vec(),
+            Value::Bytes(bytes) => bytes.clone(),
+        }
+    }
+
+    /// As a number, for plots. `None` for texts and bytes.
+    #[must_use]
+    pub fn as_f64(&self) -> Option<f64> {
+        match self {
+            #[allow(clippy::cast_precision_loss)] // A plot has fewer points than f64 has digits.
+            Value::Integer(value) => Some(*value as f64),
+            Value::Real32(value) => Some(f64::from(*value)),
+            Value::Real64(value) => Some(*value),
+            Value::Text(_) | Value::Bytes(_) => None,
+        }
+    }
+}
+
+/// Bytes that a number has.
+fn size(class: Class) -> usize {
+    match class {
+        Class::Signed(bits) | Class::Unsigned(bits) | Class::Real(bits) => usize::from(bits).div_ceil(8),
+        Class::Text | Class::Bytes => 0,
+    }
+}
+
+fn decode_number(bytes: &[u8], class: Class) -> Option<Value> {
+    let bytes = bytes.get(..size(class))?;
+    match class {
+        Class::Real(32) => Some(Value::Real32(f32::from_le_bytes(bytes.try_into().ok()?))),
+        Class::Real(_) => Some(Value::Real64(f64::from_le_bytes(bytes.try_into().ok()?))),
+        Class::Unsigned(1) => Some(Value::Integer((bytes != [0]).into())),
+        Class::Signed(_) => Some(Value::Integer(extend(bytes, bytes.last()? & 0x80 != 0))),
+        _ => Some(Value::Integer(extend(bytes, false))),
+    }
+}
+
+/// A little-endian integer of up to 16 bytes.
+fn extend(bytes: &[u8], is_negative: bool) -> i128 {
+    let mut word = [if is_negative { 0xFF } else { 0 }; 16];
+    word[..bytes.len()].copy_from_slice(bytes);
+    i128::from_le_bytes(word)
+}
+
+/// The text in the bytes of a `VISIBLE_STRING`. Some devices fill theirs with zeros.
+#[must_use]
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned()
+}
+
+fn decode_utf16(bytes: &[u8]) -> String {
+    let units: Vec<u16> = bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+    String::from_utf16_lossy(&units).trim_end_matches('\0').to_owned()
+}
+
+fn boolean(text: &str) -> Option<Value> {
+    match text.trim() {
+        "true" | "1" => Some(Value::Integer(1)),
+        "false" | "0" => Some(Value::Integer(0)),
+        _ => None,
+    }
+}
+
+fn integer(text: &str, low: i128, high: i128) -> Option<Value> {
+    let text = text.trim();
+    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));
+    let lower = digits.to_ascii_lowercase();
+    let (digits, radix) = lower.strip_prefix("0x").map_or((lower.as_str(), 10), |digits| (digits, 16));
+    // `from_str_radix` takes a sign of its own.
+    let is_plain = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let value = i128::from_str_radix(digits, radix).ok().filter(|_| is_plain)?.checked_mul(sign)?;
+    (low..=high).contains(&value).then_some(Value::Integer(value))
+}
+
+/// Pairs of hexadecimal digits, apart or not.
+fn hex_bytes(text: &str) -> Option<Vec<u8>> {
+    let digits: String = text.split_ascii_whitespace().collect();
+    let is_plain = digits.len().is_multiple_of(2) && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let pair = |number: usize| u8::from_str_radix(&digits[2 * number..2 * number + 2], 16).ok();
+    is_plain.then(|| (0..digits.len() / 2).map(pair).collect())?
+}
+
+fn expected(data_type: DataType) -> String {
+    match data_type.class() {
+        Class::Signed(bits) => {
+            format!("a whole number from {} to {}", -(1_i128 << (bits - 1)), (1_i128 << (bits - 1)) - 1)
+        }
+        Class::Unsigned(1) => "true or false".to_owned(),
+        Class::Unsigned(bits) => format!("a whole number from 0 to {}", (1_i128 << bits) - 1),
+        Class::Real(_) => "a number".to_owned(),
+        Class::Text => "text".to_owned(),
+        Class::Bytes => "pairs of hexadecimal digits".to_owned(),
+    }
+}
+
+/// The data type of a name, in any case: `UNSIGNED32` as in CiA 301, or `u32`, `i16`, `r32`, `r64`, `b`, `vs`, `os`,
+/// `us`, `d` as in CiA 309.
+#[must_use]
+pub fn data_type(name: &str) -> Option<DataType> {
+    let upper = name.to_ascii_uppercase();
+    let long = match (upper.as_str(), upper.get(1..)) {
+        ("B", _) => "BOOLEAN".to_owned(),
+        ("VS", _) => "VISIBLE_STRING".to_owned(),
+        ("OS", _) => "OCTET_STRING".to_owned(),
+        ("US", _) => "UNICODE_STRING".to_owned(),
+        ("D", _) => "DOMAIN".to_owned(),
+        (text, Some(bits)) if bits.parse::<u8>().is_ok() => match &text[..1] {
+            "U" => format!("UNSIGNED{bits}"),
+            "I" => format!("INTEGER{bits}"),
+            "R" => format!("REAL{bits}"),
+            _ => return None,
+        },
+        _ => upper,
+    };
+    (0..=0x1F).map(DataType).find(|data_type| data_type.to_string() == long)
+}
+
+/// The type that a value of an unknown type looks like: text that is longer than any number, a number of a usual size,
+/// else bytes.
+#[must_use]
+pub fn guess(bytes: &[u8]) -> DataType {
+    let is_text = bytes.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ');
+    match bytes.len() {
+        1 => DataType(0x05),
+        2 => DataType(0x06),
+        4 => DataType(0x07),
+        5.. if is_text => VISIBLE_STRING,
+        8 => DataType(0x1B),
+        _ => DataType::DOMAIN,
+    }
+}
+
+/// Numbers in decimal, bytes in hexadecimal.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Value::Integer(value) => f.pad(&value.to_string()),
+            Value::Real32(value) => f.pad(&value.to_string()),
+            Value::Real64(value) => f.pad(&value.to_string()),
+            Value::Text(text) => f.pad(text),
+            Value::Bytes(bytes) => {
+                let pairs: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+                f.pad(&pairs.join(" "))
+            }
+        }
+    }
+}
+
+/// A number, or a text: bytes in hexadecimal. What is no number (infinite) is null, as JSON has none.
+impl Serialize for Value {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Value::Integer(value) => serializer.serialize_i128(*value),
+            // As f32: its shortest text is what a person calls the number.
+            Value::Real32(value) => serializer.serialize_f32(*value),
+            Value::Real64(value) => serializer.serialize_f64(*value),
+            Value::Text(text) => serializer.serialize_str(text),
+            Value::Bytes(_) => serializer.collect_str(self),
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! A node with a program that can be replaced (CiA 302-3), on the server of crate `canopen`.
+//!
+//! It behaves as devices in the field do: stopping and starting the program is not acknowledged, the node then answers
+//! in its new state; erasing takes time, in which SDO is served.
+
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Object, Rule, Type};
+use canopen::sdo::{Abort, Multiplexer, Response};
+use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Transmit};
+use nodectl::bus::Station;
+
+const PROGRAM: u8 = 1;
+const CONTROL: u8 = 2;
+
+const fn read_only(index: u16, sub: u8, kind: Type) -> Object {
+    Object::new(index, sub, "", kind, Access::ReadOnly)
+}
+
+const ROWS: &[Object] = &[
+    read_only(0x1000, 0, Type::Unsigned32),
+    read_only(0x1001, 0, Type::Unsigned8),
+    Object::new(0x1008, 0, "", Type::VisibleString(32), Access::Const).default(DefaultValue::Text("loader")),
+    read_only(0x100A, 0, Type::VisibleString(32)),
+    Object::new(0x1017, 0, "", Type::Unsigned16, Access::ReadWrite).rule(Rule::HeartbeatTime),
+    Object::highest(0x1018, 4, ""),
+    read_only(0x1018, 1, Type::Unsigned32).value(7),
+    read_only(0x1018, 2, Type::Unsigned32).value(42),
+    read_only(0x1018, 3, Type::Unsigned32).value(0x0001_0000),
+    read_only(0x1018, 4, Type::Unsigned32).value(99),
+    Object::highest(0x1F50, 1, ""),
+    Object::new(0x1F50, 1, "", Type::Domain, Access::ReadWrite).rule(Rule::Application(PROGRAM)),
+    Object::highest(0x1F51, 1, ""),
+    Object::new(0x1F51, 1, "", Type::Unsigned8, Access::ReadWrite).rule(Rule::Application(CONTROL)),
+    Object::highest(0x1F56, 1, ""),
+    read_only(0x1F56, 1, Type::Unsigned32),
+    Object::highest(0x1F57, 1, ""),
+    read_only(0x1F57, 1, Type::Unsigned32),
+];
+
+const SIZE: usize = dictionary::image_size(ROWS);
+const TABLE: [Object; ROWS.len()] = dictionary::gather(&[ROWS]);
+const ENTRIES: [Entry; ROWS.len()] = dictionary::compile(&TABLE);
+const DEFAULTS: [u8; SIZE] = dictionary::default_image(ROWS);
+const _: () = dictionary::check(ROWS);
+const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+
+/// From a command to the first answer in the new state.
+const RESTART: Duration = Duration::from_millis(200);
+/// Erasing, and checking what was downloaded.
+const ERASE: Duration = Duration::from_millis(1500);
+const CHECK: Duration = Duration::from_millis(100);
+
+/// The program and what the loader knows about it.
+#[derive(Clone, Debug)]
+pub(crate) struct Flash {
+    /// What was downloaded: an image is its version and a newline, then anything.
+    pub(crate) program: Vec<u8>,
+    /// Whether block transfers are understood.
+    pub(crate) has_blocks: bool,
+    /// What 1F57h says after a download; 0 where the program is good.
+    pub(crate) verdict: u32,
+    /// How often it was erased.
+    pub(crate) erased: usize,
+    /// Commands of 1F51h as they came.
+    pub(crate) commands: Vec<u8>,
+    status: u32,
+    busy_until: Instant,
+    runs: bool,
+    /// The state after the restart that is under way.
+    next: Option<bool>,
+    now: Instant,
+}
+
+impl Flash {
+    fn command(&mut self, command: u8) -> Result<(), Abort> {
+        self.commands.push(command);
+        match (command, self.runs) {
+            (0, true) => self.next = Some(false),
+            (0, false) => (),
+            (1, false) if self.program.is_empty() => return Err(Abort::DeviceState),
+            (1, false) => self.next = Some(true),
+            (3, false) => {
+                (self.program, self.status, self.erased) = (Vec::new(), 0, self.erased + 1);
+                self.busy_until = self.now + ERASE;
+            }
+            _ => return Err(Abort::DeviceState),
+        }
+        Ok(())
+    }
+
+    fn version(&self) -> &[u8] {
+        self.program.split(|&byte| byte == b'\n').next().unwrap_or(&[])
+    }
+}
+
+/// What stands in 1F56h: any function of the program will do.
+pub(crate) fn identification(program: &[u8]) -> u32 {
+    program.iter().fold(1, |sum, &byte| sum.wrapping_mul(31).wrapping_add(byte.into()))
+}
+
+impl Application for Flash {
+    fn initialise(&mut self, _: &mut [u8]) {}
+
+    fn write(&mut self, _: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        self.command(bytes[0])
+    }
+
+    fn read_domain(&self, _: u8) -> Result<&[u8], Abort> {
+        Ok(&self.program)
+    }
+
+    fn write_domain(&mut self, _: u8, part: Part<'_>) -> Result<(), Abort> {
+        if self.runs || self.now < self.busy_until {
+            return Err(Abort::DeviceState);
+        }
+        match part {
+            Part::Begin(_) => self.program.clear(),
+            Part::Data(_, bytes) => self.program.extend_from_slice(bytes),
+            Part::End(_) => (self.status, self.busy_until) = (self.verdict, self.now + CHECK),
+        }
+        Ok(())
+    }
+}
+
+/// The node. It can be switched off.
+pub(crate) struct Loader {
+    id: NodeId,
+    device: Device<Flash, SIZE>,
+    /// When it is up again; `NEVER` while it is off.
+    up: Instant,
+    is_started: bool,
+}
+
+impl Loader {
+    /// A node that runs this program.
+    pub(crate) fn new(id: u8, program: &[u8]) -> Loader {
+        let id = NodeId::new(id).expect("a node-ID");
+        let flash = Flash {
+            program: program.to_vec(),
+            has_blocks: true,
+            verdict: 0,
+            erased: 0,
+            commands: Vec::new(),
+            status: 0,
+            busy_until: Instant(0),
+            runs: !program.is_empty(),
+            next: None,
+            now: Instant(0),
+        };
+        Loader { id, device: Device::new(&DICTIONARY, id, flash), up: Instant(0), is_started: false }
+    }
+
+    pub(crate) fn id(&self) -> NodeId {
+        self.id
+    }
+
+    pub(crate) fn flash(&mut self) -> &mut Flash {
+        self.device.application_mut()
+    }
+
+    /// Switches it off until an instant. What was erased or half written stays so.
+    pub(crate) fn switch_off(&mut self, until: Instant) {
+        let runs = self.flash().runs;
+        self.restart(runs, until);
+    }
+
+    fn restart(&mut self, runs: bool, up: Instant) {
+        let flash = Flash { runs, next: None, ..self.flash().clone() };
+        self.device = Device::new(&DICTIONARY, self.id, flash);
+        (self.up, self.is_started) = (up, false);
+    }
+
+    /// Brings the dictionary up to date.
+    fn publish(&mut self, now: Instant) {
+        let flash = self.flash();
+        let device_type = if flash.runs { 0x0002_0194_u32 } else { 0x424F_4F54 };
+        let version = if flash.runs { flash.version().to_vec() } else { b"loader 1".to_vec() };
+        let status = if now < flash.busy_until { 1 } else { flash.status };
+        let identification = if flash.program.is_empty() { 0 } else { identification(&flash.program) };
+        let runs = flash.runs;
+        let image = self.device.image_mut();
+        DICTIONARY.field(0x1000, 0).set(image, &device_type.to_le_bytes());
+        DICTIONARY.field(0x100A, 0).set(image, &version);
+        DICTIONARY.field(0x1F51, 1).set(image, &[u8::from(runs)]);
+        DICTIONARY.field(0x1F56, 1).set(image, &identification.to_le_bytes());
+        DICTIONARY.field(0x1F57, 1).set(image, &status.to_le_bytes());
+    }
+
+    fn understands(&self, frame: &Frame) -> bool {
+        let is_block_download = frame.data().first().is_some_and(|byte| byte >> 5 == 6);
+        self.device.application().has_blocks || !is_block_download
+    }
+}
+
+/// A queue for the answer to one frame.
+#[derive(Default)]
+struct Answers(Vec<Frame>);
+
+impl Transmit for Answers {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.0.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+}
+
+impl Station for Loader {
+    fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        self.poll(now, out);
+        if now < self.up || frame.id() != 0x600 + u16::from(self.id.get()) {
+            return;
+        }
+        self.device.application_mut().now = now;
+        let is_upload = frame.data().first().is_some_and(|byte| byte >> 5 == 2);
+        if is_upload {
+            self.publish(now);
+        }
+        let mut answers = Answers::default();
+        if self.understands(frame) {
+            self.device.on_service_frame(frame, now, &mut answers);
+        } else {
+            let at = Multiplexer { index: 0x1F50, sub: 1 };
+            let refusal = Response::Abort(at, Abort::Command.code()).encode();
+            answers.0.extend(Frame::new(0x580 + u16::from(self.id.get()), &refusal));
+        }
+        // A change of the program is not acknowledged.
+        match self.flash().next {
+            Some(runs) => self.restart(runs, now + RESTART),
+            None => answers.0.into_iter().for_each(|frame| out.send(frame).expect("room")),
+        }
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        if now < self.up {
+            return self.up;
+        }
+        if !std::mem::replace(&mut self.is_started, true) {
+            self.device.start(now, out);
+        }
+        self.device.poll_services(now, out)
+    }
+}

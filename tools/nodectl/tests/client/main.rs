@@ -1,0 +1,11 @@
+//! The library against nodes in this process, in virtual time.
+
+mod blocks;
+mod commands;
+mod loader;
+mod lss;
+mod pressure;
+mod process;
+mod transfers;
+mod update;
+mod wire;

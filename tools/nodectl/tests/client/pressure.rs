@@ -1,0 +1,91 @@
+//! The node of this project on the simulated bus, with its parameter store.
+
+use canopen::{Frame, Instant, NodeId, Transmit};
+use node::{BitRate, Parcel, Personality, Protocol, Request, Setup};
+use nodectl::bus::Station;
+use storage::{Memory, Pages, Store, View};
+
+const PAGES: Pages = Pages::new(0, 4096);
+
+/// A pressure transmitter; it starts at the first poll and restarts when it is told to.
+pub(crate) struct Pressure {
+    setup: Setup,
+    protocol: Protocol,
+    store: Store<Memory<Vec<u8>>>,
+    is_started: bool,
+}
+
+impl Pressure {
+    /// A node as it comes from the factory; `None` for one that waits for LSS.
+    pub(crate) fn new(id: impl Into<Option<u8>>) -> Pressure {
+        let setup = Setup {
+            personality: Personality::Pressure,
+            node_id: id.into().and_then(NodeId::new),
+            bit_rate: BitRate::from_kbit(250).expect("a bit rate"),
+            serial_number: 0x1234_5678,
+            program_id: 0x0BAD_CAFE,
+            hardware_version: "in process",
+            software_version: "1.2.3",
+        };
+        Pressure::with_flash(setup, vec![0xFF; 8192])
+    }
+
+    /// The same with another serial number.
+    pub(crate) fn with_serial(self, serial_number: u32) -> Pressure {
+        Pressure::with_flash(Setup { serial_number, ..self.setup }, self.store.into_flash().0)
+    }
+
+    fn with_flash(setup: Setup, flash: Vec<u8>) -> Pressure {
+        let mut view = View::open(Memory(flash), PAGES).expect("pages");
+        let mut protocol = Protocol::new(&setup);
+        protocol.load(&mut view);
+        Pressure { setup, protocol, store: Store::prepare(view).expect("a store"), is_started: false }
+    }
+
+    fn restart(&mut self) {
+        let view = View::open(Memory(vec![0xFF; 8192]), PAGES).expect("pages");
+        let empty = Store::prepare(view).expect("a store");
+        let flash = std::mem::replace(&mut self.store, empty).into_flash().0;
+        *self = Pressure::with_flash(self.setup, flash);
+    }
+
+    fn serve_requests(&mut self, now: Instant, out: &mut impl Transmit) {
+        while let Some(request) = self.protocol.take_request() {
+            match request {
+                Request::ResetNode => self.restart(),
+                Request::ResetCommunication => self.is_started = false,
+                Request::Store => self.save(now, out),
+                Request::Filters | Request::BitRate(_) | Request::Bootloader => (),
+            }
+        }
+    }
+
+    fn save(&mut self, now: Instant, out: &mut impl Transmit) {
+        let mut parcel = Parcel::new();
+        if self.protocol.pack(&mut parcel) {
+            let result = parcel.deliver(&mut self.store);
+            self.protocol.finish(&parcel, result, now, out);
+        }
+    }
+}
+
+impl Station for Pressure {
+    fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        if self.protocol.process_ids().any(|id| id == frame.id()) {
+            self.protocol.on_process_frame(frame, now, out);
+        }
+        if self.protocol.service_ids().any(|id| id == frame.id()) {
+            self.protocol.on_service_frame(frame, now, out);
+        }
+        self.serve_requests(now, out);
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        if !std::mem::replace(&mut self.is_started, true) {
+            self.protocol.start(now, out);
+            self.serve_requests(now, out);
+        }
+        let process = self.protocol.poll_process(now, out);
+        process.min(self.protocol.poll_services(now, out))
+    }
+}

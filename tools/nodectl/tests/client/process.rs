@@ -1,0 +1,125 @@
+//! The program as a process: exit codes, and the way onto a bus over TCP.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::thread;
+
+use assert_cmd::Command;
+use canopen::{Duration, Frame};
+use nodectl::bus::{Bus, Simulated};
+
+use crate::pressure::Pressure;
+
+fn nodectl(bus: &str, line: &[&str]) -> (i32, String, String) {
+    let mut command = Command::cargo_bin("nodectl").expect("the program");
+    let output = command.env("NODECTL_BUS", bus).args(line).output().expect("an output");
+    let text = |bytes| String::from_utf8(bytes).expect("text");
+    (output.status.code().expect("an exit code"), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn the_help_lists_the_exit_codes() {
+    let (code, help, _) = nodectl("socketcan:none", &["--help"]);
+    assert_eq!(code, 0);
+    for command in
+        ["scan", "info", "read", "write", "monitor", "record", "save", "restore", "nmt", "lss", "update"]
+    {
+        assert!(help.contains(&format!("\n  {command} ")), "{command}");
+    }
+    assert!(help.contains("Exit codes:\n  0  done\n"));
+}
+
+#[test]
+fn a_wrong_command_line_is_2_and_a_bus_that_is_not_there_4() {
+    for line in [
+        &["fly"][..],
+        &["read"],
+        &["read", "1000", "--node", "0"],
+        &["write", "1017"],
+        &["--bus", "x", "scan"],
+    ] {
+        assert_eq!(nodectl("socketcan:none", line).0, 2, "{line:?}");
+    }
+    // Nobody listens on port 1.
+    let (code, out, error) = nodectl("socketcand://127.0.0.1:1/vcan0", &["scan"]);
+    assert_eq!((code, out.as_str()), (4, ""));
+    assert!(error.starts_with("nodectl: cannot open socketcand://127.0.0.1:1/vcan0: "), "{error}");
+    let (code, out, _) = nodectl("slcan:/dev/no-such-port", &["scan", "--json"]);
+    let value: serde_json::Value = serde_json::from_str(&out).expect("JSON");
+    assert_eq!((code, value["exit_code"].as_i64()), (4, Some(4)));
+}
+
+#[test]
+fn a_socketcand_daemon_is_a_bus() {
+    let bus = daemon();
+    let (code, out, error) = nodectl(&bus, &["read", "1008", "1017"]);
+    let expected = "1008h:0 Manufacturer device name = STM32F4 pressure transmitter\n\
+                    1017h:0 Producer heartbeat time = 1000 ms\n";
+    assert_eq!((code, out.as_str(), error.as_str()), (0, expected, ""));
+    let (code, _, error) = nodectl(&bus, &["write", "1000", "1"]);
+    let expected =
+        "nodectl: node 1, 1000h:0 \"Device type\": 0601 0002h, attempt to write a read-only object\n";
+    assert_eq!((code, error.as_str()), (1, expected));
+    let (code, _, error) = nodectl(&bus.replace("vcan0", "can7"), &["scan"]);
+    assert_eq!((code, error.contains("no such bus")), (4, true), "{error}");
+}
+
+/// A daemon with a node behind it, for as long as the test runs. Its address.
+fn daemon() -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port();
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            serve(stream);
+        }
+    });
+    format!("socketcand://127.0.0.1:{port}/vcan0")
+}
+
+/// Answers until the client is gone. The node has time of its own, which goes on with each frame.
+fn serve(mut stream: TcpStream) {
+    let mut bus = Simulated::new(Pressure::new(1));
+    let mut say = |text: &str| stream.write_all(text.as_bytes()).expect("a client");
+    say("< hi >");
+    let mut reader = stream.try_clone().expect("a stream");
+    while let Some(message) = message(&mut reader) {
+        let words: Vec<&str> = message.split_ascii_whitespace().collect();
+        let answer = match &words[..] {
+            ["open", "vcan0"] | ["rawmode"] => "< ok >".to_owned(),
+            ["send", id, _, bytes @ ..] => frames(&mut bus, id, bytes),
+            _ => "< error no such bus >".to_owned(),
+        };
+        if stream.write_all(answer.as_bytes()).is_err() {
+            return;
+        }
+    }
+}
+
+/// What is between two brackets; `None` when the client is gone.
+fn message(reader: &mut TcpStream) -> Option<String> {
+    let (mut text, mut byte) = (String::new(), [0]);
+    while reader.read_exact(&mut byte).is_ok() {
+        match byte[0] {
+            b'<' => text.clear(),
+            b'>' => return Some(text),
+            letter => text.push(letter.into()),
+        }
+    }
+    None
+}
+
+/// What the node sends when it gets a frame.
+fn frames(bus: &mut Simulated<Pressure>, id: &str, bytes: &[&str]) -> String {
+    let hex = |text: &&str| u8::from_str_radix(text, 16).expect("a byte");
+    let id = u16::from_str_radix(id, 16).expect("an identifier");
+    let data: Vec<u8> = bytes.iter().map(hex).collect();
+    bus.send(&Frame::new(id, &data).expect("a frame")).expect("a bus");
+    let mut answer = String::new();
+    let until = bus.now() + Duration::from_millis(2);
+    while let Some(received) = bus.receive(until).expect("a bus") {
+        let data: String = received.frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
+        let (seconds, micros) = (received.at.0 / 1_000_000, received.at.0 % 1_000_000);
+        answer += &format!("< frame {:03X} {seconds}.{micros:06} {data} >", received.frame.id());
+    }
+    answer
+}

@@ -1,0 +1,114 @@
+//! A bus that the test can look into, disturb and break while a client uses it.
+
+use std::cell::RefCell;
+use std::io;
+use std::rc::Rc;
+
+use canopen::{Duration, Frame, Instant, NodeId};
+use nodectl::Network;
+use nodectl::bus::{Bus, BusError, Received, Simulated, Station};
+use nodectl::sdo::{Client, Options};
+
+/// What the bus does to a frame, by the frame.
+type Fault = Box<dyn FnMut(&Frame) -> Fate>;
+
+/// What happens to a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fate {
+    Arrives,
+    IsLost,
+    BecomesAnother(Frame),
+    /// The client's way to the bus breaks at this frame.
+    BreaksTheBus,
+}
+
+struct State<S> {
+    bus: Simulated<S>,
+    fault: Fault,
+    broken: bool,
+}
+
+/// The bus. Clones are the same bus.
+pub(crate) struct Wire<S>(Rc<RefCell<State<S>>>);
+
+impl<S: Station + 'static> Wire<S> {
+    pub(crate) fn new(station: S) -> Wire<S> {
+        let fault = Box::new(|_: &Frame| Fate::Arrives);
+        Wire(Rc::new(RefCell::new(State { bus: Simulated::new(station), fault, broken: false })))
+    }
+
+    /// From now on this happens to frames in both directions.
+    pub(crate) fn disturb(&self, fault: impl FnMut(&Frame) -> Fate + 'static) {
+        self.0.borrow_mut().fault = Box::new(fault);
+    }
+
+    /// Every `n`th frame is lost.
+    pub(crate) fn lose_every(&self, n: usize) {
+        let mut count = 0;
+        self.disturb(move |_| {
+            count += 1;
+            if count % n == 0 { Fate::IsLost } else { Fate::Arrives }
+        });
+    }
+
+    /// Looks at the station.
+    pub(crate) fn station<T>(&self, look: impl FnOnce(&mut S) -> T) -> T {
+        look(&mut self.0.borrow_mut().bus.station)
+    }
+
+    /// A client's side of the bus. Opening it again repairs it.
+    pub(crate) fn network(&self) -> Network {
+        let this = Wire(Rc::clone(&self.0));
+        Network::open(move || {
+            this.0.borrow_mut().broken = false;
+            Ok(Box::new(Wire(Rc::clone(&this.0))))
+        })
+        .expect("an open bus")
+    }
+}
+
+impl<S: Station> State<S> {
+    fn fate(&mut self, frame: &Frame) -> Result<Fate, BusError> {
+        let fate = (self.fault)(frame);
+        self.broken |= fate == Fate::BreaksTheBus;
+        self.check().map(|()| fate)
+    }
+
+    fn check(&self) -> Result<(), BusError> {
+        if self.broken { Err(BusError::Lost(io::Error::other("unplugged"))) } else { Ok(()) }
+    }
+}
+
+impl<S: Station> Bus for Wire<S> {
+    fn now(&self) -> Instant {
+        self.0.borrow().bus.now()
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let mut state = self.0.borrow_mut();
+        match state.fate(frame)? {
+            Fate::Arrives => state.bus.send(frame),
+            Fate::BecomesAnother(frame) => state.bus.send(&frame),
+            _ => Ok(()),
+        }
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
+        let mut state = self.0.borrow_mut();
+        state.check()?;
+        while let Some(received) = state.bus.receive(until)? {
+            match state.fate(&received.frame)? {
+                Fate::Arrives => return Ok(Some(received)),
+                Fate::BecomesAnother(frame) => return Ok(Some(Received { frame, ..received })),
+                _ => (),
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// A client with the usual patience.
+pub(crate) fn client(network: &mut Network, node: u8) -> Client<'_> {
+    let options = Options { timeout: Duration::from_millis(500), retries: 1 };
+    Client::new(network, NodeId::new(node).expect("a node-ID"), options)
+}

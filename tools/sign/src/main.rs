@@ -1,0 +1,149 @@
+//! `cargo xtask sign`: makes keys, signs images, shows what is in one. docs/update.md tells the story.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, Parser, Subcommand};
+use sign::{code, image::Image, key};
+use update::{Description, Version};
+
+/// Keys and signed images for the field update.
+#[derive(Parser)]
+#[command(name = "cargo xtask sign", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Make a key pair: the secret half goes to a new file, the public half is printed for crates/update/src/key.rs
+    Key {
+        /// The new file
+        file: PathBuf,
+    },
+    /// Print the public half of a key
+    Public {
+        /// The secret key, PKCS#8 in PEM
+        file: PathBuf,
+    },
+    /// Sign an application, an ELF file or a flat binary
+    Image(ImageArgs),
+    /// Show what is in an image, and check it
+    Show {
+        /// The image
+        file: PathBuf,
+        /// A secret key, to see whether it signed the image [default: the development key]
+        #[arg(long)]
+        key: Option<PathBuf>,
+    },
+}
+
+#[derive(Args)]
+struct ImageArgs {
+    /// The ELF file, or the binary from 0x08010200 on
+    file: PathBuf,
+    /// The secret key, PKCS#8 in PEM [default: the development key, which is known to everybody]
+    #[arg(long)]
+    key: Option<PathBuf>,
+    /// The product that it is for, as in 1018h:2
+    #[arg(long, value_parser = number)]
+    product: u32,
+    /// The hardware revisions that it runs on, 0 to 31, with commas
+    #[arg(long, value_delimiter = ',', required = true, value_parser = clap::value_parser!(u32).range(0..32))]
+    hardware: Vec<u32>,
+    /// Its version, as 1.2.3
+    #[arg(long = "image-version", value_parser = version)]
+    version: Version,
+    /// The security counter: raise it when no older image may ever run again
+    #[arg(long)]
+    counter: u32,
+    /// Where the image goes [default: the name of the file with .img]
+    #[arg(long, short)]
+    out: Option<PathBuf>,
+}
+
+fn number(text: &str) -> Result<u32> {
+    Ok(match text.strip_prefix("0x") {
+        Some(hex) => u32::from_str_radix(hex, 16)?,
+        None => text.parse()?,
+    })
+}
+
+fn version(text: &str) -> Result<Version> {
+    let numbers: Vec<u16> = text.split('.').map(str::parse).collect::<Result<_, _>>()?;
+    let [major, minor, patch] = numbers[..] else { bail!("three numbers with points between them") };
+    Ok(Version { major, minor, patch })
+}
+
+fn signing_key(path: Option<&Path>) -> Result<ed25519_dalek::SigningKey> {
+    let development = key::development_path();
+    let key = key::read(path.unwrap_or(&development))?;
+    if key::is_development(&key) {
+        eprintln!("warning: the development key is known to everybody");
+    }
+    Ok(key)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+fn make_key(path: &Path) -> Result<()> {
+    let key = key::random()?;
+    key::write(&key, path)?;
+    println!("{}", key::constant(&key));
+    Ok(())
+}
+
+fn make_image(args: &ImageArgs) -> Result<()> {
+    let key = signing_key(args.key.as_deref())?;
+    let code = code::read(&read(&args.file)?).with_context(|| args.file.display().to_string())?;
+    let hardware = args.hardware.iter().fold(0, |mask, revision| mask | 1 << revision);
+    let description =
+        Description { product: args.product, hardware, version: args.version, counter: args.counter };
+    let image = Image::sign(description, code, &key)?;
+    let out = args.out.clone().unwrap_or_else(|| args.file.with_extension("img"));
+    std::fs::write(&out, image.to_bytes()).with_context(|| format!("cannot write {}", out.display()))?;
+    show(&image);
+    println!("file        {}", out.display());
+    Ok(())
+}
+
+fn show(image: &Image) {
+    let about = image.header.description();
+    let revisions = (0..32).filter(|revision| about.hardware >> revision & 1 != 0);
+    let revisions: Vec<_> = revisions.map(|revision: u32| revision.to_string()).collect();
+    println!("version     {}", about.version);
+    println!("product     {:#010x}", about.product);
+    println!("hardware    {}", revisions.join(", "));
+    println!("counter     {}", about.counter);
+    println!("code        {} bytes, CRC-32 {:#010x} (1F56h)", image.header.length(), image.header.code_crc());
+}
+
+fn show_file(file: &Path, key: Option<&Path>) -> Result<()> {
+    let image = Image::read(&read(file)?).with_context(|| file.display().to_string())?;
+    show(&image);
+    if !image.is_signed_by(&signing_key(key)?.verifying_key()) {
+        bail!("it was not signed with this key");
+    }
+    println!("signature   good");
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Key { file } => make_key(&file),
+        Command::Public { file } => key::read(&file).map(|key| println!("{}", key::constant(&key))),
+        Command::Image(args) => make_image(&args),
+        Command::Show { file, key } => show_file(&file, key.as_deref()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! `cargo xtask sign`: the signing tool, wherever it is called from.
+
+use std::ffi::OsString;
+
+use anyhow::{Context, Result};
+
+use crate::command::{cargo, root, run};
+
+/// Runs the tool in the directory of the caller, so that paths mean what they say.
+pub(crate) fn run_tool(arguments: &[OsString]) -> Result<()> {
+    let here = std::env::current_dir().context("there is no current directory")?;
+    let manifest = root().join("Cargo.toml");
+    let mut command = cargo();
+    command.args(["run", "--quiet", "-p", "sign", "--manifest-path"]).arg(manifest).arg("--").args(arguments);
+    run(command.current_dir(here))
+}
