@@ -42,8 +42,8 @@ pub(super) struct Pending {
     reset_untold: bool,
     pub(super) identifiers: bool,
     pub(super) parameters: bool,
-    /// 1F80h asks for Operational, which waits for the first values: no PDO carries what nobody has measured.
-    self_start: bool,
+    /// The state to which the first values lead, where 1F80h asks for it: no PDO carries what nobody has measured.
+    with_values: Option<State>,
     /// Of LSS or of program control.
     pub(super) request: Option<Action>,
 }
@@ -55,7 +55,7 @@ impl Pending {
             reset_untold: false,
             identifiers: false,
             parameters: false,
-            self_start: false,
+            with_values: None,
             request: None,
         }
     }
@@ -76,14 +76,16 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         self.core.configure(now);
         self.core.enter(State::PreOperational);
-        self.core.pending.self_start = self.core.number(0x1F80, 0) == SELF_START;
+        let starts = self.core.number(0x1F80, 0) == SELF_START;
+        self.core.pending.with_values = starts.then_some(State::Operational);
         self.poll_services(now, out);
     }
 
     /// There are values now. A device with an error, or one that its master has already told a state, does not start.
     pub(super) fn start_by_itself(&mut self, now: Instant, out: &mut impl Transmit) {
-        if core::mem::take(&mut self.core.pending.self_start) && self.core.emcy.register() == 0 {
-            self.core.enter(State::Operational);
+        let Some(state) = self.core.pending.with_values.take() else { return };
+        if self.core.emcy.register() == 0 {
+            self.core.enter(state);
             self.send_process(now, out);
         }
     }
@@ -112,7 +114,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     pub(super) fn command(&mut self, command: Command) {
-        self.core.pending.self_start = false;
+        self.core.pending.with_values = None;
         match command {
             Command::Start => self.core.enter(State::Operational),
             Command::Stop => self.core.enter(State::Stopped),
