@@ -120,8 +120,8 @@ pub(crate) struct Numbers {
     pub(crate) start_up: u8,
     pub(crate) domain: Vec<u8>,
     pub(crate) downloads: usize,
-    /// What is stored, communication and application.
-    pub(crate) stored: [Vec<u8>; 2],
+    /// What is stored: communication, application, calibration.
+    pub(crate) stored: [Vec<u8>; 3],
     pub(crate) is_damaged: bool,
     /// What the device said of the groups that it loaded.
     pub(crate) loaded: Vec<(Group, bool)>,
@@ -138,8 +138,13 @@ impl Application for Numbers {
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {
-        let [communication, application] = &self.stored;
-        let packed = if group == Group::Communication { communication } else { application };
+        let [communication, application, calibration] = &self.stored;
+        let packed: &[u8] = match group {
+            Group::Communication => communication,
+            Group::Application => application,
+            Group::Calibration => calibration,
+            Group::Volatile => &[],
+        };
         Stored { packed, is_sound: !self.is_damaged }
     }
 
