@@ -2,9 +2,9 @@
 
 use crate::profile::{APPLICATION_SIZE, CALIBRATION_SIZE, COMMUNICATION_SIZE};
 use crate::stored::CALIBRATION_LAYOUT;
+use canopen::Job;
 use canopen::dictionary;
 use canopen::sdo::Abort;
-use canopen::Job;
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
 use storage::{Change, DeviceRecord, Error, Group, Store};
@@ -53,9 +53,7 @@ impl Parcel {
     pub fn deliver<F: NorFlash>(&self, store: &mut Store<F>) -> Result<(), Abort> {
         let changes: Vec<Change<'_>, GROUPS> = match self.job {
             None => Vec::new(),
-            Some(Job::Configure(_) | Job::Set(_)) => {
-                some([Some(self.change(Group::Device))])
-            }
+            Some(Job::Configure(_) | Job::Set(_)) => some([Some(self.change(Group::Device))]),
             Some(Job::Save(selection)) => {
                 some(SAVED.map(|(group, of)| selection.contains(of).then(|| self.change(group))))
             }

@@ -55,7 +55,8 @@ pub(crate) struct Stored {
 }
 
 impl Stored {
-    pub(crate) const NOTHING: Stored = Stored { communication: Kept::EMPTY, application: Kept::EMPTY, calibration: Kept::EMPTY };
+    pub(crate) const NOTHING: Stored =
+        Stored { communication: Kept::EMPTY, application: Kept::EMPTY, calibration: Kept::EMPTY };
 
     /// Reads all groups. What cannot be read counts as not stored, and as a fault.
     pub(crate) fn load<F: ReadNorFlash>(&mut self, layout: u16, view: &mut View<F>) {
