@@ -97,6 +97,8 @@ const ROWS: &[Object] = &[
     Object::new(0x6102, 0, "", Type::Unsigned32, Access::WriteOnly).rule(Rule::Application(7)),
     Object::new(0x6103, 0, "", Type::VisibleString(20), Access::ReadWrite).saved(Group::Application),
     Object::new(0x6104, 0, "", Type::Domain, Access::ReadWrite).rule(Rule::Application(8)),
+    Object::new(0x6105, 0, "", Type::Real32, Access::ReadWrite).saved(Group::Calibration),
+    Object::new(0x6106, 0, "", Type::Unsigned32, Access::ReadWrite).value(1).rule(Rule::StoreCalibration),
     Object::new(0x6200, 0, "", Type::Unsigned16, Access::ReadWrite).mappable(Mapping::Rpdo),
 ];
 
