@@ -143,9 +143,9 @@ impl Fields {
 /// The places of `N` values from a sub-index on.
 const fn fields<const N: usize>(d: &Dictionary, index: u16, first: u8) -> [Field; N] {
     let mut fields = [d.field(index, first); N];
-    let mut i = 0;
-    while i < N {
-        fields[i] = d.field(index, first + i as u8);
+    let mut i: u8 = 0;
+    while (i as usize) < N {
+        fields[i as usize] = d.field(index, first + i);
         i += 1;
     }
     fields

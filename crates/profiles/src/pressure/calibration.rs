@@ -78,7 +78,7 @@ impl PressureCalibration {
     /// The pressure in Pa at a ratio and a temperature in K, beyond the ends of the range too.
     #[must_use]
     pub fn pressure(&self, ratio: f32, kelvin: Option<f32>) -> f32 {
-        let t = kelvin.map_or(0.0, |kelvin| kelvin.max(COLDEST).min(HOTTEST) - self.reference);
+        let t = kelvin.map_or(0.0, |kelvin| kelvin.clamp(COLDEST, HOTTEST) - self.reference);
         self.start + (self.end - self.start) * ((ratio - self.zero.at(t)) / self.span.at(t))
     }
 

@@ -132,7 +132,7 @@ impl Channel {
 
 /// The nearest finite number, and 0 for what is none: nothing else ever leaves the channel.
 fn finite(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value.max(f32::MIN).min(f32::MAX) }
+    if value.is_nan() { 0.0 } else { value.clamp(f32::MIN, f32::MAX) }
 }
 
 /// Towards zero, to the nearest limit when out of range, 0 for what is not a number: what `as` is defined to do.
