@@ -74,7 +74,7 @@ mod app {
         receiver_process: Receiver,
         receiver_services: Receiver,
         sampling: Sampling,
-        measurement: Measurement,
+        measurement: &'static mut Measurement,
         factory: FactoryCalibration,
         transmitter: Transmitter,
         time: TimeInterrupt,
@@ -89,6 +89,7 @@ mod app {
         lost: Losses = Losses::new(),
         // Too large to be handed around on the stack.
         protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
+        measurement_place: MaybeUninit<Measurement> = MaybeUninit::uninit(),
         parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
@@ -113,7 +114,7 @@ mod app {
             receiver_process,
             receiver_services,
             sampling: board.sampling,
-            measurement: Measurement::new(Start::First),
+            measurement: cx.local.measurement_place.write(Measurement::new(Start::First)),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
