@@ -1,6 +1,7 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::{Access, DefaultValue, Entry, Field, Group, Mapping, Object, Rule, Type};
+use crate::pdo::WATCHED;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -115,9 +116,10 @@ const fn default_byte(value: DefaultValue, i: usize) -> u8 {
 /// During compilation, when a row is wrong.
 pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    let mut i = 0;
+    let (mut i, mut sent) = (0, 0);
     while i < rows.len() {
         check_row(&rows[i]);
+        sent += matches!(rows[i].mapping, Mapping::Tpdo) as usize;
         if i > 0 {
             assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
         }
@@ -128,6 +130,7 @@ pub const fn check(rows: &[Object]) {
         }
         i += 1;
     }
+    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
 }
 
 const fn has(rows: &[Object], key: u32) -> bool {

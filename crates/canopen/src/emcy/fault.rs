@@ -93,7 +93,8 @@ impl Fault {
         Fault::MpdoNotTaken,
     ];
 
-    fn all() -> impl Iterator<Item = Fault> {
+    /// Every fault that there is.
+    pub fn all() -> impl Iterator<Item = Fault> {
         Fault::SINGLE
             .into_iter()
             .chain((0..4).map(Fault::Heartbeat))
