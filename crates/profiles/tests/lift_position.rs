@@ -34,7 +34,7 @@ impl Car {
         let steps = self.way / self.step();
         let raw = match self.parameters.sensors.channels[0].kind {
             Some(kind) if kind.is_absolute() => RawEncoder {
-                ssi: Some(frame(&self.parameters.sensors.format, steps as u32)),
+                ssi: Some(frame(&self.parameters.sensors.format, steps.floor() as u32)),
                 ..RawEncoder::default()
             },
             _ => RawEncoder { counter: steps.floor() as i64 as u16, ..RawEncoder::default() },
@@ -70,11 +70,11 @@ impl Car {
     }
 }
 
-/// What an SSI encoder sends for a position: a start bit, then the code.
+/// What an SSI encoder sends for a position: a high level, the code, and a low level to the last clock.
 fn frame(format: &Format, position: u32) -> Frame {
     let bits = format.position_bits();
     let code = position ^ (position >> 1);
-    Frame { bits: 1 << bits | u64::from(code), clocks: bits + 1 }
+    Frame { bits: (1 << bits | u64::from(code)) << 1, clocks: bits + 2 }
 }
 
 fn with_sensor(kind: SensorType, resolution: u32) -> Parameters {
@@ -158,7 +158,7 @@ fn a_preset_beyond_the_sensor_is_none() {
     assert_eq!(car.preset(4096 * 200), None);
     assert_eq!(car.preset(4096 * 200 - 1), Some(()));
     assert_eq!(car.position(), 4096 * 200 - 1);
-    car.drive(1.0);
+    car.drive(1.1);
     assert_eq!(car.position(), 0, "and it goes round");
     assert_eq!(car.parameters.preset(1, 0, 0), None, "a unit without a sensor");
     assert_eq!(car.parameters.preset(4, 0, 0), None, "no unit");

@@ -163,7 +163,7 @@ fn rounded(load: f32) -> u16 {
 #[must_use]
 pub fn signals(load: u16, limits: &[u16; 4]) -> u8 {
     let mut used = limits.iter().filter(|limit| **limit != 0);
-    let is_inverted = match (used.next(), used.last()) {
+    let is_inverted = match (used.next(), used.next_back()) {
         (Some(first), Some(last)) => first > last,
         _ => false,
     };
