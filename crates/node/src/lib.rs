@@ -10,6 +10,7 @@ pub mod encoder;
 mod faults;
 mod flags;
 mod keeping;
+pub mod lift;
 mod measurement;
 mod parcel;
 pub mod pressure;

@@ -4,7 +4,9 @@
 use std::num::{NonZeroU16, NonZeroU32};
 
 use profiles::encoder::{Area, Coding, Format, Frame, OVERFLOW, RawEncoder, SensorType, UNDERFLOW};
-use profiles::lift::position::{INVERTED, Parameters, PositionUnits, Snapshot, Source, UnitParameters};
+use profiles::lift::position::{
+    INVERTED, Parameters, PositionUnits, Snapshot, Source, UNKNOWN, UnitParameters,
+};
 
 /// Speed of the car in mm/ms.
 const FAST: f64 = 2.5;
@@ -216,8 +218,8 @@ fn the_status_describes_the_sensor() {
     let mut car = Car::new(with_sensor(SensorType::MultiTurn, 1), 0.0);
     let values = car.drive(0.0).units[0];
     assert_eq!((values.resolution, values.revolutions, values.operating_status), (8192, 4096, 4));
-    assert!(values.is_known);
-    assert!(!car.units.sample(&RawEncoder::default()).units[0].is_known, "it does not answer");
+    assert_eq!(values.state, 0);
+    assert_eq!(car.units.sample(&RawEncoder::default()).units[0].state, UNKNOWN, "it does not answer");
 }
 
 /// The pulley of a counted sensor turns on from where it was left.

@@ -7,6 +7,7 @@ mod profile;
 mod rules;
 mod values;
 
+pub(crate) use manufacturer::SENSORS;
 pub use rules::CYCLIC_TIMER;
 pub use values::Fields;
 
@@ -17,7 +18,7 @@ use profiles::encoder::{Parameters, Snapshot};
 /// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 
-const PARTS: &[&[Object]] = &[manufacturer::OBJECTS, &PROFILE];
+const PARTS: &[&[Object]] = &[SENSORS, &PROFILE];
 static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
 const ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
 const DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);

@@ -22,6 +22,9 @@ pub const UNITS: usize = 4;
 /// Operating parameter (6380h): the position falls when the sensor counts up.
 pub const INVERTED: u16 = 1 << 3;
 
+/// State of a position unit: the sensor does not give a position.
+pub const UNKNOWN: u8 = 1 << 3;
+
 /// Which channel of the encoder a position unit measures with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
@@ -165,10 +168,8 @@ pub struct UnitValues {
     pub offset: i32,
     /// Speed (6390h) in speed measuring steps.
     pub speed: i16,
-    /// Whether the position is beyond a limit: bits of the area state of CiA 406.
+    /// [`UNKNOWN`], and whether the position is beyond a limit: bits of the area state of CiA 406.
     pub state: u8,
-    /// Whether there is a position.
-    pub is_known: bool,
     /// Operating status (63C0h).
     pub operating_status: u16,
     /// Resolution (63C1h) of the sensor: steps per revolution, or nm a step.
@@ -223,12 +224,15 @@ impl Unit {
         UnitValues {
             position,
             speed: if self.is_inverted { channel.speed.saturating_neg() } else { channel.speed },
-            state: area_state(&self.limits, &Module::default(), position, 0),
-            is_known: channel.sensor_state & SENSOR_HELD == 0,
+            state: area_state(&self.limits, &Module::default(), position, 0) | known(channel),
             warnings,
             ..self.fixed
         }
     }
+}
+
+fn known(channel: &ChannelValues) -> u8 {
+    if channel.sensor_state & SENSOR_HELD == 0 { 0 } else { UNKNOWN }
 }
 
 /// 63C0h: scaling (bit 2) is always on. What is public shows the direction in bit 0, 6380h has it in bit 3: both.
