@@ -66,6 +66,9 @@ pub const fn tpdo(number: u16, name: &'static str, is_on: bool) -> [Object; 6] {
 }
 
 /// The same of TPDO 2, the multiplexed one: it has neither bit 30 in its COB-ID nor a SYNC start value.
+///
+/// # Panics
+/// Never: the catalogue has it.
 #[must_use]
 pub const fn multiplexed_tpdo(name: &'static str) -> [Object; 5] {
     let pdo = pdo(2);
@@ -126,12 +129,14 @@ const fn mapping<const N: usize>(
     let count = Object::new(index, 0, name, Type::Unsigned8, Access::Const);
     let Content::Objects(objects) = pdo.content else { return [count.value(DESTINATION); N] };
     assert!(objects.len() + 1 == N, "N is not the number of rows");
-    let mut rows = [count.value(objects.len() as i64); N];
-    let mut sub = 1;
-    while sub < N {
-        let object = if is_consumed { objects[sub - 1].consumed() } else { objects[sub - 1] };
-        let row = Object::new(index, sub as u8, "Mapped object", Type::Unsigned32, Access::Const);
-        rows[sub] = row.value(object.entry() as i64);
+    let mut rows = [count; N];
+    let mut sub: u8 = 1;
+    while (sub as usize) < N {
+        let object =
+            if is_consumed { objects[sub as usize - 1].consumed() } else { objects[sub as usize - 1] };
+        let row = Object::new(index, sub, "Mapped object", Type::Unsigned32, Access::Const);
+        rows[sub as usize] = row.value(object.entry() as i64);
+        rows[0] = count.value(sub as i64);
         sub += 1;
     }
     rows

@@ -108,7 +108,7 @@ fn every_parameter_is_saved_and_nothing_else() {
 fn every_parameter_changes_what_the_measurement_gets() {
     let silent = [0x2220, 0x2221, 0x6001, 0x6382, 0x6486];
     let special = |index, sub| match (index, sub) {
-        (0x2105, _) | (0x2103, 3) | (0x2201, _) => 0,
+        (0x2105 | 0x2201, _) | (0x2103, 3) => 0,
         (0x2101, _) => 8000,
         (0x2200, _) => 300_000,
         (0x6380, _) => INVERTED.into(),
