@@ -27,15 +27,17 @@ const fn value(index: u16, access: Access, mapping: Mapping) -> Object {
     Object::new(index, 0, "", Type::Unsigned16, access).mappable(mapping)
 }
 
-/// RPDOs 7 and 512, TPDOs 130, 261 and 512, all but the last with a CAN-ID of their own.
+/// RPDOs 7 and 512, TPDOs 2 (multiplexed), 130, 261 and 512, all but the last with a CAN-ID of their own.
 const PARTS: &[&[Object]] = &[
     &cob_id(0x1406, DefaultValue::Integer(0x206), Rule::PdoPredefined),
     &cob_id(0x15FF, DefaultValue::Integer(0x180), Rule::PdoPredefined),
     &mapping(0x1606, 0x2004_0010),
     &mapping(0x17FF, 0x2005_0010),
+    &cob_id(0x1801, DefaultValue::NodeId(0x500), Rule::PdoPredefined),
     &cob_id(0x1881, DefaultValue::NodeId(0x4000_0480), Rule::PdoPredefined),
     &cob_id(0x1904, DefaultValue::Integer(0x4000_0180), Rule::PdoPredefined),
     &cob_id(0x19FF, DefaultValue::Integer(0x8000_0000), Rule::PdoCobId),
+    &[Object::new(0x1A01, 0, "", Type::Unsigned8, Access::Const).value(0xFF)],
     &mapping(0x1A81, 0x2001_0010),
     &mapping(0x1B04, 0x2002_0010),
     &mapping(0x1BFF, 0x2003_0010),
@@ -45,6 +47,7 @@ const PARTS: &[&[Object]] = &[
         value(0x2003, Access::ReadOnly, Mapping::Tpdo),
         value(0x2004, Access::ReadWrite, Mapping::Rpdo),
         value(0x2005, Access::ReadWrite, Mapping::Rpdo),
+        value(0x2006, Access::ReadOnly, Mapping::Tpdo),
     ],
 ];
 static TABLE: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
@@ -132,7 +135,7 @@ const INVALID_VALUE: u32 = 0x0609_0030;
 #[test]
 fn every_number_is_a_pdo_of_its_own() {
     let mut bench = Bench::operational();
-    assert_eq!(bench.ids(), [0x485, 0x180], "those that are valid, on entering Operational");
+    assert_eq!(bench.ids(), [0x485, 0x180, 0x505], "those that are valid, on entering Operational");
     assert_eq!(bench.change(0x2001), [0x485]);
     assert_eq!(bench.change(0x2002), [0x180]);
     assert_eq!(bench.change(0x2003), []);
@@ -140,6 +143,14 @@ fn every_number_is_a_pdo_of_its_own() {
     assert_eq!(bench.change(0x2003), [0x385]);
     bench.write_cob_id(0x1904, 0xC000_0180).unwrap();
     assert_eq!((bench.change(0x2002), bench.change(0x2001)), (vec![], vec![0x485]));
+}
+
+#[test]
+fn the_multiplexed_one_has_what_is_mapped_nowhere() {
+    let mut bench = Bench::operational();
+    assert_eq!((bench.change(0x2006), bench.change(0x2003)), (vec![0x505], vec![]));
+    bench.write_cob_id(0x1904, 0xC000_0180).unwrap();
+    assert_eq!(bench.change(0x2002), [], "though its own PDO is off");
 }
 
 #[test]

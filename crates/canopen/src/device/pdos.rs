@@ -143,6 +143,14 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
+    /// What is mapped into each TPDO, whether it is valid or not.
+    pub(super) fn tpdo_layouts(&self) -> impl Iterator<Item = Layout> {
+        Pdo::all(self.dictionary, Direction::Transmit).filter_map(|pdo| match self.content(pdo)? {
+            Content::Objects(layout) => Some(layout),
+            Content::Multiplexed(_) => None,
+        })
+    }
+
     fn is_multiplexed(&self, pdo: Pdo) -> bool {
         Addressing::from_count(low_byte(self.number(pdo.mapping(), 0))).is_some()
     }
