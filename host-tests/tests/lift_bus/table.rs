@@ -56,7 +56,7 @@ macro_rules! dictionary {
 }
 
 // The devices of the nodes: what node::lift has, and the communication profile.
-static NODE_PARTS: &[&[Object]] = &[COMMUNICATION, &node::lift::PDOS, &node::lift::OBJECTS];
+static NODE_PARTS: &[&[Object]] = &[COMMUNICATION, node::lift::PDOS, &node::lift::OBJECTS];
 static NODE_TABLE: [Object; dictionary::count(NODE_PARTS)] = dictionary::gather(NODE_PARTS);
 static NODE_ENTRIES: [Entry; NODE_TABLE.len()] = dictionary::compile(&NODE_TABLE);
 static NODE_DEFAULTS: [u8; NODE_SIZE] = dictionary::default_image(&NODE_TABLE);

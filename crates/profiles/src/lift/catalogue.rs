@@ -8,6 +8,10 @@
 //! * The number of mapped objects of many RPDOs is printed as 0 to n: it is n, as a default is one value.
 //! * The mapping of many RPDOs is printed as mandatory: it exists where the communication parameter does, as with the
 //!   others.
+//! * The CAN-IDs lie inside the pre-defined connection set of CiA 301: 181h to 18Fh are TPDO 1 of the nodes 1 to 15, 200h
+//!   to 207h RPDO 1 of the nodes up to 7, 400h RPDO 3, 480h and 500h and up TPDO 4 and RPDO 4 of any node. A lift device
+//!   has no PDOs of that set (`docs/lift.md`).
+//! * Misprints of single characters (an ordinal, a missing h, an event timer of two digits) are not repeated.
 //! * COB-IDs of TPDOs are printed with bit 30 set or clear. Either may be; producers here set it, for remote frames are
 //!   not to be used.
 //! * Type 255: sent on entering Operational and on each change, and with an event timer when that elapses, only. CiA 301
