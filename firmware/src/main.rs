@@ -31,8 +31,8 @@ use canopen::Duration;
 const PROCESS: Interrupt = Interrupt::TIM2;
 /// Pended by whoever has work for the services task.
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
-/// Pended by whoever has something to store. The interrupt is that of the flash controller, which uses none.
-const KEEPER: Interrupt = Interrupt::FLASH;
+/// Pended by whoever has something to store. The interrupt is that of a peripheral which the board does not use.
+const KEEPER: Interrupt = Interrupt::SDIO;
 /// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
 const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 /// Pended by whoever has put a frame into the transmit queue.
@@ -49,7 +49,7 @@ mod app {
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
     use bsp::{Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
-    use node::{FactoryCalibration, Measurement, Parameters, Parcel, Protocol, Snapshot};
+    use node::{FactoryCalibration, Measurement, Parameters, Parcel, Protocol, RawEncoder, Snapshot, Start};
 
     use crate::bit_rate::Rate;
     use crate::keeper::Keeper;
@@ -74,7 +74,7 @@ mod app {
         receiver_process: Receiver,
         receiver_services: Receiver,
         sampling: Sampling,
-        measurement: Measurement,
+        measurement: &'static mut Measurement,
         factory: FactoryCalibration,
         transmitter: Transmitter,
         time: TimeInterrupt,
@@ -89,6 +89,7 @@ mod app {
         lost: Losses = Losses::new(),
         // Too large to be handed around on the stack.
         protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
+        measurement_place: MaybeUninit<Measurement> = MaybeUninit::uninit(),
         parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
@@ -113,7 +114,7 @@ mod app {
             receiver_process,
             receiver_services,
             sampling: board.sampling,
-            measurement: Measurement::new(),
+            measurement: cx.local.measurement_place.write(Measurement::new(Start::First)),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
@@ -165,7 +166,7 @@ mod app {
             cx.local.measurement.apply(&parameters);
         }
         let raw = configuration::raw_sample(sums, *cx.local.factory);
-        let snapshot = cx.local.measurement.sample(&raw);
+        let snapshot = cx.local.measurement.sample(&raw, &RawEncoder::default());
         cx.shared.snapshot.lock(|latest| *latest = Some(snapshot));
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
@@ -198,7 +199,7 @@ mod app {
         cx.shared.watchdog.progress(Part::Services);
     }
 
-    #[task(binds = FLASH, priority = 1, local = [keeper], shared = [protocol, transmit])]
+    #[task(binds = SDIO, priority = 1, local = [keeper], shared = [protocol, transmit])]
     fn keep(cx: keep::Context) {
         cx.local.keeper.run(&mut (cx.shared.protocol, cx.shared.transmit));
     }

@@ -105,17 +105,14 @@ mod tests {
         for rate in RATES {
             for offset in (0..1_000_000).step_by(70_000) {
                 let mut detector = Detector::new(Instant(0));
-                let found = (0..).map(|i| Instant(i * 20_000)).find(|&now| {
-                    let is_heard = (now.0 + offset) % 1_000_000 < 20_000;
-                    let heard = match is_heard {
-                        false => Heard::Silence,
-                        true if detector.timing().kbit() == rate => Heard::Frame,
-                        // The worst: what is sent faster or slower is not even seen.
-                        true => Heard::Silence,
-                    };
+                let found = (0..2_000).map(|i| Instant(i * 20_000)).find(|&now| {
+                    // The worst: what is sent faster or slower is not even seen.
+                    let is_understood = detector.timing().kbit() == rate;
+                    let is_heard = is_understood && (now.0 + offset) % 1_000_000 < 20_000;
+                    let heard = if is_heard { Heard::Frame } else { Heard::Silence };
                     matches!(detector.step(heard, now), Step::Found(timing) if timing.kbit() == rate)
                 });
-                assert!(found.unwrap().0 < 40_000_000, "{rate} kbit/s from {offset}: {found:?}");
+                assert!(found.is_some(), "{rate} kbit/s from {offset}");
             }
         }
     }

@@ -2,5 +2,6 @@
 
 mod configuring;
 mod faults;
+mod measuring;
 mod running;
 mod support;

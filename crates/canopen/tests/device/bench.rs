@@ -88,6 +88,7 @@ const ROWS: &[Object] = &[
     parameter(0x1FD0, 0, Type::Unsigned8).limits(0, 2),
     parameter(0x1FD0, 1, Type::Unsigned64),
     parameter(0x1FD0, 2, Type::Unsigned64),
+    Object::new(0x5F00, 0, "", Type::Unsigned8, Access::ReadWrite).limits(0, 2).rule(Rule::Setting),
     Object::highest(0x6000, 3, ""),
     value(0x6000, 1, Type::Integer32),
     value(0x6000, 2, Type::Integer16),
@@ -97,6 +98,7 @@ const ROWS: &[Object] = &[
     Object::new(0x6102, 0, "", Type::Unsigned32, Access::WriteOnly).rule(Rule::Application(7)),
     Object::new(0x6103, 0, "", Type::VisibleString(20), Access::ReadWrite).saved(Group::Application),
     Object::new(0x6104, 0, "", Type::Domain, Access::ReadWrite).rule(Rule::Application(8)),
+    Object::new(0x6105, 0, "", Type::Unsigned16, Access::ReadWrite).rule(Rule::EventTimerOf(0)),
     Object::new(0x6200, 0, "", Type::Unsigned16, Access::ReadWrite).mappable(Mapping::Rpdo),
 ];
 

@@ -213,3 +213,16 @@ fn the_size_of_a_packed_group_is_known() {
         assert_eq!(packed.len() + relative, canopen::dictionary::packed_size(&rows, group));
     }
 }
+
+#[test]
+fn a_setting_is_stored_at_once_and_shown_by_the_application() {
+    let mut bench = Bench::booted();
+    bench.device.take_action();
+    assert_eq!(bench.write(0x5F00, 0, &[3]), Err(0x0609_0031));
+    assert_eq!(bench.device.take_action(), None);
+    assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "the response waits");
+    assert_eq!(bench.device.take_action(), Some(Action::Store(Job::Set(2))));
+    assert_eq!(bench.read(0x5F00, 0), Ok(vec![0]), "it is not stored yet");
+    assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "asked again");
+    assert_eq!(finish(&mut bench, Ok(())), [0x60, 0, 0x5F, 0, 0, 0, 0, 0]);
+}
