@@ -49,7 +49,7 @@ mod app {
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
     use bsp::{Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
-    use node::{FactoryCalibration, Measurement, Parameters, Parcel, Protocol, Snapshot};
+    use node::{FactoryCalibration, Measurement, Parameters, Parcel, Protocol, RawEncoder, Snapshot, Start};
 
     use crate::bit_rate::Rate;
     use crate::keeper::Keeper;
@@ -113,7 +113,7 @@ mod app {
             receiver_process,
             receiver_services,
             sampling: board.sampling,
-            measurement: Measurement::new(),
+            measurement: Measurement::new(Start::First),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
@@ -165,7 +165,7 @@ mod app {
             cx.local.measurement.apply(&parameters);
         }
         let raw = configuration::raw_sample(sums, *cx.local.factory);
-        let snapshot = cx.local.measurement.sample(&raw);
+        let snapshot = cx.local.measurement.sample(&raw, &RawEncoder::default());
         cx.shared.snapshot.lock(|latest| *latest = Some(snapshot));
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);

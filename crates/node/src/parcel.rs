@@ -1,7 +1,6 @@
 //! What travels to the parameter store: a copy of the values, so that nothing is locked while they are written.
 
 use crate::profile::{APPLICATION_SIZE, COMMUNICATION_SIZE};
-use crate::stored::LAYOUT;
 use canopen::dictionary;
 use canopen::sdo::Abort;
 use canopen::{Job, Selection};
@@ -13,6 +12,8 @@ use storage::{Change, DeviceRecord, Error, Group, Store};
 #[derive(Debug)]
 pub struct Parcel {
     pub(crate) job: Option<Job>,
+    /// Of the packed values.
+    pub(crate) layout: u16,
     pub(crate) device: [u8; DeviceRecord::LEN],
     pub(crate) communication: Vec<u8, COMMUNICATION_SIZE>,
     pub(crate) application: Vec<u8, APPLICATION_SIZE>,
@@ -24,6 +25,7 @@ impl Parcel {
     pub const fn new() -> Parcel {
         Parcel {
             job: None,
+            layout: 0,
             device: [0; DeviceRecord::LEN],
             communication: Vec::new(),
             application: Vec::new(),
@@ -39,7 +41,9 @@ impl Parcel {
         let [communication, application] = [Group::Communication, Group::Application];
         let changes: Vec<Change<'_>, 2> = match self.job {
             None => Vec::new(),
-            Some(Job::Configure(_)) => some([Some(set(Group::Device, DeviceRecord::VERSION, &self.device))]),
+            Some(Job::Configure(_) | Job::Set(_)) => {
+                some([Some(set(Group::Device, DeviceRecord::VERSION, &self.device))])
+            }
             Some(Job::Save(selection)) => some(
                 [communication, application]
                     .map(|group| selects(selection, group).then(|| self.change(group))),
@@ -58,7 +62,7 @@ impl Parcel {
     fn change(&self, group: Group) -> Change<'_> {
         let value: &[u8] =
             if group == Group::Communication { &self.communication } else { &self.application };
-        set(group, LAYOUT, value)
+        set(group, self.layout, value)
     }
 }
 

@@ -151,6 +151,12 @@ impl<A: Application, const N: usize> Device<A, N> {
         &mut self.core.image
     }
 
+    /// Lets the application show its state in the image. To be followed by [`changed`](Device::changed) where that can be
+    /// mapped.
+    pub fn show(&mut self, show: impl FnOnce(&A, &mut [u8])) {
+        show(&self.core.application, &mut self.core.image);
+    }
+
     /// The application.
     #[must_use]
     pub fn application(&self) -> &A {

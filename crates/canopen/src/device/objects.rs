@@ -1,6 +1,6 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
-use super::{Application, Core, Part, STALE};
+use super::{Application, Core, Job, Part, STALE};
 use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
@@ -8,7 +8,7 @@ use crate::{Duration, Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
+        let entry = self.entry(at)?;
         if !entry.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
@@ -55,8 +55,17 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
-    fn writable_entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+    /// The entry, or the one that it is another name of.
+    fn entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
+        match entry.rule {
+            Rule::EventTimerOf(number) => self.dictionary.find(0x1800 | u16::from(number), 5),
+            _ => Ok(entry),
+        }
+    }
+
+    fn writable_entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+        let entry = self.entry(at)?;
         if entry.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
     }
 
@@ -99,6 +108,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
             Rule::Store | Rule::Restore => self.admit_store(entry, value),
+            Rule::Setting => self.begin_deferred(Job::Set(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
             Rule::PdoCobId => self.admit_pdo_cob_id(entry, value),

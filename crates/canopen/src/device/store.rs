@@ -1,4 +1,4 @@
-//! What the memory has to do with: objects 1010h, 1011h and 1F51h, the configuration of LSS, and what a start finds stored.
+//! What the memory has to do with: objects 1010h, 1011h and 1F51h, settings, the configuration of LSS, and what a start finds stored.
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
@@ -59,6 +59,8 @@ pub enum Job {
     Restore(Selection),
     /// Store node-ID and bit rate.
     Configure(Configuration),
+    /// Store the value of the entry with [`Rule::Setting`].
+    Set(u8),
 }
 
 /// What is stored of a group.
@@ -148,6 +150,11 @@ impl<A: Application, const N: usize> Core<A, N> {
             (Rule::Restore, LOAD) => Job::Restore(selection),
             _ => return Err(Abort::NotStored),
         };
+        self.begin_deferred(job)
+    }
+
+    /// Begins a job for whose end the answer to the client waits.
+    pub(super) fn begin_deferred(&mut self, job: Job) -> Result<(), Abort> {
         self.jobs.begin(job)?;
         self.jobs.is_deferred = true;
         Ok(())

@@ -123,8 +123,19 @@ pub const fn check(rows: &[Object]) {
         }
         let has_sub_0 = rows[i].sub == 0 || (i > 0 && rows[i - 1].index == rows[i].index);
         assert!(has_sub_0, "an object has no sub-index 0");
+        if let Rule::EventTimerOf(number) = rows[i].rule {
+            assert!(has(rows, (0x1800 | number as u32) << 8 | 5), "there is no such event timer");
+        }
         i += 1;
     }
+}
+
+const fn has(rows: &[Object], key: u32) -> bool {
+    let mut i = 0;
+    while i < rows.len() && rows[i].key() != key {
+        i += 1;
+    }
+    i < rows.len()
 }
 
 const fn check_row(row: &Object) {
@@ -161,6 +172,13 @@ const fn check_row(row: &Object) {
     // An RPDO writes without a check, so what it writes must have none: any value of an integer type.
     let takes_any = matches!(row.rule, Rule::Plain) && row.limits.is_none() && row.kind.range().is_some();
     assert!(!rpdo || (row.access.is_writable() && takes_any), "an RPDO writes what takes any value");
+    let is_byte = matches!(row.kind, Type::Unsigned8);
+    assert!(!matches!(row.rule, Rule::Setting) || is_byte, "a setting is a number of eight bits");
+    let is_time = matches!(row.kind, Type::Unsigned16) && matches!(row.group, Group::Volatile);
+    assert!(
+        !matches!(row.rule, Rule::EventTimerOf(_)) || is_time,
+        "an event timer is saved under its own index"
+    );
     let listed = matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
     assert!(!listed || row.index == 0x1003, "the error list is object 1003h");
 }

@@ -109,12 +109,16 @@ pub enum Rule {
     PdoEventTimer,
     /// 1800h..:6, SYNC start value.
     PdoSyncStart,
+    /// Another name of 1800h..:5, the event timer of this TPDO, from 0: the cyclic timer of a device profile.
+    EventTimerOf(u8),
     /// 1600h.., 1A00h..:0, number of mapped objects.
     PdoCount,
     /// 1600h.., 1A00h..:1 and up, a mapped object.
     PdoSlot,
     /// 1FA0h:1 and up, a line of the object scanner list.
     ScannerLine,
+    /// A setting that is stored at once: a write is answered when it is, and the application then shows it.
+    Setting,
     /// The application decides, by this number.
     Application(u8),
 }
@@ -122,12 +126,12 @@ pub enum Rule {
 impl Rule {
     /// Whether what is written is a command: the value that is read stays.
     pub(crate) const fn is_command(self) -> bool {
-        matches!(self, Rule::Store | Rule::Restore | Rule::ProgramControl)
+        matches!(self, Rule::Store | Rule::Restore | Rule::ProgramControl | Rule::Setting)
     }
 
     /// Whether the value lives elsewhere and takes no place in the image.
     pub(crate) const fn is_computed(self) -> bool {
-        matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
+        matches!(self, Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_))
     }
 }
 

@@ -15,6 +15,14 @@ pub enum Fault {
     TemperatureRail,
     /// The pressure input is at a rail of the converter.
     PressureRail,
+    /// An encoder does not answer, or not as one.
+    EncoderBreak,
+    /// The encoders take too much current.
+    InputCurrent,
+    /// The supply of the encoders is out of its limits.
+    InputVoltage,
+    /// A memory of the hardware is damaged.
+    HardwareMemory,
     /// A module did not initialise.
     ModuleInitialisation,
     /// The image does not fit the hardware.
@@ -52,17 +60,21 @@ pub enum Fault {
 }
 
 /// The first bit of communication faults in a set of faults.
-const COMMUNICATION: u8 = 16;
+const COMMUNICATION: u8 = 20;
 
 impl Fault {
     /// Those that exist once.
-    const SINGLE: [Fault; 19] = [
+    const SINGLE: [Fault; 23] = [
         Fault::SensorClock,
         Fault::SensorBoot,
         Fault::SensorBreak,
         Fault::SensorMemory,
         Fault::TemperatureRail,
         Fault::PressureRail,
+        Fault::EncoderBreak,
+        Fault::InputCurrent,
+        Fault::InputVoltage,
+        Fault::HardwareMemory,
         Fault::ModuleInitialisation,
         Fault::HardwareIdentification,
         Fault::ParameterStore,
@@ -87,8 +99,8 @@ impl Fault {
             .chain((0..8).map(Fault::RpdoDeadline))
     }
 
-    /// Its bit in a set of faults, and its emergency error code: CiA 301, table 26, and the codes of the classes 50xxh,
-    /// 61xxh, 63xxh and 80xxh that are the manufacturer's.
+    /// Its bit in a set of faults, and its emergency error code: CiA 301, table 26, CiA 406, 5.1, and the codes of the
+    /// classes 50xxh, 61xxh, 63xxh and 80xxh that are the manufacturer's.
     const fn definition(self) -> (u8, u16) {
         match self {
             Fault::ModuleInitialisation => (0, 0x5001),
@@ -104,6 +116,10 @@ impl Fault {
             Fault::ApplicationData => (10, 0x6303),
             Fault::TemperatureRail => (11, 0x8001),
             Fault::PressureRail => (12, 0x8002),
+            Fault::EncoderBreak => (13, 0x5006),
+            Fault::InputCurrent => (14, 0x2110),
+            Fault::InputVoltage => (15, 0x3110),
+            Fault::HardwareMemory => (16, 0x5100),
             Fault::Overrun => (COMMUNICATION, 0x8110),
             Fault::ErrorPassive => (COMMUNICATION + 1, 0x8120),
             Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),
@@ -123,7 +139,8 @@ impl Fault {
         self.definition().1
     }
 
-    /// Manufacturer-specific error field: which one, from 1, of those that exist several times.
+    /// Manufacturer-specific error field: which one, from 1, of those that exist several times; 1 for the encoder's
+    /// sensor, whose code is that of the pressure sensor.
     #[must_use]
     pub const fn detail(self) -> [u8; 5] {
         match self {
@@ -131,6 +148,7 @@ impl Fault {
             | Fault::RpdoTooShort(number)
             | Fault::RpdoTooLong(number)
             | Fault::RpdoDeadline(number) => [number.saturating_add(1), 0, 0, 0, 0],
+            Fault::EncoderBreak => [1, 0, 0, 0, 0],
             _ => [0; 5],
         }
     }
@@ -162,12 +180,19 @@ impl FaultSet {
     }
 
     pub(crate) fn iter(self) -> impl Iterator<Item = Fault> {
-        Fault::all().filter(move |fault| self.0 & 1 << fault.definition().0 != 0)
+        Fault::all().filter(move |fault| self.contains(*fault))
     }
 
-    /// The error register (1001h): the generic bit for any fault, the communication bit for those of communication.
+    /// The error register (1001h): bit 0 for any fault, bits 1 and 2 for current and voltage, bit 4 for communication.
     pub(crate) fn register(self) -> u8 {
-        u8::from(self.0 != 0) | u8::from(self.0 >> COMMUNICATION != 0) << 4
+        u8::from(self.0 != 0)
+            | u8::from(self.contains(Fault::InputCurrent)) << 1
+            | u8::from(self.contains(Fault::InputVoltage)) << 2
+            | u8::from(self.0 >> COMMUNICATION != 0) << 4
+    }
+
+    fn contains(self, fault: Fault) -> bool {
+        self.0 & 1 << fault.definition().0 != 0
     }
 }
 

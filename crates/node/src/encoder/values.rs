@@ -8,8 +8,25 @@ use profiles::encoder::{
     Parity, SensorType, Snapshot,
 };
 
+/// 6004h and 6020h:1 as they are mapped.
+pub(super) const POSITION: u32 = 0x6004_0020;
+const FIRST_POSITION: u32 = 0x6020_0120;
+
+/// Type of an encoder with several sensors.
+const MULTI_SENSOR: u8 = 10;
+
+/// CiA 406.
+const PROFILE_NUMBER: u32 = 0x196;
+
+/// The device type: the type of the encoder and the number of the profile.
+pub(crate) const fn device_type(encoder_type: u8) -> u32 {
+    (encoder_type as u32) << 16 | PROFILE_NUMBER
+}
+
 /// Where the encoder's values are in the image of a dictionary that has its objects.
-pub struct Fields {
+pub(crate) struct Fields {
+    device_type: Field,
+    mappings: [Field; 2],
     pub(super) channels: [Channel; 2],
     /// The preset, the position and the offset of the first channel, where there is no sub-index.
     pub(super) preset: Field,
@@ -142,13 +159,11 @@ impl Channel {
 }
 
 impl Fields {
-    /// Looks them up.
-    ///
-    /// # Panics
-    /// During compilation, when the dictionary does not have them all.
-    #[must_use]
-    pub const fn new(d: &Dictionary) -> Fields {
+    /// Looks them up, during compilation; the index of the device type is 1000h or 67FFh.
+    pub(crate) const fn new(d: &Dictionary, device_type: u16) -> Fields {
         Fields {
+            device_type: d.field(device_type, 0),
+            mappings: [d.field(0x1A00, 1), d.field(0x1A01, 1)],
             channels: [Channel::new(d, 1), Channel::new(d, 2)],
             preset: d.field(0x6003, 0),
             position: d.field(0x6004, 0),
@@ -183,13 +198,28 @@ impl Fields {
         }
     }
 
-    /// Fills in the serial number (650Bh, hard-wired to 1018h:4), which no table can know.
-    pub fn set_serial_number(&self, serial_number: u32, image: &mut [u8]) {
+    /// Fills in what no table can know: the serial number (650Bh, hard-wired to 1018h:4), and what follows from the
+    /// sensors that there are.
+    pub(crate) fn initialise(&self, serial_number: u32, image: &mut [u8]) {
         self.serial_number.store(image, serial_number.to_le_bytes());
+        let encoder_type = self.parameters(image).encoder_type();
+        self.device_type.store(image, device_type(encoder_type).to_le_bytes());
+        if encoder_type == MULTI_SENSOR {
+            self.map_first_channel(image);
+        }
+    }
+
+    /// An encoder with several sensors has 6020h:1 where another one has 6004h (CiA 406, 1A00h): the same bits.
+    fn map_first_channel(&self, image: &mut [u8]) {
+        for mapping in &self.mappings {
+            if mapping.u32(image) == POSITION {
+                mapping.store(image, FIRST_POSITION.to_le_bytes());
+            }
+        }
     }
 
     /// Takes a snapshot into the image.
-    pub fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+    pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
         for (channel, values) in self.channels.iter().zip(&snapshot.channels) {
             channel.publish(values, image);
         }
@@ -208,8 +238,7 @@ impl Fields {
     }
 
     /// The parameters in the image. A value that no write could have put there acts as the default one.
-    #[must_use]
-    pub fn parameters(&self, image: &[u8]) -> Parameters {
+    pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         let [offset, low, high] = self.module.map(|at| i32::from_le_bytes(at.load(image)));
         let mask = self.acknowledgement.u16(image).into();
         Parameters {
