@@ -199,6 +199,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.load_stored(Group::Communication);
         if everything {
             self.load_stored(Group::Application);
+            self.load_stored(Group::Calibration);
         }
         self.application.initialise(&mut self.image);
         self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
