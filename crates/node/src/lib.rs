@@ -13,6 +13,7 @@ pub mod encoder;
 mod faults;
 mod flags;
 mod keeping;
+pub mod lift;
 mod manufacturer;
 mod measurement;
 mod parcel;
@@ -32,7 +33,9 @@ pub use canopen::{Frame, Instant, NodeId, QueueFull, Transmit};
 pub use measurement::{Measurement, Parameters, Snapshot};
 pub use parcel::Parcel;
 pub use personality::Personality;
-pub use profiles::encoder::{Kept, RawEncoder, Start};
+pub use profiles::encoder::{
+    Board as EncoderBoard, ChannelParameters as EncoderChannel, Frame as SsiFrame, Kept, RawEncoder, Start,
+};
 pub use profiles::pressure::{FactoryCalibration, RawSample};
 pub use protocol::Protocol;
 pub use setup::{REVISION, Setup, VENDOR_ID};

@@ -103,6 +103,9 @@ pub enum Rule {
     StartUp,
     /// 1400h.., 1800h..:1, COB-ID of a PDO.
     PdoCobId,
+    /// The same of a PDO to which a profile has given its CAN-ID: only the flags change. The profile may have chosen a
+    /// CAN-ID that CiA 301 restricts, as CiA 417 does with 180h.
+    PdoPredefined,
     /// 1400h.., 1800h..:2, transmission type.
     PdoType,
     /// 1800h..:3, inhibit time.

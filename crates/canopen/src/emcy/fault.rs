@@ -53,11 +53,11 @@ pub enum Fault {
     MpdoNotTaken,
     /// The heartbeat of a node is missing: entry of 1016h, from 0.
     Heartbeat(u8),
-    /// An RPDO, from 0, was shorter than its mapping and is not processed.
+    /// An RPDO, counted from 0 among those of the dictionary, was shorter than its mapping and is not processed.
     RpdoTooShort(u8),
-    /// An RPDO, from 0, was longer than its mapping.
+    /// An RPDO, counted the same way, was longer than its mapping.
     RpdoTooLong(u8),
-    /// An RPDO, from 0, did not come in time.
+    /// An RPDO, counted the same way, did not come in time.
     RpdoDeadline(u8),
 }
 
