@@ -1,6 +1,6 @@
 //! Measured values into the image, parameters out of it.
 
-use super::sensors::Sensors;
+use crate::encoder::Sensors;
 use canopen::dictionary::{Dictionary, Field};
 use core::num::{NonZeroU16, NonZeroU32};
 use profiles::encoder::Area;
