@@ -33,7 +33,9 @@ pub use canopen::{Frame, Instant, NodeId, QueueFull, Transmit};
 pub use measurement::{Measurement, Parameters, Snapshot};
 pub use parcel::Parcel;
 pub use personality::Personality;
-pub use profiles::encoder::{Kept, RawEncoder, Start};
+pub use profiles::encoder::{
+    Board as EncoderBoard, ChannelParameters as EncoderChannel, Frame as SsiFrame, Kept, RawEncoder, Start,
+};
 pub use profiles::pressure::{FactoryCalibration, RawSample};
 pub use protocol::Protocol;
 pub use setup::{REVISION, Setup, VENDOR_ID};

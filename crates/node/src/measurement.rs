@@ -21,6 +21,12 @@ pub struct Snapshot {
     pub encoder: Option<encoder::Snapshot>,
 }
 
+impl Snapshot {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.pressure.is_none() && self.encoder.is_none()
+    }
+}
+
 /// The measurement chains and their state. Nothing is measured before there are parameters: they say what.
 #[derive(Clone, Debug)]
 pub struct Measurement {

@@ -113,6 +113,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
             Rule::Store | Rule::Restore => self.admit_store(entry, value),
+            Rule::StoreCalibration => self.admit_store_calibration(value),
             Rule::Setting => self.begin_deferred(Job::Set(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
@@ -128,7 +129,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// What follows from a new value.
     fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
-        self.pending.parameters |= entry.group == Group::Application;
+        self.pending.parameters |= matches!(entry.group, Group::Application | Group::Calibration);
         match entry.rule {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,

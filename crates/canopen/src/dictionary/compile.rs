@@ -2,6 +2,7 @@
 
 use super::{Access, DefaultValue, Entry, Field, Group, Mapping, Object, Rule, Type};
 use crate::device::{RPDOS, TPDOS};
+use crate::pdo::WATCHED;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -118,9 +119,10 @@ pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
     assert!(pdos(rows, 0x1400) <= RPDOS, "more RPDOs than a device has");
     assert!(pdos(rows, 0x1800) <= TPDOS, "more TPDOs than a device has");
-    let mut i = 0;
+    let (mut i, mut sent) = (0, 0);
     while i < rows.len() {
         check_row(&rows[i]);
+        sent += matches!(rows[i].mapping, Mapping::Tpdo) as usize;
         if i > 0 {
             assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
         }
@@ -131,6 +133,7 @@ pub const fn check(rows: &[Object]) {
         }
         i += 1;
     }
+    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
 }
 
 /// PDOs with communication objects among the 512 indexes from `first` on.

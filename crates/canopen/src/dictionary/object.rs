@@ -49,6 +49,8 @@ pub enum Group {
     Communication,
     /// Application parameters, sub-index 3.
     Application,
+    /// Calibration, saved by [`Rule::StoreCalibration`]: 1010h and 1011h do not touch it.
+    Calibration,
 }
 
 /// The value after a reset with nothing saved.
@@ -120,6 +122,8 @@ pub enum Rule {
     PdoSlot,
     /// 1FA0h:1 and up, a line of the object scanner list.
     ScannerLine,
+    /// Stores the calibration, as 1010h does the other parameters.
+    StoreCalibration,
     /// A setting that is stored at once: a write is answered when it is, and the application then shows it.
     Setting,
     /// The application decides, by this number.
@@ -129,7 +133,10 @@ pub enum Rule {
 impl Rule {
     /// Whether what is written is a command: the value that is read stays.
     pub(crate) const fn is_command(self) -> bool {
-        matches!(self, Rule::Store | Rule::Restore | Rule::ProgramControl | Rule::Setting)
+        matches!(
+            self,
+            Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::ProgramControl | Rule::Setting
+        )
     }
 
     /// Whether the value lives elsewhere and takes no place in the image.

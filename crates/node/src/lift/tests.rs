@@ -28,6 +28,7 @@ fn pressure(permille: u32) -> RawSample {
         pressure: supply / 10 + permille * (supply / 10 * 8) / 1000,
         supply,
         temperature: 0,
+        thermistor: 0,
         vrefint: 0,
         count: 16,
         factory,

@@ -134,7 +134,7 @@ impl LoadUnit {
     pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
         let Some((factor, constant)) = self.line else { return Snapshot::default() };
         let p = &self.parameters;
-        let is_broken = p.transducer.is_break(raw.ratio()) || raw.is_rail(raw.pressure);
+        let is_broken = p.transducer.pressure.is_break(raw.ratio()) || raw.is_rail(raw.pressure);
         if is_broken {
             // What comes after it shall not be mixed with what was before.
             self.filter = Filter::new(p.filter_type, p.filter_constant);
@@ -147,7 +147,9 @@ impl LoadUnit {
                 is_broken,
             };
         }
-        let measured = self.filter.next(p.transducer.pressure(raw.ratio())) * factor + constant;
+        let kelvin = p.transducer.temperature.temperature(raw);
+        let pascal = p.transducer.pressure.pressure(raw.ratio(), kelvin);
+        let measured = self.filter.next(pascal) * factor + constant;
         let load = rounded(measured);
         Snapshot { load, measured, signals: signals(load, &p.limits), offset: p.offset, is_broken }
     }
@@ -185,7 +187,7 @@ mod tests {
     fn raw(pascal: f64) -> RawSample {
         let factory = FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
         let pressure = (64_000.0 * (0.1 + 0.8 * pascal / 1.0e6)).round() as u32;
-        RawSample { pressure, supply: 64_000, temperature: 0, vrefint: 0, count: 16, factory }
+        RawSample { pressure, supply: 64_000, temperature: 0, thermistor: 0, vrefint: 0, count: 16, factory }
     }
 
     fn hydraulic() -> Parameters {
