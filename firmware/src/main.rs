@@ -84,7 +84,7 @@ mod app {
         receiver_services: Receiver,
         sampling: Sampling,
         shaft: Shaft,
-        measurement: Measurement,
+        measurement: &'static mut Measurement,
         factory: FactoryCalibration,
         transmitter: Transmitter,
         time: TimeInterrupt,
@@ -100,6 +100,7 @@ mod app {
         lost: Losses = Losses::new(),
         // Too large to be handed around on the stack.
         protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
+        measurement_place: MaybeUninit<Measurement> = MaybeUninit::uninit(),
         parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
@@ -128,7 +129,7 @@ mod app {
             receiver_services,
             sampling: board.sampling,
             shaft: Shaft::new(board.encoder, board.ssi, surroundings),
-            measurement: Measurement::new(remembering::start(&board.found)),
+            measurement: cx.local.measurement_place.write(Measurement::new(remembering::start(&board.found))),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,

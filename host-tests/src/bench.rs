@@ -82,6 +82,7 @@ pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
         supply,
         temperature: (16.0 * temperature).round() as u32,
         vrefint: 16 * 1500,
+        thermistor: 0,
         count: 16,
         factory,
     }

@@ -8,6 +8,8 @@ use crate::bench::{ID, setup};
 
 /// The CMP 8271: its communication segment, its own objects and CiA 404.
 const TRANSMITTER: &str = include_str!("../tables/cia404.csv");
+/// How a transmitter is calibrated.
+const CALIBRATION: &str = include_str!("../tables/calibration.csv");
 /// What every node has of CiA 301 beyond that, and objects of its own.
 const COMMUNICATION: &str = include_str!("../tables/cia301.csv");
 /// CiA 406, classes C1 and C2.
@@ -134,7 +136,7 @@ fn as_second_device(row: Row) -> Row {
 /// Every entry that the documents give a node of this personality.
 #[must_use]
 pub fn table(personality: Personality) -> Vec<Row> {
-    let (transmitter, common) = (rows(TRANSMITTER), rows(COMMUNICATION));
+    let (transmitter, common) = (rows(TRANSMITTER).chain(rows(CALIBRATION)), rows(COMMUNICATION));
     let encoder = || rows(ENCODER).chain(rows(SENSORS));
     let all: Vec<Row> = match personality {
         Personality::Pressure => common.chain(transmitter).collect(),

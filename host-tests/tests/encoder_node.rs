@@ -64,6 +64,18 @@ fn tpdo1_carries_the_position_on_entering_operational() {
 }
 
 #[test]
+fn a_node_that_starts_by_itself_sends_no_position_that_it_has_not_measured() {
+    let mut bench = operational();
+    turn_to(&mut bench, 1234);
+    bench.write(0x1F80, 0, &8_u32.to_le_bytes()).unwrap();
+    bench.write(0x1010, 1, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!((bench.protocol.state(), positions(&mut bench, TPDO1)), (State::PreOperational, vec![]));
+    turn_to(&mut bench, 0);
+    assert_eq!((bench.protocol.state(), positions(&mut bench, TPDO1)), (State::Operational, vec![1234]));
+}
+
+#[test]
 fn a_shaft_that_turns_is_seen_in_the_same_millisecond_in_both_directions() {
     let mut bench = operational();
     let revolution = 4096 * 4096;

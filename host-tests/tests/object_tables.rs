@@ -77,15 +77,15 @@ fn writing_is_refused_or_taken_as_the_access_says() {
         }
         let value = match row.index {
             0x6125 | 0x6925 => b"zero".to_vec(),
-            0x1010 => b"save".to_vec(),
+            0x1010 | 0x2204 => b"save".to_vec(),
             0x1011 => b"load".to_vec(),
             0x2F00 => vec![1, 2, 3],
             _ if row.access == "wo" => vec![0; size],
             _ => bench.read(row.index, row.sub).unwrap(),
         };
         let expected = match (row.index, row.sub) {
-            // Factory data is locked.
-            (0x2107, _) => Err(ACCESS),
+            // Factory data and the calibration are locked.
+            (0x2107 | 0x2200..=0x2202, _) => Err(ACCESS),
             // There is no second encoder.
             (0x6010, 2) => Err(DEVICE_STATE),
             _ => Ok(()),

@@ -53,6 +53,8 @@ impl Flags {
 /// The bits of a fault in 3000h:1 and 3000h:3. Bits 0 to 6 are those of a pressure transmitter, the rest is the encoder's.
 fn bits(fault: Fault) -> (u32, u32) {
     match fault {
+        // The sensor was not set up as it should: it runs with the calibration of no device.
+        Fault::CalibrationData => (1, 0),
         Fault::SensorClock => (1 << 1, 0),
         Fault::SensorBoot => (1 << 2, 0),
         Fault::TemperatureRail => (1 << 3, 0),

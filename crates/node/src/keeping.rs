@@ -26,10 +26,12 @@ impl Protocol {
             Some(Job::Save(selection)) => {
                 self.pack_group(Group::Communication, selection, &mut parcel.communication);
                 self.pack_group(Group::Application, selection, &mut parcel.application);
+                self.pack_group(Group::Calibration, selection, &mut parcel.calibration);
             }
             Some(Job::Restore(_)) => {
                 parcel.communication.clear();
                 parcel.application.clear();
+                parcel.calibration.clear();
             }
             Some(job @ (Job::Configure(_) | Job::Set(_))) => {
                 parcel.device = self.device.application().configured.after(job).encode();
@@ -68,6 +70,7 @@ impl Protocol {
             let stored = &mut profile.stored;
             take_over(&mut stored.communication, Group::Communication, selection, &parcel.communication);
             take_over(&mut stored.application, Group::Application, selection, &parcel.application);
+            take_over(&mut stored.calibration, Group::Calibration, selection, &parcel.calibration);
         }
         self.device.show(Profile::show_personality);
     }

@@ -13,6 +13,7 @@ pub mod encoder;
 mod faults;
 mod flags;
 mod keeping;
+pub mod lift;
 mod manufacturer;
 mod measurement;
 mod parcel;

@@ -21,8 +21,14 @@ pub struct Snapshot {
     pub encoder: Option<encoder::Snapshot>,
 }
 
+impl Snapshot {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.pressure.is_none() && self.encoder.is_none()
+    }
+}
+
 /// The measurement chains and their state. Nothing is measured before there are parameters: they say what.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Measurement {
     pressure: Transmitter,
     encoder: Encoder,
@@ -34,7 +40,12 @@ impl Measurement {
     /// A measurement after power-on, with what was kept of the encoder.
     #[must_use]
     pub fn new(start: Start) -> Measurement {
-        Measurement { encoder: Encoder::new(start), ..Measurement::default() }
+        Measurement {
+            pressure: Transmitter::default(),
+            encoder: Encoder::new(start),
+            has_pressure: false,
+            has_encoder: false,
+        }
     }
 
     /// Takes over new parameters, from the next sample on.

@@ -22,7 +22,9 @@ pub(crate) const IMAGE_SIZE: usize =
 /// The same for the parameters as they are stored.
 pub(crate) const COMMUNICATION_SIZE: usize = largest_packed(Group::Communication);
 pub(crate) const APPLICATION_SIZE: usize = largest_packed(Group::Application);
+pub(crate) const CALIBRATION_SIZE: usize = largest_packed(Group::Calibration);
 const _: () = assert!(COMMUNICATION_SIZE <= storage::MAX_VALUE && APPLICATION_SIZE <= storage::MAX_VALUE);
+const _: () = assert!(CALIBRATION_SIZE <= storage::MAX_VALUE);
 
 const fn largest_packed(group: Group) -> usize {
     let [a, b, c] = TABLES;
@@ -102,13 +104,18 @@ impl Application for Profile {
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {
-        self.stored.get(group)
+        match self.definition().pressure {
+            // It is that of the pressure channel: what does not have one lets it be.
+            None if group == Group::Calibration => self.stored.get(Group::Volatile),
+            _ => self.stored.get(group),
+        }
     }
 
     fn loaded(&mut self, group: Group, good: bool) {
         let fault = match group {
             Group::Communication => Fault::CommunicationData,
             Group::Application => Fault::ApplicationData,
+            Group::Calibration => Fault::CalibrationData,
             Group::Volatile => return,
         };
         self.flags.set(fault, !good);

@@ -52,8 +52,12 @@ impl Protocol {
         self.device.on_service_frame(frame, now, out);
     }
 
-    /// Takes the values of the last millisecond into the dictionary and sends what their change triggers.
+    /// Takes the values of the last millisecond into the dictionary and sends what their change triggers. Before the
+    /// measurement has parameters there are none.
     pub fn publish(&mut self, snapshot: &Snapshot, now: Instant, out: &mut impl Transmit) {
+        if snapshot.is_empty() {
+            return;
+        }
         let definition = self.device.application().definition();
         let image = self.device.image_mut();
         if let (Some(fields), Some(snapshot)) = (definition.pressure, &snapshot.pressure) {

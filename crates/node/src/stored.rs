@@ -2,7 +2,7 @@
 //! wait for the flash.
 
 use crate::Personality;
-use crate::profile::{APPLICATION_SIZE, COMMUNICATION_SIZE};
+use crate::profile::{APPLICATION_SIZE, CALIBRATION_SIZE, COMMUNICATION_SIZE};
 use canopen::dictionary::Group;
 use embedded_storage::nor_flash::ReadNorFlash;
 use heapless::{Vec, VecView};
@@ -17,6 +17,9 @@ const FORM: u8 = 1;
 pub(crate) fn layout(personality: Personality) -> u16 {
     u16::from_le_bytes([FORM, personality.number()])
 }
+
+/// The calibration is that of the device, whatever its personality.
+pub(crate) const CALIBRATION_LAYOUT: u16 = FORM as u16;
 
 /// The packed values of one group.
 #[derive(Debug)]
@@ -43,31 +46,36 @@ impl<const N: usize> Kept<N> {
     }
 }
 
-/// The packed values of the groups that 1010h stores.
+/// The packed values of the groups that are stored.
 #[derive(Debug)]
 pub(crate) struct Stored {
     pub(crate) communication: Kept<COMMUNICATION_SIZE>,
     pub(crate) application: Kept<APPLICATION_SIZE>,
+    pub(crate) calibration: Kept<CALIBRATION_SIZE>,
 }
 
 impl Stored {
-    pub(crate) const NOTHING: Stored = Stored { communication: Kept::EMPTY, application: Kept::EMPTY };
+    pub(crate) const NOTHING: Stored =
+        Stored { communication: Kept::EMPTY, application: Kept::EMPTY, calibration: Kept::EMPTY };
 
-    /// Reads both groups. What cannot be read counts as not stored, and as a fault.
+    /// Reads all groups. What cannot be read counts as not stored, and as a fault.
     pub(crate) fn load<F: ReadNorFlash>(&mut self, layout: u16, view: &mut View<F>) {
         self.communication.load(storage::Group::Communication, layout, view);
         self.application.load(storage::Group::Application, layout, view);
+        self.calibration.load(storage::Group::Calibration, CALIBRATION_LAYOUT, view);
     }
 
     /// 1F57h:1 as the running program gives it (CiA 302-3): 0, or in bits 1 to 7 code 3, format or CRC error.
     pub(crate) fn flash_status(&self) -> u32 {
-        if self.communication.is_sound && self.application.is_sound { 0 } else { 3 << 1 }
+        let is_sound = self.communication.is_sound && self.application.is_sound && self.calibration.is_sound;
+        if is_sound { 0 } else { 3 << 1 }
     }
 
     pub(crate) fn get(&self, group: Group) -> canopen::Stored<'_> {
         match group {
             Group::Communication => self.communication.get(),
             Group::Application => self.application.get(),
+            Group::Calibration => self.calibration.get(),
             Group::Volatile => canopen::Stored { packed: &[], is_sound: true },
         }
     }

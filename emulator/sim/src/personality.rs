@@ -62,6 +62,6 @@ mod tests {
         for personality in Personality::ALL {
             assert_eq!(personality.to_string().parse(), Ok(personality));
         }
-        assert!("toaster".parse::<Personality>().unwrap_err().contains("it has: pressure, encoder"));
+        assert!("valve".parse::<Personality>().unwrap_err().contains("it has: pressure, encoder, combined"));
     }
 }

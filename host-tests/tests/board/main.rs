@@ -3,5 +3,6 @@
 mod configuring;
 mod encoder;
 mod faults;
+mod measuring;
 mod running;
 mod support;

@@ -30,8 +30,8 @@ use crate::sdo::{Response, Server};
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
 /// How many PDOs a device can have each way; which of them it has, the dictionary says.
-const TPDOS: usize = 8;
-const RPDOS: usize = 8;
+pub(crate) const TPDOS: usize = 8;
+pub(crate) const RPDOS: usize = 8;
 
 /// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
 #[derive(Debug)]

@@ -1,6 +1,8 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::{Access, DefaultValue, Entry, Field, Group, Mapping, Object, Rule, Type};
+use crate::device::{RPDOS, TPDOS};
+use crate::pdo::WATCHED;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -109,15 +111,18 @@ const fn default_byte(value: DefaultValue, i: usize) -> u8 {
 }
 
 /// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
-/// are others, attributes that fit together.
+/// are others, attributes that fit together, no more PDOs than a device has room for.
 ///
 /// # Panics
 /// During compilation, when a row is wrong.
 pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    let mut i = 0;
+    assert!(pdos(rows, 0x1400) <= RPDOS, "more RPDOs than a device has");
+    assert!(pdos(rows, 0x1800) <= TPDOS, "more TPDOs than a device has");
+    let (mut i, mut sent) = (0, 0);
     while i < rows.len() {
         check_row(&rows[i]);
+        sent += matches!(rows[i].mapping, Mapping::Tpdo) as usize;
         if i > 0 {
             assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
         }
@@ -128,6 +133,17 @@ pub const fn check(rows: &[Object]) {
         }
         i += 1;
     }
+    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
+}
+
+/// PDOs with communication objects among the 512 indexes from `first` on.
+const fn pdos(rows: &[Object], first: u16) -> usize {
+    let (mut total, mut i) = (0, 0);
+    while i < rows.len() {
+        let is_one = rows[i].index & 0xFE00 == first && rows[i].sub == 1;
+        (total, i) = (total + is_one as usize, i + 1);
+    }
+    total
 }
 
 const fn has(rows: &[Object], key: u32) -> bool {

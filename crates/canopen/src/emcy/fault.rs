@@ -37,6 +37,8 @@ pub enum Fault {
     CommunicationData,
     /// Application parameters could not be loaded.
     ApplicationData,
+    /// The calibration could not be loaded.
+    CalibrationData,
     /// A received frame was lost.
     Overrun,
     /// The CAN controller is error passive.
@@ -51,11 +53,11 @@ pub enum Fault {
     MpdoNotTaken,
     /// The heartbeat of a node is missing: entry of 1016h, from 0.
     Heartbeat(u8),
-    /// An RPDO, from 0, was shorter than its mapping and is not processed.
+    /// An RPDO, counted from 0 among those of the dictionary, was shorter than its mapping and is not processed.
     RpdoTooShort(u8),
-    /// An RPDO, from 0, was longer than its mapping.
+    /// An RPDO, counted the same way, was longer than its mapping.
     RpdoTooLong(u8),
-    /// An RPDO, from 0, did not come in time.
+    /// An RPDO, counted the same way, did not come in time.
     RpdoDeadline(u8),
 }
 
@@ -64,7 +66,7 @@ const COMMUNICATION: u8 = 20;
 
 impl Fault {
     /// Those that exist once.
-    const SINGLE: [Fault; 23] = [
+    const SINGLE: [Fault; 24] = [
         Fault::SensorClock,
         Fault::SensorBoot,
         Fault::SensorBreak,
@@ -82,6 +84,7 @@ impl Fault {
         Fault::BootData,
         Fault::CommunicationData,
         Fault::ApplicationData,
+        Fault::CalibrationData,
         Fault::Overrun,
         Fault::ErrorPassive,
         Fault::BusOffRecovered,
@@ -90,7 +93,8 @@ impl Fault {
         Fault::MpdoNotTaken,
     ];
 
-    fn all() -> impl Iterator<Item = Fault> {
+    /// Every fault that there is.
+    pub fn all() -> impl Iterator<Item = Fault> {
         Fault::SINGLE
             .into_iter()
             .chain((0..4).map(Fault::Heartbeat))
@@ -120,6 +124,7 @@ impl Fault {
             Fault::InputCurrent => (14, 0x2110),
             Fault::InputVoltage => (15, 0x3110),
             Fault::HardwareMemory => (16, 0x5100),
+            Fault::CalibrationData => (17, 0x6300),
             Fault::Overrun => (COMMUNICATION, 0x8110),
             Fault::ErrorPassive => (COMMUNICATION + 1, 0x8120),
             Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),

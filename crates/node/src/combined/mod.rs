@@ -41,6 +41,7 @@ const PARTS: &[&[Object]] = &[
     communication::START_UP,
     &[personality(Personality::Combined)],
     encoder::SENSORS,
+    pressure::CALIBRATION,
     &[TRANSFER_BUFFER],
     pressure::STATUS_AND_USER,
     &encoder::PROFILE,

@@ -247,6 +247,7 @@ impl Fields {
             range: self.range.u32(image),
             step: self.step.u32(image),
             speed_step: self.speed_step.u32(image),
+            travel: None,
             channels: self.channels.each_ref().map(|channel| channel.parameters(image)),
             format: self.format(image).unwrap_or(Format::COMMON),
             index: self.index.u8(image) != 0,

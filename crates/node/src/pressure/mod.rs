@@ -1,11 +1,13 @@
 //! The pressure transmitter: its dictionary, and how measured values and parameters come in and out of it.
 
+mod calibration;
 mod manufacturer;
 mod pdos;
 mod profile;
 mod rules;
 mod values;
 
+pub(crate) use calibration::CALIBRATION;
 pub(crate) use manufacturer::STATUS_AND_USER;
 pub(crate) use profile::{INTEGER, REAL};
 pub(crate) use values::Fields;
@@ -29,7 +31,9 @@ const PARTS: &[&[Object]] = &[
     communication::SERVICES,
     &PDOS,
     communication::START_UP,
-    &[personality(Personality::Pressure), TRANSFER_BUFFER],
+    &[personality(Personality::Pressure)],
+    CALIBRATION,
+    &[TRANSFER_BUFFER],
     STATUS_AND_USER,
     REAL,
     INTEGER,

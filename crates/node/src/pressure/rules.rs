@@ -1,6 +1,7 @@
 //! Rules of the profile's own objects.
 
 use super::Fields;
+use super::calibration::{LOCK, VALUE};
 use canopen::dictionary::Entry;
 use canopen::sdo::Abort;
 use profiles::pressure::{STATUS_INVALID, Unit};
@@ -21,6 +22,7 @@ impl Fields {
         let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let known = match rule {
             AUTOZERO => return self.autozero(entry.sub(), bytes, image),
+            VALUE..=LOCK => return self.write_calibration(rule, entry, bytes, image),
             PRESSURE_UNIT => Unit::pressure(code).is_some(),
             TEMPERATURE_UNIT => Unit::temperature(code).is_some(),
             _ => true,

@@ -1,7 +1,8 @@
 //! Measured values into the image, parameters out of it.
 
+use super::calibration::Places;
 use canopen::dictionary::{Dictionary, Field};
-use profiles::pressure::{Calibration, ChannelParameters, ChannelValues, Parameters, Snapshot, Span, Unit};
+use profiles::pressure::{ChannelParameters, ChannelValues, Parameters, Snapshot, Span, Unit};
 
 /// Where the values of one channel are.
 pub(super) struct Channel {
@@ -26,6 +27,7 @@ pub(super) struct Channel {
 pub(crate) struct Fields {
     pub(super) pressure: Channel,
     pub(super) temperature: Channel,
+    pub(super) calibration: Places,
 }
 
 impl Channel {
@@ -80,7 +82,11 @@ impl Channel {
 impl Fields {
     /// Looks them up, during compilation; every object of the profile has its index plus `shift`.
     pub(crate) const fn new(d: &Dictionary, shift: u16) -> Fields {
-        Fields { pressure: Channel::new(d, shift, 1), temperature: Channel::new(d, shift, 2) }
+        Fields {
+            pressure: Channel::new(d, shift, 1),
+            temperature: Channel::new(d, shift, 2),
+            calibration: Places::new(d),
+        }
     }
 
     /// Takes a snapshot into the image.
@@ -96,7 +102,7 @@ impl Fields {
         Parameters {
             pressure: self.pressure.parameters(pressure, image),
             temperature: self.temperature.parameters(temperature, image),
-            calibration: Calibration::default(),
+            calibration: self.calibration.calibration(image),
         }
     }
 }
