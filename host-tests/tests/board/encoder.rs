@@ -112,7 +112,11 @@ fn a_fast_shaft_is_followed_both_ways_across_the_wrap() {
         let (least, most) = ages(&mut world, &master, COUNTS, 1 << 24, per_second);
         println!("{rpm} rpm: positions are {least:.0} to {most:.0} us old");
         assert!(least > 0.0 && most < 1200.0, "{rpm} rpm: {least} to {most} us");
-        assert_eq!(read(&mut world, &master, SENSOR_STATE), 0, "no step is lost and the index is in its place");
+        assert_eq!(
+            read(&mut world, &master, SENSOR_STATE),
+            0,
+            "no step is lost and the index is in its place"
+        );
         // In 64 units a revolution the speed fits 6030h.
         write(&mut world, &master, PER_REVOLUTION, 4, 64);
         write(&mut world, &master, OPERATING, 2, SCALING);
@@ -173,7 +177,8 @@ fn the_absolute_encoder_follows_a_fast_shaft_both_ways_over_its_zero() {
 
 #[test]
 fn faults_of_the_absolute_encoder_are_told() {
-    let (mut world, master) = start_absolute("--shaft const:2.25 --fault open-ssi@2..3 --fault wrong-code@4..5");
+    let (mut world, master) =
+        start_absolute("--shaft const:2.25 --fault open-ssi@2..3 --fault wrong-code@4..5");
     // Half a revolution takes four seconds then, and is implausible for so long.
     write(&mut world, &master, FASTEST, 4, 1);
     let (open, wrong) = (NO_SIGNAL | POSITION_ERROR, IMPLAUSIBLE | POSITION_ERROR);
@@ -183,6 +188,20 @@ fn faults_of_the_absolute_encoder_are_told() {
         let position = f64::from(read(&mut world, &master, POSITION));
         assert_eq!(position, 2.25 * STEPS, "the last good one, at {at} ms");
     }
+}
+
+/// It is written after every sample, below the sampling.
+#[test]
+fn to_keep_the_position_costs_little() {
+    /// TAMP_STAMP, to which the firmware binds the task: interrupt 2.
+    const REMEMBER: usize = 16 + 2;
+    let (mut world, _) = start("--shaft rpm:6000");
+    let summary = run(&mut world, SECOND);
+    let stats = world.machine(0).stats().exceptions[REMEMBER];
+    let each = stats.instructions / stats.entries;
+    println!("{each} instructions to keep a position");
+    assert!(stats.entries.abs_diff(summary.nodes[0].sampling.samples) < 10, "{stats:?}");
+    assert!(each < 2000, "{stats:?}");
 }
 
 /// Switches the board off for a second, and on again.
