@@ -8,7 +8,7 @@ use crate::device::{Behaviour, Values};
 use crate::world::World;
 
 /// Positions of the landings in measuring steps of 1 mm.
-pub(crate) const LANDINGS: [u32; 5] = [10_000, 13_000, 16_000, 19_000, 22_000];
+pub(crate) const LANDINGS: [u32; 5] = [10_000, 12_500, 15_000, 17_500, 20_000];
 /// Speed of the car in mm/s.
 pub(crate) const FAST: i32 = 2500;
 const SLOW: i32 = 30;

@@ -10,6 +10,7 @@ use host_tests::network::Unit;
 use node::Request;
 use node::lift::Fields;
 use profiles::lift::Lift;
+use profiles::lift::panel::Lamp;
 
 use crate::device::{TICK, request};
 use crate::table::{NODE, NODE_SIZE, POSITION};
@@ -48,6 +49,7 @@ pub(crate) struct LiftNode {
     device: Device<Rules, NODE_SIZE>,
     node_id: u8,
     lift: Lift,
+    lamp: Lamp,
     world: Rc<RefCell<World>>,
     next_sample: Instant,
 }
@@ -58,6 +60,7 @@ impl LiftNode {
             device: Device::new(&NODE, NodeId::new(node_id), Rules::default()),
             node_id,
             lift: Lift::default(),
+            lamp: Lamp::default(),
             world: Rc::clone(world),
             next_sample: Instant::NEVER,
         }
@@ -96,7 +99,7 @@ impl Unit for LiftNode {
 
     fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         self.device.on_process_frame(frame, now, out);
-        FIELDS.follow_output(self.device.image_mut());
+        FIELDS.follow_output(&mut self.lamp, self.device.image_mut());
     }
 
     fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {

@@ -139,7 +139,7 @@ impl SmallLift {
         self.write(POSITION, 0x2100, 1, &[6]);
         self.write(POSITION, 0x2101, 1, &100_000_u32.to_le_bytes());
         self.write(POSITION, 0x2105, 0, &[0]);
-        self.write(POSITION, 0x63B8, 1, &22_100_i32.to_le_bytes());
+        self.write(POSITION, 0x63B8, 1, &20_100_i32.to_le_bytes());
         self.write(POSITION, 0x63B4, 1, &9_900_i32.to_le_bytes());
         self.write(POSITION, 0x1901, 1, &0xC000_0188_u32.to_le_bytes());
         self.run(5);

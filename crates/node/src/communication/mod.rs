@@ -9,6 +9,7 @@ pub(crate) use objects::{
     ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, STATUS_REGISTER, device_name, device_type,
 };
 pub(crate) use pdos::{
-    RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, tpdo_mappings, tpdos, transmission_type,
+    RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, sync_start, tpdo_mappings, tpdos,
+    transmission_type,
 };
 pub(crate) use start_up::START_UP;

@@ -52,7 +52,7 @@ pub(crate) const fn event_timer(index: u16, milliseconds: i64) -> Object {
     parameter(index, 5, "Event timer", Type::Unsigned16, Rule::PdoEventTimer).value(milliseconds).unit("ms")
 }
 
-const fn sync_start(index: u16) -> Object {
+pub(crate) const fn sync_start(index: u16) -> Object {
     parameter(index, 6, "SYNC start value", Type::Unsigned8, Rule::PdoSyncStart).limits(0, 240)
 }
 

@@ -70,7 +70,7 @@ impl Fields {
         let field = entry.field();
         let before = Saved::of(field, image);
         field.set(image, bytes);
-        let result = allow(self.format(image).is_some() && self.parameters(image).is_consistent());
+        let result = allow(self.sensors.has_format(image) && self.parameters(image).is_consistent());
         field.set(image, before.bytes());
         result
     }

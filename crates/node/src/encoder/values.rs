@@ -1,11 +1,9 @@
 //! Measured values into the image, parameters out of it.
 
-use core::num::{NonZeroU16, NonZeroU32};
-
+use super::Sensors;
 use canopen::dictionary::{Dictionary, Field};
 use profiles::encoder::{
-    Area, Cam, Cams, ChannelParameters, ChannelValues, Coding, Command, Format, Limits, Module, Parameters,
-    Parity, SensorType, Snapshot,
+    Area, Cam, Cams, ChannelParameters, ChannelValues, Command, Module, Parameters, Snapshot,
 };
 
 /// 6004h and 6020h:1 as they are mapped.
@@ -27,6 +25,7 @@ pub(crate) const fn device_type(encoder_type: u8) -> u32 {
 pub(crate) struct Fields {
     device_type: Field,
     mappings: [Field; 2],
+    pub(super) sensors: Sensors,
     pub(super) channels: [Channel; 2],
     /// The preset, the position and the offset of the first channel, where there is no sub-index.
     pub(super) preset: Field,
@@ -40,10 +39,6 @@ pub(crate) struct Fields {
     range: Field,
     step: Field,
     speed_step: Field,
-    format: [Field; 5],
-    index: Field,
-    limits: [Field; 4],
-    operating_time_limit: Field,
     module: [Field; 3],
     identification: [Field; 3],
     operating_status: Field,
@@ -57,14 +52,10 @@ pub(crate) struct Fields {
 
 /// Where the values of one channel are.
 pub(super) struct Channel {
-    pub(super) kind: Field,
     pub(super) preset: Field,
     pub(super) presets: Field,
     pub(super) position: Field,
     pub(super) sensor_state: Field,
-    resolution: Field,
-    counted: Field,
-    fastest: Field,
     speed: Field,
     cam_state: Field,
     cam_enable: Field,
@@ -98,14 +89,10 @@ impl CamFields {
 impl Channel {
     const fn new(d: &Dictionary, sub: u8) -> Channel {
         Channel {
-            kind: d.field(0x2100, sub),
             preset: d.field(0x6010, sub),
             presets: d.field(0x210A, sub),
             position: d.field(0x6020, sub),
             sensor_state: d.field(0x210B, sub),
-            resolution: d.field(0x2101, sub),
-            counted: d.field(0x2102, sub),
-            fastest: d.field(0x2104, sub),
             speed: d.field(0x6030, sub),
             cam_state: d.field(0x6300, sub),
             cam_enable: d.field(0x6301, sub),
@@ -140,13 +127,9 @@ impl Channel {
         }
     }
 
-    fn parameters(&self, image: &[u8]) -> ChannelParameters {
+    fn parameters(&self, sensor: ChannelParameters, image: &[u8]) -> ChannelParameters {
         let [low, high] = self.area.map(|at| i32::from_le_bytes(at.load(image)));
         ChannelParameters {
-            kind: SensorType::from_code(self.kind.u8(image)),
-            resolution: NonZeroU32::new(self.resolution.u32(image)).unwrap_or(NonZeroU32::MIN),
-            counted: NonZeroU16::new(self.counted.u16(image)).unwrap_or(NonZeroU16::MIN),
-            fastest: self.fastest.u32(image),
             preset: Command { value: self.preset.u32(image), count: self.presets.u8(image) },
             cams: Cams {
                 cams: self.cams.each_ref().map(|cam| cam.cam(image)),
@@ -154,6 +137,7 @@ impl Channel {
                 polarity: self.cam_polarity.u8(image),
             },
             area: Area { low, high },
+            ..sensor
         }
     }
 }
@@ -164,6 +148,7 @@ impl Fields {
         Fields {
             device_type: d.field(device_type, 0),
             mappings: [d.field(0x1A00, 1), d.field(0x1A01, 1)],
+            sensors: Sensors::new(d),
             channels: [Channel::new(d, 1), Channel::new(d, 2)],
             preset: d.field(0x6003, 0),
             position: d.field(0x6004, 0),
@@ -176,16 +161,6 @@ impl Fields {
             range: d.field(0x6002, 0),
             step: d.field(0x6005, 1),
             speed_step: d.field(0x6005, 2),
-            format: [
-                d.field(0x2103, 1),
-                d.field(0x2103, 2),
-                d.field(0x2103, 3),
-                d.field(0x2103, 4),
-                d.field(0x2103, 5),
-            ],
-            index: d.field(0x2105, 0),
-            limits: [d.field(0x2106, 1), d.field(0x2106, 2), d.field(0x2106, 3), d.field(0x2106, 4)],
-            operating_time_limit: d.field(0x2106, 5),
             module: [d.field(0x2107, 1), d.field(0x2107, 2), d.field(0x2107, 3)],
             identification: [d.field(0x650A, 1), d.field(0x650A, 2), d.field(0x650A, 3)],
             operating_status: d.field(0x6500, 0),
@@ -241,38 +216,18 @@ impl Fields {
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         let [offset, low, high] = self.module.map(|at| i32::from_le_bytes(at.load(image)));
         let mask = self.acknowledgement.u16(image).into();
+        let sensors = self.sensors.parameters(image);
+        let ([first, second], [a, b]) = (&self.channels, sensors.channels);
         Parameters {
             operating: self.operating.u16(image),
             per_revolution: self.per_revolution.u32(image),
             range: self.range.u32(image),
             step: self.step.u32(image),
             speed_step: self.speed_step.u32(image),
-            travel: None,
-            channels: self.channels.each_ref().map(|channel| channel.parameters(image)),
-            format: self.format(image).unwrap_or(Format::COMMON),
-            index: self.index.u8(image) != 0,
+            channels: [first.parameters(a, image), second.parameters(b, image)],
             module: Module { offset, low, high },
-            limits: self.limits(image),
             acknowledge: Command { value: mask, count: self.acknowledgements.u8(image) },
+            ..sensors
         }
-    }
-
-    fn limits(&self, image: &[u8]) -> Limits {
-        let [lowest_supply, highest_supply, highest_current, lowest_battery] =
-            self.limits.map(|at| at.u16(image));
-        let operating_time = self.operating_time_limit.u32(image);
-        Limits { lowest_supply, highest_supply, highest_current, lowest_battery, operating_time }
-    }
-
-    /// The frame that 2103h describes; `None` for one that cannot be.
-    pub(super) fn format(&self, image: &[u8]) -> Option<Format> {
-        let [revolutions, steps, coding, alarm, parity] = self.format.map(|at| at.u8(image));
-        let coding = if coding == 0 { Coding::Binary } else { Coding::Gray };
-        let parity = match parity {
-            0 => Parity::None,
-            1 => Parity::Even,
-            _ => Parity::Odd,
-        };
-        Format::new(revolutions, steps, coding, alarm != 0, parity)
     }
 }

@@ -3,35 +3,26 @@
 //! A device has those of the virtual devices that it is. Nothing of the generic set of CiA 301 (1800h to 1803h with 180h +
 //! node-ID and up) is among them, so no PDO of a lift device can have the CAN-ID of another one of the same device.
 
-use canopen::dictionary::{self, Access, DefaultValue, Group, Object, Rule, Type};
+use crate::communication::{self, inhibit_time, sync_start};
+use canopen::dictionary::{self, Access, DefaultValue, Object, Rule, Type};
 use profiles::lift::catalogue::{CobId, Content, Pdo, by_number};
 
 /// Flags of a COB-ID: the PDO is switched off; no remote frames.
 const OFF: u32 = 1 << 31;
 const NO_REMOTE: u32 = 1 << 30;
 
-const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type, rule: Rule) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Communication).rule(rule)
-}
-
+/// A COB-ID of which only the flags change.
 const fn cob_id(index: u16, default: DefaultValue) -> Object {
-    parameter(index, 1, "COB-ID", Type::Unsigned32, Rule::PdoPredefined).default(default)
+    communication::cob_id(index, default).rule(Rule::PdoPredefined)
 }
 
+/// 255: the event is that of the profile.
 const fn transmission_type(index: u16) -> Object {
-    parameter(index, 2, "Transmission type", Type::Unsigned8, Rule::PdoType).value(255)
-}
-
-const fn inhibit_time(index: u16) -> Object {
-    parameter(index, 3, "Inhibit time", Type::Unsigned16, Rule::PdoInhibit).unit("100 us")
+    communication::transmission_type(index, 255)
 }
 
 const fn event_timer(index: u16) -> Object {
-    parameter(index, 5, "Event timer", Type::Unsigned16, Rule::PdoEventTimer).unit("ms")
-}
-
-const fn sync_start(index: u16) -> Object {
-    parameter(index, 6, "SYNC start value", Type::Unsigned8, Rule::PdoSyncStart).limits(0, 240)
+    communication::event_timer(index, 0)
 }
 
 /// The COB-ID of a producer.

@@ -6,6 +6,7 @@ use canopen::sdo::Abort;
 use profiles::encoder::RawEncoder;
 use profiles::lift::catalogue::{CobId, Content, PDOS as CATALOGUE};
 use profiles::lift::load::{FULL_LOAD, OVERLOAD, ZERO_LOAD};
+use profiles::lift::panel::Lamp;
 use profiles::lift::position::{INVERTED, UNKNOWN};
 use profiles::lift::{Lift, Parameters, RawLift};
 use profiles::pressure::{FactoryCalibration, RawSample};
@@ -262,11 +263,15 @@ fn a_button_is_a_word_and_a_word_is_a_lamp() {
     node.raw.button = true;
     (0..25).for_each(|_| node.sample());
     assert_eq!(node.read(0x6010, 0), 0x9988_7766_5544);
+    let mut lamp = Lamp::default();
     for (word, is_lit) in [(0x33, true), (0x44, true), (0x22, false), (0, false)] {
         node.write(0x6011, 0, word).unwrap();
-        FIELDS.follow_output(&mut node.image);
+        FIELDS.follow_output(&mut lamp, &mut node.image);
         assert_eq!(FIELDS.is_lit(&node.image), is_lit, "{word:X}h");
     }
+    node.write(0x2222, 0, 1).unwrap();
+    FIELDS.follow_output(&mut lamp, &mut node.image);
+    assert!(FIELDS.is_lit(&node.image), "an old output says nothing new");
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Measured values into the image, parameters out of it.
 
-use super::sensors::Sensors;
+use crate::encoder::Sensors;
 use canopen::dictionary::{Dictionary, Field};
 use core::num::{NonZeroU16, NonZeroU32};
 use profiles::encoder::Area;
 use profiles::lift::load::{self, Point};
+use profiles::lift::panel::Lamp;
 use profiles::lift::position::{self, Source, UNITS, UnitParameters, UnitValues};
-use profiles::lift::{Parameters, Snapshot, panel};
+use profiles::lift::{Parameters, Snapshot};
 
 /// Where the lift's values are in the image of a dictionary that has its objects.
 pub struct Fields {
@@ -145,11 +146,11 @@ impl Fields {
         }
     }
 
-    /// Does what the virtual output says. To be called after every frame that may have brought one: the next may be for
+    /// Does what a new virtual output says. To be called after every frame that may have brought one: the next may be for
     /// another panel.
-    pub fn follow_output(&self, image: &mut [u8]) {
+    pub fn follow_output(&self, lamp: &mut Lamp, image: &mut [u8]) {
         let [off, on] = self.lamp_words.map(|at| at.load(image));
-        if let Some(is_lit) = panel::lamp(self.output.load(image), on, off) {
+        if let Some(is_lit) = lamp.follow(self.output.load(image), on, off) {
             self.lamp.store(image, [is_lit.into()]);
         }
     }

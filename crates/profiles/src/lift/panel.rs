@@ -26,13 +26,24 @@ impl Contact {
     }
 }
 
-/// What a virtual output does to the lamp: lights it, puts it out, or nothing. A lamp whose words are equal has none.
-#[must_use]
-pub fn lamp(output: [u8; 6], on: [u8; 6], off: [u8; 6]) -> Option<bool> {
-    match (output == on, output == off) {
-        (true, false) => Some(true),
-        (false, true) => Some(false),
-        _ => None,
+/// Listens to virtual outputs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Lamp {
+    last: [u8; 6],
+}
+
+impl Lamp {
+    /// What a virtual output does to the lamp when it is another one than before: lights it, puts it out, or nothing. Two
+    /// equal words are for no lamp.
+    pub fn follow(&mut self, output: [u8; 6], on: [u8; 6], off: [u8; 6]) -> Option<bool> {
+        if core::mem::replace(&mut self.last, output) == output {
+            return None;
+        }
+        match (output == on, output == off) {
+            (true, false) => Some(true),
+            (false, true) => Some(false),
+            _ => None,
+        }
     }
 }
 
@@ -52,9 +63,9 @@ mod tests {
     #[test]
     fn a_lamp_follows_its_own_words() {
         let (on, off) = ([1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 7]);
-        assert_eq!(lamp(on, on, off), Some(true));
-        assert_eq!(lamp(off, on, off), Some(false));
-        assert_eq!(lamp([0; 6], on, off), None);
-        assert_eq!(lamp([0; 6], [0; 6], [0; 6]), None);
+        let mut lamp = Lamp::default();
+        let followed = [on, on, off, [0; 6], on].map(|output| lamp.follow(output, on, off));
+        assert_eq!(followed, [Some(true), None, Some(false), None, Some(true)]);
+        assert_eq!(lamp.follow(off, off, off), None);
     }
 }
