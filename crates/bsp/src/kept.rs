@@ -124,7 +124,6 @@ mod tests {
     }
 
     /// What `write` with this number keeps.
-    #[allow(clippy::cast_possible_truncation)]
     fn bytes(number: u8) -> [u8; CAPACITY] {
         core::array::from_fn(|n| number.wrapping_mul(31).wrapping_add(n.to_le_bytes()[0]))
     }
