@@ -18,7 +18,7 @@ from simulator import PATIENCE, Master, Simulator
 EDS = Path(__file__).parents[2] / "eds" / "pressure.eds"
 
 #: Objects whose value is a command or belongs to the moment.
-COMMANDS = {0x1010, 0x1011, 0x1F51, 0x6125}
+COMMANDS = {0x1010, 0x1011, 0x1F51, 0x2203, 0x2204, 0x6125}
 #: What the EDS gives a default for and the node measures or counts.
 MEASURED = {0x1F56, 0x6100, 0x6130, 0x6150, 0x7130, 0x9130}
 
@@ -91,6 +91,8 @@ def test_every_object_of_the_eds_is_written_or_refused(master: NodeWithEds):
     for number in (1, 2):
         master.write(0x1800 + number - 1, 1, 0x8000_0081 + 0x100 * number, 4)
         master.write(0x1A00 + number - 1, 0, 0, 1)
+    # The key to the calibration; "cali".
+    master.write(0x2203, 0, 0x696C_6163, 4)
     for index, sub, variable, remote in master.variables():
         if index in COMMANDS or index == 0x2F00:
             continue
