@@ -161,17 +161,26 @@ def test_a_pdo_is_remapped_saved_and_found_after_a_power_cycle(tmp_path):
     simulator.quit()
 
 
+def scan(lss) -> list[int]:
+    """One more identity. The client tells a bit by an answer that does not come for a while of the host's time, so on a busy
+    machine a scan may have to be repeated; a wrong identity cannot come of it, for its end is answered or is none."""
+    for _ in range(5):
+        is_found, identity = lss.fast_scan()
+        if is_found:
+            return identity
+    raise AssertionError("no node is found")
+
+
 def test_three_nodes_without_a_node_id_are_found_and_moved_to_another_bit_rate():
     nodes = [flag for number in (201, 202, 203) for flag in ("--node", f"{number}:pressure")]
     simulator = Simulator("--bitrate", "250", *nodes, speed="real")
     master = Master(simulator)
     lss = master.network.lss
-    lss.RESPONSE_TIMEOUT = 0.25
+    lss.RESPONSE_TIMEOUT = 0.4
     found = {}
     for node_id in (11, 12, 13):
         boot_up = master.listen(0x700 + node_id)
-        is_found, identity = lss.fast_scan()
-        assert is_found
+        identity = scan(lss)
         lss.configure_node_id(node_id)
         assert lss.inquire_node_id() == 255, "the new one counts from the next start of the communication"
         lss.configure_bit_timing(2)
