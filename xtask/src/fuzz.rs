@@ -53,17 +53,28 @@ pub(crate) fn run_fuzzer(flags: &Flags) -> Result<()> {
     let value = flags.target.to_possible_value().context("a target has a name")?;
     let name = value.get_name();
     let program = build(name)?;
-    let corpus = root().join("host-tests/fuzz/corpus").join(name);
+    let corpus = root().join("host-tests/fuzz/corpus").join(name).with_extension("hex");
     let found = target_dir().join("fuzz").join(name);
-    fs::create_dir_all(&found).with_context(|| format!("cannot make {}", found.display()))?;
-    let broken = found.join("broken-");
+    unpack(&corpus, &found)?;
+    let broken = found.with_extension("broken-");
     run(fuzzer(&program)
         .arg(format!("-max_total_time={}", flags.seconds))
         .arg(format!("-artifact_prefix={}", broken.display()))
         .args(["-len_control=0", "-print_final_stats=1"])
-        .args([&found, &corpus]))
-    .with_context(|| format!("what breaks a rule is in {}", found.display()))?;
+        .arg(&found))
+    .with_context(|| format!("what breaks a rule is in {}*", broken.display()))?;
     if flags.keep { keep(&program, &found, &corpus) } else { Ok(()) }
+}
+
+/// The corpus as libFuzzer wants it, a file for each input.
+fn unpack(corpus: &Path, found: &Path) -> Result<()> {
+    fs::create_dir_all(found).with_context(|| format!("cannot make {}", found.display()))?;
+    let text = fs::read_to_string(corpus).with_context(|| format!("cannot read {}", corpus.display()))?;
+    for (number, line) in (1..).zip(text.lines()) {
+        let input = hex::decode(line).with_context(|| format!("{}:{number}", corpus.display()))?;
+        fs::write(found.join(format!("corpus-{number}")), input)?;
+    }
+    Ok(())
 }
 
 fn build(name: &str) -> Result<PathBuf> {
@@ -86,17 +97,18 @@ fn fuzzer(program: &Path) -> Command {
     command
 }
 
-/// The smallest set of inputs that covers as much, in the corpus' place.
+/// The smallest set of inputs that covers as much, in the corpus' place: a line for each, the shortest first.
 fn keep(program: &Path, found: &Path, corpus: &Path) -> Result<()> {
     let smallest = found.with_extension("smallest");
     fs::create_dir_all(&smallest)?;
-    run(fuzzer(program).arg("-set_cover_merge=1").args([&smallest, corpus, found]))?;
-    fs::remove_dir_all(corpus)?;
-    fs::create_dir_all(corpus)?;
+    run(fuzzer(program).arg("-set_cover_merge=1").args([&smallest, found]))?;
+    let mut inputs = Vec::new();
     for entry in fs::read_dir(&smallest)? {
-        let entry = entry?;
-        fs::copy(entry.path(), corpus.join(entry.file_name()))?;
+        inputs.push(fs::read(entry?.path())?);
     }
+    inputs.sort_by_key(|input| (input.len(), input.clone()));
+    let lines: Vec<String> = inputs.iter().map(|input| hex::encode(input) + "\n").collect();
+    fs::write(corpus, lines.concat())?;
     fs::remove_dir_all(&smallest)?;
     Ok(())
 }
