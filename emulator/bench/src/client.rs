@@ -6,6 +6,7 @@ use canopen::sdo::{
     BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Request as Sdo, Response, Segment,
 };
 use crc::{CRC_16_XMODEM, Crc};
+use emulator::Visits;
 
 use crate::mailbox::{Command, Request};
 use crate::program::Program;
@@ -28,6 +29,11 @@ impl Client {
     /// The count since the last call.
     pub(crate) fn take_spent(&mut self) -> u64 {
         std::mem::take(&mut self.spent)
+    }
+
+    /// Where the instructions are since the last call.
+    pub(crate) fn take_profile(&mut self) -> Vec<Visits> {
+        self.program.take_profile()
     }
 
     fn run(&mut self, request: Request) -> Result<Vec<Frame>> {
@@ -129,14 +135,14 @@ impl Client {
     pub(crate) fn read_block(&mut self, at: Multiplexer) -> Result<Vec<u8>> {
         let request = Sdo::BlockUpload { at, crc: true, block_size: BlockSize::MAX.get(), threshold: 0 };
         let answer = self.ask(request)?;
-        let Response::BlockUpload { size: Some(size), crc: true, .. } = answer else { bail!("{answer:?}") };
+        ensure!(matches!(answer, Response::BlockUpload { crc: true, .. }), "{answer:?}");
         let segments = self.sdo(Sdo::BlockUploadStart.encode())?;
         let mut data: Vec<u8> = segments.iter().flat_map(|segment| segment[1..].to_vec()).collect();
-        data.truncate(usize::try_from(size)?);
         let sequence = u8::try_from(segments.len())?;
         let answer = self.ask(Sdo::BlockAcknowledge { sequence, block_size: BlockSize::MAX.get() })?;
-        // How many bytes of the last segment are data, zencan-node says wrongly; the size and the CRC are right.
         let Response::BlockUploadEnd(end) = answer else { bail!("{answer:?}") };
+        // zencan-node says 7 of a last segment that is full.
+        data.truncate(data.len() - usize::from(end.unused % 7));
         ensure!(end.crc == crc(&data), "the CRC is wrong");
         ensure!(self.sdo(Sdo::BlockUploadEnded.encode())?.is_empty(), "an answer to the end");
         Ok(data)

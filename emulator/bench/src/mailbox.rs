@@ -1,8 +1,8 @@
 //! The registers between a program and us. `bench/src/registers.rs` has the other end, at the same addresses.
 
 use canbus::Time;
-use chip::{BusFault, Effect, IrqLines, Memory, Peripherals};
 use canopen::Frame;
+use chip::{BusFault, Effect, IrqLines, Memory, Peripherals};
 
 /// What the program is to do: the numbers that it reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -82,6 +82,7 @@ impl Operation {
         (self.prepare)(client)?;
         (self.run)(client)?;
         client.take_spent();
+        client.take_profile();
         (self.run)(client)?;
         Ok(client.take_spent())
     }

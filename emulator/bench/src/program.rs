@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use canbus::Time;
 use canopen::Frame;
-use emulator::{Machine, Model, Stop};
+use emulator::{Machine, Model, Stop, Visits};
 
 use crate::mailbox::{Mailbox, Request};
 
@@ -48,6 +48,7 @@ impl Program {
         let mut instructions = 0;
         let end = self.machine.now() + LIMIT;
         while !self.is_done()? {
+            self.machine.set_profiling(self.machine.peripherals().counts);
             let (counted, before) = (self.machine.peripherals().counts, self.machine.stats().instructions);
             ensure!(self.machine.run_until(end) == Stop::Poked, "the program does not come to an end");
             let passed = self.machine.stats().instructions - before;
@@ -58,6 +59,11 @@ impl Program {
             }
         }
         Ok(Outcome { instructions, frames: std::mem::take(&mut self.machine.peripherals_mut().sent) })
+    }
+
+    /// Where the counted instructions of the last requests are.
+    pub(crate) fn take_profile(&mut self) -> Vec<Visits> {
+        self.machine.take_profile()
     }
 
     fn is_done(&self) -> Result<bool> {
