@@ -1,6 +1,8 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
 
 mod configuring;
+mod encoder;
 mod faults;
+mod measuring;
 mod running;
 mod support;

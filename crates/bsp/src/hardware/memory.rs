@@ -2,10 +2,7 @@
 
 use core::ops::Range;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
-
-/// In flash: its table is too large for the stack.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use crate::checksum::CRC;
 
 unsafe extern "C" {
     static _stack_start: u8;

@@ -1,9 +1,12 @@
 //! The modules that touch hardware.
 
 pub mod application;
+mod backup;
 pub mod board;
 pub mod can;
 pub mod crash;
+mod digital;
+mod encoder;
 pub mod factory;
 mod fault;
 pub mod flash;
@@ -11,12 +14,17 @@ pub mod led;
 pub mod memory;
 mod receive;
 mod sampling;
+mod ssi;
 mod time_base;
 mod watchdog;
 
+pub use backup::BackupMemory;
 pub use board::Board;
+pub use digital::{Buttons, Lamps};
+pub use encoder::{Counted, Encoder};
 pub use receive::{Frames, ReceiveQueue, Received, Receiver};
 pub use sampling::{Sampling, Sums};
+pub use ssi::Ssi;
 pub use stm32f4xx_hal::pac;
 pub use time_base::{Alarm, Clock, TimeInterrupt};
 pub use watchdog::{StartUpWatchdog, Watchdog};
