@@ -112,14 +112,14 @@ extern "C" fn measure(
     measurement: &mut Measurement,
     raw: &RawSample,
     encoder: &RawEncoder,
-    buttons: [bool; 2],
+    buttons: &[bool; 2],
     lit: &mut [bool; 2],
     now: u64,
 ) {
     if let Some(parameters) = protocol.take_parameters() {
         measurement.apply(&parameters);
     }
-    let snapshot: Snapshot = measurement.sample(raw, encoder, buttons);
+    let snapshot: Snapshot = measurement.sample(raw, encoder, *buttons);
     protocol.publish(&snapshot, Instant(now), &mut Queue);
     *lit = protocol.lamps();
 }

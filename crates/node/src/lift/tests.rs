@@ -270,7 +270,9 @@ fn the_transducer_is_calibrated_as_that_of_the_pressure_transmitter() {
 fn a_button_is_a_word_and_a_word_is_a_lamp() {
     let mut node = Node::new();
     let words = [(1, 0x11), (2, 0x9988_7766_5544), (3, 0x12), (4, 0x13)];
-    words.into_iter().for_each(|(sub, word)| node.write(0x2320, sub, word).unwrap());
+    for (sub, word) in words {
+        node.write(0x2320, sub, word).unwrap();
+    }
     node.sample();
     assert_eq!(node.read(0x6010, 0), 0x11);
     // The second button is told a millisecond after the first, and what was told last stays.
@@ -286,7 +288,9 @@ fn a_button_is_a_word_and_a_word_is_a_lamp() {
         assert_eq!(node.read(0x6010, 0), word, "{buttons:?}");
     }
     let words = [(1, 0x22), (2, 0x33), (3, 0x55), (4, 0x33)];
-    words.into_iter().for_each(|(sub, word)| node.write(0x2321, sub, word).unwrap());
+    for (sub, word) in words {
+        node.write(0x2321, sub, word).unwrap();
+    }
     let mut lamps = [Lamp::default(); 2];
     for (word, lit) in [
         (0x33, [true, true]),

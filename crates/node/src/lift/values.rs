@@ -137,7 +137,7 @@ impl Fields {
 
     /// Of a button that is used: the virtual input says what it has said before, whatever the others do.
     fn publish_input(&self, contact: Contact, image: &mut [u8]) {
-        let Some(words) = self.buttons.get(contact.button).filter(|words| differ(words, image)) else {
+        let Some(words) = self.buttons.get(contact.button).filter(|words| differ(**words, image)) else {
             return;
         };
         let [released, pressed] = words;
@@ -207,7 +207,7 @@ impl Fields {
 
     /// Device type (1000h): the virtual device that this one is, or 0 in bits 24 to 31 for several in one.
     pub(super) fn device_type(&self, image: &[u8]) -> u32 {
-        let is_used = |all: &[[Field; 2]]| all.iter().any(|words| differ(words, image));
+        let is_used = |all: &[[Field; 2]]| all.iter().any(|words| differ(*words, image));
         let has = [
             (INPUT_PANEL, is_used(&self.buttons)),
             (OUTPUT_PANEL, is_used(&self.lamp_words)),
@@ -228,7 +228,7 @@ const fn pair(d: &Dictionary, index: u16, first: u8) -> [Field; 2] {
     [d.field(index, first), d.field(index, first + 1)]
 }
 
-fn differ([a, b]: &[Field; 2], image: &[u8]) -> bool {
+fn differ([a, b]: [Field; 2], image: &[u8]) -> bool {
     a.get(image) != b.get(image)
 }
 
