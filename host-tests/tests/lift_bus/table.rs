@@ -1,7 +1,7 @@
 //! The dictionaries of all devices of the small lift: a device has the PDOs that it produces and consumes and the objects
 //! that they map, as the catalogue says.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Rule, Type};
 use node::lift::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 
 /// Node-IDs.
@@ -47,10 +47,7 @@ macro_rules! dictionary {
             const PARTS: &[&[Object]] = $parts;
             const COUNT: usize = dictionary::count(PARTS);
             static TABLE: [Object; COUNT] = dictionary::gather(PARTS);
-            static ENTRIES: [Entry; COUNT] = dictionary::compile(&TABLE);
-            static DEFAULTS: [u8; dictionary::image_size(&TABLE)] = dictionary::default_image(&TABLE);
-            dictionary::check(&TABLE);
-            Dictionary::new(&ENTRIES, &DEFAULTS)
+            canopen::dictionary!(&TABLE)
         };
     };
 }
@@ -58,13 +55,8 @@ macro_rules! dictionary {
 // The devices of the nodes: what node::lift has, and the communication profile.
 static NODE_PARTS: &[&[Object]] = &[COMMUNICATION, node::lift::PDOS, &node::lift::OBJECTS];
 static NODE_TABLE: [Object; dictionary::count(NODE_PARTS)] = dictionary::gather(NODE_PARTS);
-static NODE_ENTRIES: [Entry; NODE_TABLE.len()] = dictionary::compile(&NODE_TABLE);
-static NODE_DEFAULTS: [u8; NODE_SIZE] = dictionary::default_image(&NODE_TABLE);
 pub(crate) const NODE_SIZE: usize = dictionary::image_size(&NODE_TABLE);
-pub(crate) static NODE: Dictionary = {
-    dictionary::check(&NODE_TABLE);
-    Dictionary::new(&NODE_ENTRIES, &NODE_DEFAULTS)
-};
+pub(crate) static NODE: Dictionary = canopen::dictionary!(&NODE_TABLE);
 
 dictionary!(
     CALL_CONTROLLER,

@@ -34,9 +34,9 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn not_mapped(&self) -> impl Iterator<Item = Watched> {
         let layouts: Vec<Layout, TPDOS> = self.tpdo_layouts().take(TPDOS).collect();
         let is_mapped = move |entry: &Entry| layouts.iter().any(|layout| layout.contains(entry.field));
-        let entries = self.dictionary.entries().iter();
+        let entries = self.dictionary.entries();
         let free = entries.filter(move |entry| is_sendable(entry) && !is_mapped(entry));
-        free.map(|entry| Watched::new(multiplexer(entry), entry.field))
+        free.map(|entry| Watched::new(multiplexer(&entry), entry.field))
     }
 
     /// What the scanner list names: blocks of sub-indexes of one object.
@@ -47,7 +47,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             let index = u16::from_le_bytes([low, high]);
             (0..size).filter_map(move |i| {
                 let entry = self.dictionary.find(index, first.checked_add(i)?).ok()?;
-                is_sendable(entry).then(|| Watched::new(multiplexer(entry), entry.field))
+                is_sendable(&entry).then(|| Watched::new(multiplexer(&entry), entry.field))
             })
         })
     }
@@ -78,7 +78,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// Whether the object exists and takes process data.
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
         let entry = self.dictionary.find(at.index, at.sub).ok();
-        let entry = entry.filter(|entry| entry.mapping == Mapping::Rpdo && entry.field.size <= LONGEST);
+        let entry =
+            entry.filter(|entry| entry.attributes.mapping == Mapping::Rpdo && entry.field.size <= LONGEST);
         if let Some(entry) = entry {
             let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
             entry.field.set(&mut self.image, bytes);
@@ -123,7 +124,7 @@ impl DispatchingLine {
 }
 
 fn is_sendable(entry: &Entry) -> bool {
-    entry.mapping == Mapping::Tpdo && entry.field.size <= LONGEST
+    entry.attributes.mapping == Mapping::Tpdo && entry.field.size <= LONGEST
 }
 
 fn multiplexer(entry: &Entry) -> Multiplexer {

@@ -9,38 +9,40 @@ use crate::{Duration, Instant, emcy, sync};
 impl<A: Application, const N: usize> Objects for Core<A, N> {
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
         let entry = self.entry(at)?;
-        if !entry.access.is_readable() {
+        if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
-        match entry.rule {
+        match entry.rule() {
             Rule::ErrorCount => Ok(core::slice::from_ref(self.emcy.history().count())),
-            Rule::Application(number) if entry.kind == Type::Domain => self.application.read_domain(number),
+            Rule::Application(number) if entry.attributes.kind == Type::Domain => {
+                self.application.read_domain(number)
+            }
             Rule::ErrorEntry => {
                 self.emcy.history().error(at.sub).map(|error| &error[..]).ok_or(Abort::NoData)
             }
-            _ => Ok(stored(entry, &self.image)),
+            _ => Ok(stored(&entry, &self.image)),
         }
     }
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
         let entry = self.writable_entry(at)?;
-        let is_stream = entry.kind == Type::Domain;
+        let is_stream = entry.attributes.kind == Type::Domain;
         Ok(if is_stream { Writable::Stream } else { Writable::Value(entry.field.size.into()) })
     }
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
         let entry = self.writable_entry(at)?;
-        if entry.kind == Type::Domain {
-            return self.write_domain(entry, bytes);
+        if entry.attributes.kind == Type::Domain {
+            return self.write_domain(&entry, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
         entry.check_value(bytes)?;
-        self.admit(entry, value, bytes)?;
-        if !entry.rule.is_computed() && !entry.rule.is_command() {
+        self.admit(&entry, value, bytes)?;
+        if !entry.rule().is_computed() && !entry.rule().is_command() {
             entry.field.set(&mut self.image, bytes);
         }
-        self.follow(entry, value, now);
+        self.follow(&entry, value, now);
         Ok(())
     }
 
@@ -50,27 +52,27 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
 
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
-        self.stream_entry(entry, part)
+        self.stream_entry(&entry, part)
     }
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
     /// The entry, or the one that it is another name of.
-    fn entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+    fn entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
-        match entry.rule {
+        match entry.rule() {
             Rule::EventTimerOf(number) => self.dictionary.find(0x1800 | u16::from(number), 5),
             _ => Ok(entry),
         }
     }
 
-    fn writable_entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+    fn writable_entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
         let entry = self.entry(at)?;
-        if entry.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
+        if entry.attributes.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
     }
 
     fn stream_entry(&mut self, entry: &Entry, part: Part<'_>) -> Result<(), Abort> {
-        match entry.rule {
+        match entry.rule() {
             Rule::Application(number) => self.application.write_domain(number, part),
             _ => Err(Abort::Access),
         }
@@ -106,7 +108,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Whether the rule of the entry allows the value.
     fn admit(&mut self, entry: &Entry, value: u32, bytes: &[u8]) -> Result<(), Abort> {
-        match entry.rule {
+        match entry.rule() {
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
             Rule::SyncCobId => sync::check_cob_id(value),
             Rule::SyncOverflow => sync::check_overflow(value, self.number(0x1006, 0)),
@@ -129,8 +131,8 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// What follows from a new value.
     fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
-        self.pending.parameters |= matches!(entry.group, Group::Application | Group::Calibration);
-        match entry.rule {
+        self.pending.parameters |= matches!(entry.attributes.group, Group::Application | Group::Calibration);
+        match entry.rule() {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
             Rule::ErrorCount => self.emcy.clear_history(),
@@ -151,7 +153,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             _ => (),
         }
         self.pending.identifiers |= matches!(
-            entry.rule,
+            entry.rule(),
             Rule::SyncCobId | Rule::PdoCobId | Rule::PdoPredefined | Rule::HeartbeatWatch
         );
         (self.process_due, self.services_due) = (STALE, STALE);
@@ -161,7 +163,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 /// The value as an upload gives it: a string ends where its zeros begin.
 fn stored<'a>(entry: &Entry, image: &'a [u8]) -> &'a [u8] {
     let value = entry.field.get(image);
-    match entry.kind {
+    match entry.attributes.kind {
         Type::VisibleString(_) => value.split(|&byte| byte == 0).next().unwrap_or(value),
         _ => value,
     }

@@ -25,8 +25,12 @@ struct Pdo {
 
 impl Pdo {
     fn of(entry: &Entry) -> Pdo {
-        let direction = if entry.index() & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive };
-        Pdo { direction, number: entry.index() & 0x01FF }
+        Pdo::at(entry.index())
+    }
+
+    fn at(index: u16) -> Pdo {
+        let direction = if index & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive };
+        Pdo { direction, number: index & 0x01FF }
     }
 
     fn communication(self) -> u16 {
@@ -37,11 +41,10 @@ impl Pdo {
         self.number | if self.direction == Direction::Transmit { 0x1A00 } else { 0x1600 }
     }
 
-    /// Those that a dictionary has, one way: each has a COB-ID.
+    /// Those that a dictionary has, one way.
     fn all(dictionary: &Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
         let first = Pdo { direction, number: 0 };
-        let objects = dictionary.between(first.communication(), first.mapping());
-        objects.iter().filter(|entry| entry.sub() == 1).map(Pdo::of)
+        dictionary.between(first.communication(), first.mapping()).map(Pdo::at)
     }
 }
 
@@ -189,7 +192,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn admit_pdo_cob_id(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let pdo = Pdo::of(entry);
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
-        let is_predefined = entry.rule == Rule::PdoPredefined;
+        let is_predefined = entry.rule() == Rule::PdoPredefined;
         if is_predefined && CobId::parse(self.default_number(entry)).is_none_or(|own| own.id != new.id) {
             return Err(Abort::InvalidValue);
         }

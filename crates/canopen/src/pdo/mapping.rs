@@ -65,7 +65,7 @@ pub(crate) fn locate(
         _ => {
             let entry = dictionary.find(mapped.index, mapped.sub).map_err(|_| Abort::NoObject)?;
             let needed = if direction == Direction::Transmit { Mapping::Tpdo } else { Mapping::Rpdo };
-            (entry.field, entry.mapping == needed)
+            (entry.field, entry.attributes.mapping == needed)
         }
     };
     let same_length = u16::from(mapped.bits) == u16::from(field.size) * 8;

@@ -13,7 +13,7 @@ mod values;
 pub use values::Fields;
 
 use crate::pressure::CALIBRATION;
-use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::dictionary::{self, Dictionary, Object};
 
 /// The PDO objects, sorted: 1400h to 1BFFh.
 pub static PDOS: &[Object] = &pdos::ROWS;
@@ -27,15 +27,12 @@ static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather
 /// Both, as the smallest dictionary that a lift device can run.
 static TABLE: [Object; dictionary::count(&[&pdos::ROWS, &OBJECTS])] =
     dictionary::gather(&[&pdos::ROWS, &OBJECTS]);
-static ENTRIES: [Entry; TABLE.len()] = dictionary::compile(&TABLE);
-static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&TABLE);
-const _: () = dictionary::check(&TABLE);
 
 /// Bytes of the image of all values.
 pub const IMAGE_SIZE: usize = dictionary::image_size(&TABLE);
 
 /// The dictionary with nothing but the lift in it.
-pub static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+pub static DICTIONARY: Dictionary = canopen::dictionary!(&TABLE);
 
 /// Where the values of [`DICTIONARY`] are. Another dictionary that has the lift's objects has its own.
 pub static FIELDS: Fields = Fields::new(&DICTIONARY);
