@@ -4,6 +4,7 @@ use super::compile::effective_limits;
 use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type, image_size};
 use crate::device::{RPDOS, TPDOS};
 use crate::pdo::WATCHED;
+use crate::sdo::BUFFER;
 
 /// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
 /// are others, attributes that fit together, no more PDOs than a device has room for.
@@ -65,6 +66,7 @@ const fn check_row(row: &Object) {
             assert!(value.is_finite(), "the default is not a number");
         }
         (DefaultValue::Text(text), Type::VisibleString(capacity)) => {
+            assert!(capacity as usize <= BUFFER, "an SDO transfer has no room for the text");
             assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
         }
         (DefaultValue::NodeId(_), Type::Unsigned32) => (),
