@@ -3,14 +3,14 @@
 //! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
 //! entries, count, COB-ID valid.
 
-use super::{Application, Core};
+use super::{Application, Core, NO_ID};
 use crate::dictionary::{Dictionary, Entry, Rule};
 use crate::pdo::{
     Addressing, Content, Direction, Layout, MappedObject, RpdoSettings, ScannerSettings, Settings,
     Transmission, locate,
 };
 use crate::sdo::Abort;
-use crate::{CobId, Duration, Instant};
+use crate::{CanId, CobId, Duration, Instant};
 
 /// A PDO by the index of one of its objects.
 ///
@@ -95,8 +95,10 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn configure_rpdo(&mut self, pdo: Pdo, place: u8, now: Instant) {
         let settings = self.rpdo_settings(pdo);
         self.valid_rpdos.set(place, settings.is_some());
-        if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
+        let number = usize::from(place);
+        if let (Some(rpdo), Some(id)) = (self.rpdos.get_mut(number), self.rpdo_ids.get_mut(number)) {
             rpdo.configure(settings);
+            *id = rpdo.id().map_or(NO_ID, CanId::get);
         }
         self.forget_rpdo_faults(place, now);
     }

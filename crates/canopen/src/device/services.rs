@@ -30,7 +30,10 @@ impl<A: Application, const N: usize> Device<A, N> {
     fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
-        if self.server.take_expected(request, now) {
+        if let Some(taken) = self.server.take_expected(request, &mut self.core, now) {
+            if let Err(abort) = taken {
+                self.respond(Some(abort), now, out);
+            }
             return;
         }
         let response = self.server.answer(request, &mut self.core, now);

@@ -107,11 +107,10 @@ impl Dictionary {
         if number >= series.objects.into() {
             return Err(Abort::NoObject);
         }
+        // Most objects have the sub-indexes 0, 1, 2 and so on.
         let places = self.places_of(series);
-        let place = match places.get(usize::from(sub)).filter(|place| place.sub == sub) {
-            None => places.iter().find(|place| place.sub == sub),
-            direct => direct,
-        };
+        let direct = places.get(usize::from(sub)).filter(|place| place.sub == sub);
+        let place = direct.or_else(|| places.iter().find(|place| place.sub == sub));
         place.and_then(|place| self.entry(series, number, place)).ok_or(Abort::NoSubIndex)
     }
 
@@ -121,6 +120,7 @@ impl Dictionary {
     }
 
     /// The entry at a place in an object of a series.
+    #[inline(always)]
     fn entry(&self, series: &Series, number: u16, place: &Place) -> Option<Entry> {
         let attributes = self.attributes.get(usize::from(place.attributes))?;
         let offset = place.offset.wrapping_add(number.wrapping_mul(series.stride));

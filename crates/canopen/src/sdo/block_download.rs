@@ -35,17 +35,23 @@ impl Receiver {
         self.wants_segments() && self.has_begun
     }
 
-    /// Takes the frame that is expected within a block: most of those of a transfer are nothing else. `false`, and
-    /// nothing done, for the first and the last of a block, and whenever there is more to do.
-    pub(super) fn take_expected(&mut self, frame: [u8; 8], buffer: &mut [u8; BUFFER]) -> bool {
+    /// Whether the frame is the next segment, and neither the first nor the last of a block: most frames of a transfer
+    /// are nothing else.
+    pub(super) fn expects(&self, frame: &[u8; 8]) -> bool {
+        let [sequence, ..] = frame;
+        matches!(sequence, 2..=126) && *sequence == self.sequence + 1 && self.is_within_block()
+    }
+
+    /// Takes a frame that it expects.
+    pub(super) fn take_expected(
+        &mut self,
+        frame: [u8; 8],
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<(), Abort> {
         let [sequence, data @ ..] = frame;
-        let is_inner = self.is_within_block() && matches!(sequence, 2..=126);
-        if !is_inner || sequence != self.sequence + 1 || !self.sink.append_segment(data, buffer) {
-            return false;
-        }
-        self.sequence = sequence;
-        self.newest = None;
-        true
+        (self.sequence, self.newest) = (sequence, None);
+        self.sink.append_segment(data, buffer, objects)
     }
 
     /// Takes a segment; `true` at the end of a block. Segments after a gap are left to be sent again.
@@ -64,7 +70,7 @@ impl Receiver {
             self.sequence += 1;
             match segment.last {
                 true => self.last = Some(segment.data),
-                false => self.sink.append(&segment.data, buffer, objects)?,
+                false => self.sink.append_segment(segment.data, buffer, objects)?,
             }
         }
         if is_end {

@@ -49,11 +49,9 @@ pub(super) struct Source {
 
 impl Source {
     pub(super) fn new(value: Readable<'_>, buffer: &mut [u8; BUFFER]) -> Source {
-        for (to, from) in buffer.iter_mut().zip(value.bytes) {
-            *to = *from;
-        }
-        let is_longer = value.bytes.len() > BUFFER;
-        Source { stream: value.stream.filter(|_| is_longer), len: value.bytes.len() }
+        let len = value.bytes.len();
+        let snapshot = buffer.get_mut(..len).map(|place| place.copy_from_slice(value.bytes));
+        Source { stream: value.stream.filter(|_| snapshot.is_none()), len }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -149,17 +147,22 @@ impl Sink {
         Ok(())
     }
 
-    /// Takes seven bytes if the buffer has room for them and they are not too many.
-    pub(super) fn append_segment(&mut self, bytes: [u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
-        let place = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut());
-        let place = place.filter(|_| self.limit.saturating_sub(self.len) >= bytes.len());
-        let fits = place.is_some();
-        if let Some(place) = place {
-            *place = bytes;
-            self.len += bytes.len();
-            self.held += bytes.len();
+    /// The same for a whole segment.
+    pub(super) fn append_segment(
+        &mut self,
+        data: [u8; 7],
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<(), Abort> {
+        if self.held > BUFFER - data.len() {
+            self.hand_over(buffer, objects)?;
         }
-        fits
+        let has_room = self.limit.saturating_sub(self.len) >= data.len();
+        let place = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut());
+        *place.filter(|_| has_room).ok_or(Abort::TooLong)? = data;
+        self.len += data.len();
+        self.held += data.len();
+        Ok(())
     }
 
     /// Passes on what is in the buffer, if it is part of a stream.

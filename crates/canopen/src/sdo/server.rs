@@ -66,17 +66,21 @@ impl Server {
         self.previous = ([0; 8], None);
     }
 
-    /// Takes a frame that needs no answer and leads to nothing else; `false` where it is for [`answer`](Server::answer).
-    /// The deadline is not earlier afterwards.
-    pub(crate) fn take_expected(&mut self, frame: [u8; 8], now: Instant) -> bool {
-        let is_taken = match &mut self.transfer {
-            Transfer::BlockDownload(receiver) => receiver.take_expected(frame, &mut self.buffer),
-            _ => false,
-        };
-        if is_taken {
-            self.active = now;
+    /// Takes a segment within a block, which has no answer but an abort; `None` for any other frame, which is for
+    /// [`answer`](Server::answer). The deadline is not earlier afterwards.
+    pub(crate) fn take_expected(
+        &mut self,
+        frame: [u8; 8],
+        objects: &mut impl Objects,
+        now: Instant,
+    ) -> Option<Result<(), Response>> {
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return None };
+        if !receiver.expects(&frame) {
+            return None;
         }
-        is_taken
+        self.active = now;
+        let taken = receiver.take_expected(frame, &mut self.buffer, objects);
+        Some(taken.map_err(|abort| self.give_up(abort)))
     }
 
     /// Answers a request.
@@ -179,13 +183,16 @@ impl Server {
         }
     }
 
-    /// An error ends the transfer; the one place where it becomes an abort message.
+    /// An error ends the transfer.
     fn settle(&mut self, answer: Answer, now: Instant) -> Option<Response> {
-        if answer.is_err() {
-            self.transfer = Transfer::Idle;
-        }
         self.active = now;
-        answer.unwrap_or_else(|abort| Some(Response::Abort(self.multiplexer, abort.code())))
+        answer.unwrap_or_else(|abort| Some(self.give_up(abort)))
+    }
+
+    /// Ends the transfer: the one place where an error becomes an abort message.
+    fn give_up(&mut self, abort: Abort) -> Response {
+        self.transfer = Transfer::Idle;
+        Response::Abort(self.multiplexer, abort.code())
     }
 
     /// A new transfer; one that was under way is forgotten, as its client has started over.
