@@ -52,12 +52,6 @@ macro_rules! dictionary {
     };
 }
 
-// The devices of the nodes: what node::lift has, and the communication profile.
-static NODE_PARTS: &[&[Object]] = &[COMMUNICATION, node::lift::PDOS, &node::lift::OBJECTS];
-static NODE_TABLE: [Object; dictionary::count(NODE_PARTS)] = dictionary::gather(NODE_PARTS);
-pub(crate) const NODE_SIZE: usize = dictionary::image_size(&NODE_TABLE);
-pub(crate) static NODE: Dictionary = canopen::dictionary!(&NODE_TABLE);
-
 dictionary!(
     CALL_CONTROLLER,
     &[
