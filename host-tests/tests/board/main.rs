@@ -7,3 +7,4 @@ mod faults;
 mod measuring;
 mod running;
 mod support;
+mod timing;
