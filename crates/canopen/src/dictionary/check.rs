@@ -24,6 +24,7 @@ pub const fn check(rows: &[Object]) {
         }
         let has_sub_0 = rows[i].sub == 0 || (i > 0 && rows[i - 1].index == rows[i].index);
         assert!(has_sub_0, "an object has no sub-index 0");
+        assert!(rows[i].sub < u8::MAX, "an object has more entries than a series can");
         let is_pdo = matches!(rows[i].index, 0x1400..=0x15FF | 0x1800..=0x19FF);
         assert!(!is_pdo || rows[i].sub > 0 || has(rows, rows[i].key() | 1), "a PDO has no COB-ID");
         if let Rule::EventTimerOf(number) = rows[i].rule {

@@ -57,39 +57,59 @@ macro_rules! dictionary {
 /// # Panics
 /// During compilation, when they are less.
 #[must_use]
-#[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges.
 pub const fn compile<const S: usize, const P: usize, const A: usize>(rows: &[Object]) -> Tables<S, P, A> {
-    let mut tables =
-        Tables { series: [UNUSED; S], places: [NO_PLACE; P], attributes: [attributes(&rows[0]); A] };
-    let (mut row, mut number, mut place, mut known, mut offset) = (0, 0, 0, 0, 0);
+    let tables = Tables { series: [UNUSED; S], places: [NO_PLACE; P], attributes: [attributes(&rows[0]); A] };
+    let mut filling = Filling { tables, series: 0, places: 0, attributes: 0, offset: 0 };
+    let mut row = 0;
     while row < rows.len() {
-        let len = object_len(rows, row);
+        let object = rows.split_at(row).1.split_at(object_len(rows, row)).0;
         let objects = series_len(rows, row);
-        tables.series[number] = Series {
-            index: rows[row].index,
-            objects: objects as u8,
-            entries: len as u8,
-            first: place as u16,
-            stride: image_size(rows.split_at(row).1.split_at(len).0) as u16,
-        };
-        let next = row + len * objects;
-        let end = row + len;
-        let mut at = offset;
-        offset += tables.series[number].stride as usize * objects;
-        while row < end {
-            let attributes = attributes(&rows[row]);
-            let same = position(&tables.attributes, known, &attributes);
-            if same == known {
-                tables.attributes[known] = attributes;
-                known += 1;
-            }
-            tables.places[place] = Place { sub: rows[row].sub, attributes: same as u8, offset: at as u16 };
-            at += rows[row].stored_size();
-            (row, place) = (row + 1, place + 1);
-        }
-        (row, number) = (next, number + 1);
+        filling.add_series(object, objects);
+        row += object.len() * objects;
     }
-    tables
+    filling.tables
+}
+
+/// Tables, how much of them is filled, and the place in the image that comes next.
+struct Filling<const S: usize, const P: usize, const A: usize> {
+    tables: Tables<S, P, A>,
+    series: usize,
+    places: usize,
+    attributes: usize,
+    offset: usize,
+}
+
+#[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges.
+impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
+    /// So many objects like this one.
+    const fn add_series(&mut self, object: &[Object], objects: usize) {
+        let stride = image_size(object);
+        self.tables.series[self.series] = Series {
+            index: object[0].index,
+            objects: objects as u8,
+            entries: object.len() as u8,
+            first: self.places as u16,
+            stride: stride as u16,
+        };
+        let (mut row, mut offset) = (0, self.offset);
+        while row < object.len() {
+            self.add_place(&object[row], offset);
+            (row, offset) = (row + 1, offset + object[row].stored_size());
+        }
+        (self.series, self.offset) = (self.series + 1, self.offset + stride * objects);
+    }
+
+    const fn add_place(&mut self, row: &Object, offset: usize) {
+        let attributes = attributes(row);
+        let number = position(&self.tables.attributes, self.attributes, &attributes);
+        if number == self.attributes {
+            self.tables.attributes[number] = attributes;
+            self.attributes += 1;
+        }
+        self.tables.places[self.places] =
+            Place { sub: row.sub, attributes: number as u8, offset: offset as u16 };
+        self.places += 1;
+    }
 }
 
 /// A series of no object, after all others: no search ends in it.
@@ -134,7 +154,7 @@ pub const fn attributes_count(rows: &[Object]) -> usize {
     known
 }
 
-/// A place names its attributes in a byte.
+/// A place names its attributes in a byte. More than these do not compile.
 const MOST_ATTRIBUTES: usize = 256;
 
 /// Where the attributes are among the first `known`; `known` when they are not.

@@ -102,7 +102,7 @@ impl Dictionary {
     /// `NoObject` where the index is unknown, `NoSubIndex` where only the sub-index is.
     pub fn find(&self, index: u16, sub: u8) -> Result<Entry, Abort> {
         let after = self.series.partition_point(|series| series.index <= index);
-        let series = self.series.get(after.wrapping_sub(1)).ok_or(Abort::NoObject)?;
+        let series = *self.series.get(after.wrapping_sub(1)).ok_or(Abort::NoObject)?;
         let number = index.wrapping_sub(series.index);
         if number >= series.objects.into() {
             return Err(Abort::NoObject);
@@ -111,17 +111,17 @@ impl Dictionary {
         let places = self.places_of(series);
         let direct = places.get(usize::from(sub)).filter(|place| place.sub == sub);
         let place = direct.or_else(|| places.iter().find(|place| place.sub == sub));
-        place.and_then(|place| self.entry(series, number, place)).ok_or(Abort::NoSubIndex)
+        place.and_then(|place| self.entry(series, number, *place)).ok_or(Abort::NoSubIndex)
     }
 
-    fn places_of(&self, series: &Series) -> &'static [Place] {
+    fn places_of(&self, series: Series) -> &'static [Place] {
         let first = usize::from(series.first);
         self.places.get(first..first + usize::from(series.entries)).unwrap_or(&[])
     }
 
     /// The entry at a place in an object of a series.
-    #[inline(always)]
-    fn entry(&self, series: &Series, number: u16, place: &Place) -> Option<Entry> {
+    #[inline]
+    fn entry(&self, series: Series, number: u16, place: Place) -> Option<Entry> {
         let attributes = self.attributes.get(usize::from(place.attributes))?;
         let offset = place.offset.wrapping_add(number.wrapping_mul(series.stride));
         let field = Field { offset, size: attributes.kind.size() };
@@ -165,8 +165,8 @@ impl Iterator for Entries {
     // Called from many places that are in no hurry.
     #[inline(never)]
     fn next(&mut self) -> Option<Entry> {
-        let series = self.dictionary.series.get(self.series)?;
-        let place = self.dictionary.places_of(series).get(self.place)?;
+        let series = *self.dictionary.series.get(self.series)?;
+        let place = *self.dictionary.places_of(series).get(self.place)?;
         let entry = self.dictionary.entry(series, self.object, place);
         self.place += 1;
         if self.place == series.entries.into() {

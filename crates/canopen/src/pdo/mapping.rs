@@ -133,10 +133,9 @@ impl Layout {
             }
             at += usize::from(place.size);
         }
-        let [a, b, c, d, e, f, g, h, ..] = data;
-        let unused = 64 - u32::from(self.len) * 8;
-        let mask = u64::MAX.checked_shr(unused).unwrap_or(0);
-        (u64::from_le_bytes([a, b, c, d, e, f, g, h]) & mask).to_le_bytes()
+        let all = data.first_chunk().map_or(0, |data| u64::from_le_bytes(*data));
+        let mask = u64::MAX.checked_shr(64 - u32::from(self.len) * 8).unwrap_or(0);
+        (all & mask).to_le_bytes()
     }
 
     /// The PDO's data into the image.

@@ -37,9 +37,9 @@ impl Receiver {
 
     /// Whether the frame is the next segment, and neither the first nor the last of a block: most frames of a transfer
     /// are nothing else.
-    pub(super) fn expects(&self, frame: &[u8; 8]) -> bool {
+    pub(super) fn expects(&self, frame: [u8; 8]) -> bool {
         let [sequence, ..] = frame;
-        matches!(sequence, 2..=126) && *sequence == self.sequence + 1 && self.is_within_block()
+        matches!(sequence, 2..=126) && sequence == self.sequence + 1 && self.is_within_block()
     }
 
     /// Takes a frame that it expects.
@@ -68,9 +68,10 @@ impl Receiver {
         let is_end = segment.last || segment.sequence == BlockSize::MAX;
         if segment.sequence.get() == self.sequence + 1 {
             self.sequence += 1;
-            match segment.last {
-                true => self.last = Some(segment.data),
-                false => self.sink.append_segment(segment.data, buffer, objects)?,
+            if segment.last {
+                self.last = Some(segment.data);
+            } else {
+                self.sink.append_segment(segment.data, buffer, objects)?;
             }
         }
         if is_end {

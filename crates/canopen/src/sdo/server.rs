@@ -76,7 +76,7 @@ impl Server {
         now: Instant,
     ) -> Option<Result<(), Response>> {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return None };
-        if !receiver.expects(&frame) {
+        if !receiver.expects(frame) {
             return None;
         }
         self.active = now;
