@@ -32,7 +32,11 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// All that can be sent and that is mapped into no TPDO. One that is switched off counts too: who does not want its
     /// content sent does not want it in another way.
     fn not_mapped(&self) -> impl Iterator<Item = Watched> {
-        let layouts: Vec<Layout, TPDOS> = self.tpdo_layouts().take(TPDOS).collect();
+        let mut layouts = Vec::<Layout, TPDOS>::new();
+        for layout in self.tpdo_layouts() {
+            // A table with more TPDOs than there is room for does not compile.
+            let _ = layouts.push(layout);
+        }
         let is_mapped = move |entry: &Entry| layouts.iter().any(|layout| layout.contains(entry.field));
         let entries = self.dictionary.entries();
         let free = entries.filter(move |entry| is_sendable(entry) && !is_mapped(entry));
