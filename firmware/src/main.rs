@@ -109,7 +109,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.device);
         let (protocol, setup, store) = configuration::load(board.parameters, cx.local.protocol);
-        let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new()));
+        let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;

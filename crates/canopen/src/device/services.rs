@@ -30,6 +30,12 @@ impl<A: Application, const N: usize> Device<A, N> {
     fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
+        if let Some(taken) = self.server.take_expected(request, &mut self.core, now) {
+            if let Err(abort) = taken {
+                self.respond(Some(abort), now, out);
+            }
+            return;
+        }
         let response = self.server.answer(request, &mut self.core, now);
         self.core.services_due = self.core.services_due.min(self.server.deadline());
         self.respond(response, now, out);
@@ -41,7 +47,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
     fn send_block(&mut self, now: Instant, out: &mut impl Transmit) {
         let id = self.core.service(SDO_RESPONSE);
-        let abort = self.server.send_block(&mut self.core, now, |data| {
+        let abort = self.server.send_block(&self.core, now, |data| {
             out.room() > RESERVED_ROOM && out.send(Frame::data_frame(id, 8, data)).is_ok()
         });
         if abort.is_some() {

@@ -211,11 +211,11 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     pub(super) fn load_defaults(&mut self, is_meant: impl Fn(&Entry) -> bool) {
-        for entry in self.dictionary.entries().iter().filter(|entry| is_meant(entry)) {
+        for entry in self.dictionary.entries().filter(|entry| is_meant(entry)) {
             let default: [u8; 4] = entry.field.load(self.dictionary.defaults());
-            if entry.node_relative {
+            if entry.attributes.node_relative {
                 self.store_node_relative(entry.field, u32::from_le_bytes(default));
-            } else if !entry.rule.is_computed() {
+            } else if !entry.rule().is_computed() {
                 entry.field.set(&mut self.image, entry.field.get(self.dictionary.defaults()));
             }
         }

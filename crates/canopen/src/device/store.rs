@@ -148,7 +148,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// Begins the job that a write to 1010h or 1011h asks for.
     pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let selection = Selection::of_sub(entry.sub()).ok_or(Abort::Access)?;
-        let job = match (entry.rule, value) {
+        let job = match (entry.rule(), value) {
             (Rule::Store, SAVE) => Job::Save(selection),
             (Rule::Restore, LOAD) => Job::Restore(selection),
             _ => return Err(Abort::NotStored),
@@ -188,7 +188,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         let fits =
             self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
         if !fits {
-            self.load_defaults(|entry| entry.group == group);
+            self.load_defaults(|entry| entry.attributes.group == group);
         }
         self.unsound.set(group, !(fits && is_sound));
         self.application.loaded(group, fits && is_sound);
