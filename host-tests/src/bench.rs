@@ -160,7 +160,7 @@ impl Bench {
     #[must_use]
     pub fn power_cycled(self) -> Bench {
         let (flash, kept) = (self.store.into_flash().0, self.measurement.kept());
-        Bench::start(flash, &self.setup, Start::Kept(kept))
+        Bench::start(flash, &self.setup, kept.map_or(Start::First, Start::Kept))
     }
 
     /// The next thing that the node asks of its firmware, but for storing, which it has got.

@@ -62,15 +62,20 @@ impl Measurement {
 
     /// Processes the sums of one millisecond, and what was read of the encoder at its end.
     pub fn sample(&mut self, raw: &RawSample, encoder: &RawEncoder) -> Snapshot {
-        Snapshot {
-            pressure: self.has_pressure.then(|| self.pressure.sample(raw)),
-            encoder: self.has_encoder.then(|| self.encoder.sample(encoder)),
-        }
+        let mut snapshot = Snapshot::default();
+        self.update(raw, encoder, &mut snapshot);
+        snapshot
     }
 
-    /// What is to outlive a loss of power.
+    /// The same, with the snapshot where it is to be.
+    pub fn update(&mut self, raw: &RawSample, encoder: &RawEncoder, snapshot: &mut Snapshot) {
+        snapshot.pressure = self.has_pressure.then(|| self.pressure.sample(raw));
+        snapshot.encoder = self.has_encoder.then(|| self.encoder.sample(encoder));
+    }
+
+    /// What is to outlive a loss of power; `None` when nothing is measured of which something is.
     #[must_use]
-    pub fn kept(&self) -> Kept {
-        self.encoder.kept()
+    pub fn kept(&self) -> Option<Kept> {
+        self.has_encoder.then(|| self.encoder.kept())
     }
 }

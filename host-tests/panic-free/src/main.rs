@@ -124,7 +124,8 @@ extern "C" fn measure(
 /// What the encoder keeps, out and in again.
 #[unsafe(no_mangle)]
 extern "C" fn power_cycle(measurement: &mut Measurement) {
-    *measurement = Measurement::new(Start::Kept(measurement.kept()));
+    let kept = measurement.kept().map(|kept| Kept::from_words(&kept.to_words()));
+    *measurement = Measurement::new(kept.map_or(Start::First, Start::Kept));
 }
 
 /// Storing.

@@ -1,9 +1,10 @@
 //! The backup SRAM: what is written there outlives a loss of power, as long as there is a battery behind VBAT.
 
-use stm32f4xx_hal::pac::PWR;
+use stm32f4xx_hal::crc32::Crc32;
+use stm32f4xx_hal::pac::{CRC, PWR};
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 
-use crate::kept::{Found, Keeper, Slots};
+use crate::kept::{Checksum, Content, Found, Keeper, Slots};
 
 /// 4 KiB (RM0390, table 1; RM0090, table 1).
 const BASE: *const Slots = 0x4002_4000 as *const Slots;
@@ -13,13 +14,22 @@ const _: () = assert!(size_of::<Slots>() <= 4096);
 /// The memory, written through the copies of [`Keeper`].
 pub struct BackupMemory {
     power: PWR,
-    keeper: Keeper<'static>,
+    keeper: Keeper<'static, Crc32>,
+}
+
+/// CRC-32/MPEG-2, by the unit of the chip (RM0390, 4).
+impl Checksum for Crc32 {
+    fn of(&mut self, sequence: u32, content: &Content) -> u32 {
+        self.init();
+        self.update(&[sequence]);
+        self.update(content)
+    }
 }
 
 impl BackupMemory {
     /// Switches it on, and finds what was kept. The backup regulator need not be ready: it takes over when the main supply
     /// goes (RM0390, 5.1.2).
-    pub(crate) fn open(power: PWR, rcc: &mut Rcc) -> (BackupMemory, Found) {
+    pub(crate) fn open(power: PWR, crc: CRC, rcc: &mut Rcc) -> (BackupMemory, Found) {
         PWR::enable(rcc);
         rcc.ahb1enr().modify(|_, w| w.bkpsramen().set_bit());
         protect(&power, false);
@@ -28,14 +38,14 @@ impl BackupMemory {
         // SAFETY: the memory is there, on and aligned, and any bits of it are numbers. `power` is given to this function
         // only, once, so nothing else refers to it.
         let slots = unsafe { &*BASE };
-        let (keeper, found) = Keeper::open(slots);
+        let (keeper, found) = Keeper::open(slots, Crc32::new(crc, rcc));
         (BackupMemory { power, keeper }, found)
     }
 
-    /// Keeps these bytes. Nothing else can write to the memory: it is protected but for the time of this call.
-    pub fn write(&mut self, bytes: &[u8]) {
+    /// Keeps this. Nothing else can write to the memory: it is protected but for the time of this call.
+    pub fn write(&mut self, content: &Content) {
         protect(&self.power, false);
-        self.keeper.write(bytes);
+        self.keeper.write(content);
         protect(&self.power, true);
     }
 }
