@@ -174,13 +174,16 @@ mod app {
             0 => {}
             lost => defmt::error!("{=u32} milliseconds were not collected in time", lost),
         }
-        if let Some(parameters) = cx.shared.parameters.lock(Option::take) {
-            cx.local.measurement.apply(&parameters);
-            cx.local.shaft.apply(&parameters);
-        }
+        let (measurement, shaft) = (&mut *cx.local.measurement, cx.local.shaft);
+        cx.shared.parameters.lock(|parameters| {
+            if let Some(new) = parameters {
+                measurement.apply(new);
+                shaft.apply(new);
+                *parameters = None;
+            }
+        });
         let raw = configuration::raw_sample(&sums, *cx.local.factory);
-        let encoder = cx.local.shaft.read(&sums);
-        let measurement = &mut *cx.local.measurement;
+        let encoder = shaft.read(&sums);
         cx.shared.snapshot.lock(|latest| measurement.update(&raw, &encoder, latest.renew()));
         if let Some(kept) = measurement.kept() {
             cx.local.backup.write(&kept.to_words());

@@ -19,16 +19,16 @@ const _: () = {
     assert!(SCANS.is_multiple_of(2), "a channel has its conversions in both halves");
 };
 
-/// The sum of each channel. Both halves of a word are added at once: two scans are a whole number of words.
+/// The sum of each channel. Both halves of a word are added at once: two scans are a whole number of words. Written out,
+/// because the firmware is compiled for size, and inner loops would cost three times as much.
 pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
-    let mut pairs = [0; CHANNELS];
-    for two_scans in words.as_chunks::<CHANNELS>().0 {
-        for (pair, word) in pairs.iter_mut().zip(two_scans) {
-            *pair += word.load(Ordering::Relaxed);
-        }
-    }
-    let of_two_scans = |n: usize| pairs[n / 2] >> (16 * (n % 2)) & 0xFFFF;
-    core::array::from_fn(|channel| of_two_scans(channel) + of_two_scans(channel + CHANNELS))
+    let load = |word: &AtomicU32| word.load(Ordering::Relaxed);
+    let [a, b, c, d, e] =
+        words.as_chunks().0.iter().fold([0; CHANNELS], |[a, b, c, d, e], [v, w, x, y, z]| {
+            [a + load(v), b + load(w), c + load(x), d + load(y), e + load(z)]
+        });
+    let (low, high) = (|sum: u32| sum & 0xFFFF, |sum: u32| sum >> 16);
+    [low(a) + high(c), high(a) + low(d), low(b) + high(d), high(b) + low(e), low(c) + high(e)]
 }
 
 #[cfg(test)]

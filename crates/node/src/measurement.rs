@@ -70,7 +70,11 @@ impl Measurement {
     /// The same, with the snapshot where it is to be.
     pub fn update(&mut self, raw: &RawSample, encoder: &RawEncoder, snapshot: &mut Snapshot) {
         snapshot.pressure = self.has_pressure.then(|| self.pressure.sample(raw));
-        snapshot.encoder = self.has_encoder.then(|| self.encoder.sample(encoder));
+        if self.has_encoder {
+            self.encoder.update(encoder, snapshot.encoder.get_or_insert_default());
+        } else {
+            snapshot.encoder = None;
+        }
     }
 
     /// What is to outlive a loss of power; `None` when nothing is measured of which something is.

@@ -50,6 +50,12 @@ pub(crate) fn frame(id: u16, bytes: &[u8]) -> Frame {
     Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
 }
 
+/// An SDO request for an object.
+pub(crate) fn request(command: u8, (index, sub): (u16, u8), value: u32) -> [u8; 8] {
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+    [command, low, high, sub, a, b, c, d]
+}
+
 /// A client on the bus, at 1 Mbit/s unless it says otherwise.
 pub(crate) struct Master {
     pub(crate) port: PortId,

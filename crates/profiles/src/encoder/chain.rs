@@ -79,12 +79,19 @@ impl Encoder {
 
     /// Processes what was read in one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
+        let mut snapshot = Snapshot::default();
+        self.update(raw, &mut snapshot);
+        snapshot
+    }
+
+    /// The same, with the snapshot where it is to be.
+    pub fn update(&mut self, raw: &RawEncoder, snapshot: &mut Snapshot) {
         self.kept.operating_time.tick();
         if let Some(mask) = self.acknowledge.take() {
             let [low, high, ..] = mask.to_le_bytes();
             self.supervision.acknowledge(u16::from_le_bytes([low, high]));
         }
-        let mut snapshot = self.fixed;
+        *snapshot = self.fixed;
         for (values, channel) in snapshot.channels.iter_mut().zip(&mut self.channels) {
             if let Some(channel) = channel {
                 *values = channel.sample(raw);
@@ -95,7 +102,6 @@ impl Encoder {
         snapshot.warnings = self.supervision.warnings(channels, &raw.board, limits, time);
         snapshot.conditions = self.supervision.conditions(channels, &raw.board, limits);
         snapshot.operating_time = time.tenths();
-        snapshot
     }
 
     /// What is to outlive a loss of power: see [`Kept`].
