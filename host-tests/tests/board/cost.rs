@@ -4,7 +4,7 @@ use canbus::Time;
 use emulator::Exception;
 use sim::world::World;
 
-use crate::support::{Master, SECOND, request, world};
+use crate::support::{Master, SECOND, world, write};
 
 /// DMA2 stream 0: the sampling task.
 const SAMPLING: Exception = Exception::irq(56);
@@ -50,8 +50,7 @@ fn a_sample_of_both_profiles_takes_two_per_cent_of_the_core() {
     let master = Master::join(&mut world);
     world.run_until(SECOND);
     for (index, sub, size, value) in FILTERS_AND_SCALE.into_iter().chain(cams()) {
-        let answer = master.ask(&mut world, 1, &request(0x23 | (4 - size) << 2, (index, sub), value));
-        assert_eq!(answer[0], 0x60, "{index:X}h:{sub}: {answer:x?}");
+        write(&mut world, &master, (index, sub), size, value);
     }
     world.run_until(world.now() + Time::from_millis(100));
     let before = spent(&mut world);

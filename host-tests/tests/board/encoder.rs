@@ -4,7 +4,7 @@ use canbus::Time;
 use sim::stimuli::Stimulus;
 use sim::world::World;
 
-use crate::support::{Master, SECOND, START_ALL, SYNC, request, run, world};
+use crate::support::{Master, SECOND, START_ALL, SYNC, read, run, world, write};
 
 /// TPDO 2, which carries the position with every SYNC.
 const TPDO2: u16 = 0x281;
@@ -44,19 +44,6 @@ fn stimulate(world: &mut World, kind: &str, spec: &str) {
 
 fn wait(world: &mut World, millis: u64) {
     world.run_until(world.now() + Time::from_millis(millis));
-}
-
-fn read(world: &mut World, master: &Master, object: (u16, u8)) -> u32 {
-    let answer = master.ask(world, 1, &request(0x40, object, 0));
-    assert_eq!(answer[0] & 0xE3, 0x43, "{object:x?}: {answer:x?}");
-    let unused = usize::from(answer[0] >> 2 & 3);
-    answer[4..8 - unused].iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
-}
-
-/// Writes an object of `size` bytes.
-fn write(world: &mut World, master: &Master, object: (u16, u8), size: u8, value: u32) {
-    let answer = master.ask(world, 1, &request(0x23 | (4 - size) << 2, object, value));
-    assert_eq!(answer[0], 0x60, "{object:x?}: {answer:x?}");
 }
 
 /// Where the shaft is, in steps.

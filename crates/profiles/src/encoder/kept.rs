@@ -114,12 +114,9 @@ impl Kept {
     #[must_use]
     #[inline]
     pub fn to_words(&self) -> [u32; Kept::WORDS] {
-        let mut words = [0; Kept::WORDS];
-        let (channels, time) = words.as_chunks_mut();
-        channels.iter_mut().zip(&self.channels).for_each(|(to, channel)| *to = channel.to_words());
         let OperatingTime { tenths, millis } = self.operating_time;
-        time.iter_mut().zip([tenths, millis]).for_each(|(to, from)| *to = from);
-        words
+        let [[a, b, c, d, e, f, g, h], [i, j, k, l, m, n, o, p]] = self.channels.map(KeptChannel::to_words);
+        [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, tenths, millis]
     }
 
     /// From the stored form. Any words are something; a channel that fits no sensor is not used.
