@@ -1,7 +1,9 @@
 //! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
 
+mod bench;
 mod command;
 mod eds;
+mod fuzz;
 mod images;
 mod native;
 mod plots;
@@ -47,6 +49,10 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
+    /// Let libFuzzer look for inputs that break a rule (docs/evidence.md)
+    Fuzz(fuzz::Flags),
+    /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
+    Bench(bench::Options),
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
     Test {
         /// Run only the steps whose name contains this text
@@ -62,6 +68,8 @@ fn main() -> ExitCode {
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
         Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
+        Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
+        Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {

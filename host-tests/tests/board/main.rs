@@ -2,6 +2,7 @@
 
 mod configuring;
 mod cost;
+mod differential;
 mod encoder;
 mod faults;
 mod measuring;
