@@ -142,6 +142,7 @@ fn the_cyclic_timer_is_saved_with_the_communication_parameters() {
 #[test]
 fn a_preset_is_the_next_position_and_outlives_a_loss_of_power() {
     let mut bench = operational();
+    bench.write(0x1800, 2, &[255]).unwrap();
     turn_to(&mut bench, 1000);
     bench.take();
     bench.write(0x6003, 0, &77_u32.to_le_bytes()).unwrap();

@@ -154,7 +154,7 @@ impl Board {
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
             Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
-            Step::PowerCycle => self.power_on(Start::Kept(self.measurement.kept())),
+            Step::PowerCycle => self.power_on(self.measurement.kept().map_or(Start::First, Start::Kept)),
             Step::PowerCut { after } => self.flash.cut_after(after),
         }
         self.settle();
@@ -219,7 +219,7 @@ impl Board {
             let Some(request) = self.protocol.take_request() else { return };
             match request {
                 Request::ResetNode | Request::Bootloader => {
-                    self.power_on(Start::Kept(self.measurement.kept()));
+                    self.power_on(self.measurement.kept().map_or(Start::First, Start::Kept));
                 }
                 Request::ResetCommunication => self.start(),
                 Request::Filters => {
