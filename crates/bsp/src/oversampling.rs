@@ -10,17 +10,15 @@ pub const SCANS: usize = 16;
 pub const WORDS: usize = SCANS * CHANNELS / 2;
 
 /// Largest result of a conversion.
-const FULL_SCALE: u32 = 4095;
+const FULL_SCALE: usize = 4095;
 const _: () = {
-    assert!(
-        FULL_SCALE * SCANS as u32 / 2 < 1 << 16,
-        "the sum of a lower half must not reach into the upper one"
-    );
+    assert!(FULL_SCALE * SCANS / 2 < 1 << 16, "the sum of a lower half must not reach into the upper one");
     assert!(SCANS.is_multiple_of(2), "a channel has its conversions in both halves");
 };
 
 /// The sum of each channel. Both halves of a word are added at once: two scans are a whole number of words. Written out,
 /// because the firmware is compiled for size, and inner loops would cost three times as much.
+#[allow(clippy::many_single_char_names)] // The five words of two scans.
 pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
     let load = |word: &AtomicU32| word.load(Ordering::Relaxed);
     let [a, b, c, d, e] =
@@ -51,6 +49,6 @@ mod tests {
 
     #[test]
     fn the_largest_sums_do_not_run_over() {
-        assert_eq!(sums(&buffer(|_| FULL_SCALE)), [16 * FULL_SCALE; CHANNELS]);
+        assert_eq!(sums(&buffer(|_| 4095)), [16 * 4095; CHANNELS]);
     }
 }

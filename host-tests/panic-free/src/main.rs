@@ -7,7 +7,9 @@
 
 use canopen::{Frame, Instant, QueueFull, Transmit};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use node::{BusEvent, Fault, Measurement, Parcel, Protocol, RawEncoder, RawSample, Setup, Snapshot, Start};
+use node::{
+    BusEvent, Fault, Kept, Measurement, Parcel, Protocol, RawEncoder, RawSample, Setup, Snapshot, Start,
+};
 use storage::{Pages, Store, View};
 
 unsafe extern "C" {

@@ -138,7 +138,7 @@ impl Tpdo {
                 let _ = out.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
-                self.send(image, now, out)
+                self.send(image, now, out);
             }
             _ => (),
         }

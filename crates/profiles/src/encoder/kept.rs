@@ -115,8 +115,9 @@ impl Kept {
     #[inline]
     pub fn to_words(&self) -> [u32; Kept::WORDS] {
         let OperatingTime { tenths, millis } = self.operating_time;
-        let [[a, b, c, d, e, f, g, h], [i, j, k, l, m, n, o, p]] = self.channels.map(KeptChannel::to_words);
-        [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, tenths, millis]
+        let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] =
+            self.channels.map(KeptChannel::to_words);
+        [a0, a1, a2, a3, a4, a5, a6, a7, b0, b1, b2, b3, b4, b5, b6, b7, tenths, millis]
     }
 
     /// From the stored form. Any words are something; a channel that fits no sensor is not used.
