@@ -52,7 +52,9 @@ mod app {
     use bsp::reset_cause::ResetCause;
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
-    use bsp::{BackupMemory, Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
+    use bsp::{
+        BackupMemory, Board, Buttons, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog,
+    };
     use node::{EncoderBoard, FactoryCalibration, Measurement, Parameters, Parcel, Protocol};
 
     use crate::bit_rate::Rate;
@@ -80,6 +82,7 @@ mod app {
         receiver_services: Receiver,
         sampling: Sampling,
         shaft: Shaft,
+        buttons: Buttons,
         measurement: &'static mut Measurement,
         factory: FactoryCalibration,
         transmitter: Transmitter,
@@ -125,11 +128,12 @@ mod app {
             receiver_services,
             sampling: board.sampling,
             shaft: Shaft::new(board.encoder, board.ssi, surroundings),
+            buttons: board.buttons,
             measurement: cx.local.measurement_place.write(Measurement::new(remembering::start(&board.found))),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
-            process: Process { frames: process_frames, alarm: process_alarm },
+            process: Process { frames: process_frames, alarm: process_alarm, lamps: board.lamps },
             services: Services::new(
                 board.can,
                 Rate::of(setup.bit_rate),
@@ -166,7 +170,7 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, measurement, factory, backup],
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, buttons, measurement, factory, backup],
            shared = [snapshot, parameters, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(sums) = cx.local.sampling.take() else { return };
@@ -183,8 +187,8 @@ mod app {
             }
         });
         let raw = configuration::raw_sample(&sums, *cx.local.factory);
-        let encoder = shaft.read(&sums);
-        cx.shared.snapshot.lock(|latest| measurement.update(&raw, &encoder, latest.renew()));
+        let (encoder, pressed) = (shaft.read(&sums), cx.local.buttons.sample());
+        cx.shared.snapshot.lock(|latest| measurement.update(&raw, &encoder, pressed, latest.renew()));
         if let Some(kept) = measurement.kept() {
             cx.local.backup.write(&kept.to_words());
         }

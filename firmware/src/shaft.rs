@@ -7,7 +7,7 @@ use node::{EncoderBoard, Parameters, RawEncoder, SsiFrame};
 pub(crate) struct Shaft {
     encoder: Encoder,
     ssi: Ssi,
-    /// Whether the personality has an encoder at all.
+    /// Whether the personality has sensors of positions at all.
     is_used: bool,
     /// Bits of the word to be read over SSI; `None` when no sensor has one.
     length: Option<u32>,
@@ -21,10 +21,10 @@ impl Shaft {
 
     /// Looks which sensors there are.
     pub(crate) fn apply(&mut self, parameters: &Parameters) {
-        self.is_used = parameters.encoder.is_some();
+        self.is_used = parameters.sensors().is_some();
         let absolute = |channel: &node::EncoderChannel| channel.kind.is_some_and(|kind| kind.is_absolute());
-        let encoder = parameters.encoder.filter(|encoder| encoder.channels.iter().any(absolute));
-        self.length = encoder.map(|encoder| encoder.format.length());
+        let sensors = parameters.sensors().filter(|sensors| sensors.channels.iter().any(absolute));
+        self.length = sensors.map(|sensors| sensors.format.length());
     }
 
     /// What belongs to the millisecond of these sums. A word of SSI is that of the last millisecond, and the next one is

@@ -114,13 +114,16 @@ extern "C" fn measure(
     measurement: &mut Measurement,
     raw: &RawSample,
     encoder: &RawEncoder,
+    buttons: &[bool; 2],
+    lit: &mut [bool; 2],
     now: u64,
 ) {
     if let Some(parameters) = protocol.take_parameters() {
         measurement.apply(&parameters);
     }
-    let snapshot: Snapshot = measurement.sample(raw, encoder);
+    let snapshot: Snapshot = measurement.sample(raw, encoder, *buttons);
     protocol.publish(&snapshot, Instant(now), &mut Queue);
+    *lit = protocol.lamps();
 }
 
 /// What the encoder keeps, out and in again.
