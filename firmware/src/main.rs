@@ -189,9 +189,7 @@ mod app {
         let raw = configuration::raw_sample(&sums, *cx.local.factory);
         let (encoder, pressed) = (shaft.read(&sums), cx.local.buttons.sample());
         cx.shared.snapshot.lock(|latest| measurement.update(&raw, &encoder, pressed, latest.renew()));
-        if let Some(kept) = measurement.kept() {
-            cx.local.backup.write(&kept.to_words());
-        }
+        measurement.keep(|words| cx.local.backup.write(words));
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
     }

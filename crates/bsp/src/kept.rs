@@ -38,14 +38,17 @@ pub enum Found {
     Damaged,
 }
 
-/// A CRC of 32 bits over words: of the sequence number and of the content.
+/// A CRC of 32 bits over words, the sequence number first.
 pub trait Checksum {
-    /// The CRC.
-    fn of(&mut self, sequence: u32, content: &Content) -> u32;
+    /// Begins with this word.
+    fn start(&mut self, word: u32);
+    /// Goes on with this one.
+    fn add(&mut self, word: u32);
+    /// The CRC of all of them.
+    fn value(&self) -> u32;
 }
 
 /// Writes the copies in turn.
-#[derive(Debug)]
 pub struct Keeper<'a, C> {
     slots: &'a Slots,
     checksum: C,
@@ -75,7 +78,7 @@ impl<'a, C: Checksum> Keeper<'a, C> {
         self.sequence = self.sequence.wrapping_add(1);
         let [even, odd] = self.slots;
         let slot = if self.sequence.is_multiple_of(2) { even } else { odd };
-        slot.write(self.sequence, content, self.checksum.of(self.sequence, content));
+        slot.write(self.sequence, content, &mut self.checksum);
     }
 }
 
@@ -88,16 +91,21 @@ impl Slot {
     fn read(&self, checksum: &mut impl Checksum) -> Option<(u32, Content)> {
         let sequence = self.sequence.load(Ordering::Relaxed);
         let content = self.content.each_ref().map(|word| word.load(Ordering::Relaxed));
-        let is_good =
-            self.has_mark() && self.checksum.load(Ordering::Relaxed) == checksum.of(sequence, &content);
+        checksum.start(sequence);
+        content.iter().for_each(|word| checksum.add(*word));
+        let is_good = self.has_mark() && self.checksum.load(Ordering::Relaxed) == checksum.value();
         is_good.then_some((sequence, content))
     }
 
     /// The mark comes last: where a first write is cut short there was nothing, and not something that is damaged.
-    fn write(&self, sequence: u32, content: &Content, checksum: u32) {
+    fn write(&self, sequence: u32, content: &Content, checksum: &mut impl Checksum) {
         self.sequence.store(sequence, Ordering::Relaxed);
-        self.content.iter().zip(content).for_each(|(to, from)| to.store(*from, Ordering::Relaxed));
-        self.checksum.store(checksum, Ordering::Relaxed);
+        checksum.start(sequence);
+        for (to, from) in self.content.iter().zip(content) {
+            to.store(*from, Ordering::Relaxed);
+            checksum.add(*from);
+        }
+        self.checksum.store(checksum.value(), Ordering::Relaxed);
         self.mark.store(MARK, Ordering::Release);
     }
 }
@@ -109,23 +117,30 @@ fn is_later(sequence: u32, than: u32) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crc::{CRC_32_MPEG_2, Crc};
+    use crc::{CRC_32_MPEG_2, Crc, Digest};
 
     use super::*;
 
     /// Words of a copy.
     const WORDS: usize = CAPACITY + 3;
 
+    static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_MPEG_2);
+
     /// What the unit of the chip computes.
-    #[derive(Debug)]
-    struct Software;
+    struct Software(Digest<'static, u32>);
 
     impl Checksum for Software {
-        fn of(&mut self, sequence: u32, content: &Content) -> u32 {
-            let crc = Crc::<u32>::new(&CRC_32_MPEG_2);
-            let mut digest = crc.digest();
-            [sequence].iter().chain(content).for_each(|word| digest.update(&word.to_be_bytes()));
-            digest.finalize()
+        fn start(&mut self, word: u32) {
+            self.0 = CRC.digest();
+            self.add(word);
+        }
+
+        fn add(&mut self, word: u32) {
+            self.0.update(&word.to_be_bytes());
+        }
+
+        fn value(&self) -> u32 {
+            self.0.clone().finalize()
         }
     }
 
@@ -152,7 +167,7 @@ mod tests {
     }
 
     fn open(slots: &Slots) -> (Keeper<'_, Software>, Found) {
-        Keeper::open(slots, Software)
+        Keeper::open(slots, Software(CRC.digest()))
     }
 
     fn found(slots: &Slots) -> Found {
@@ -192,7 +207,7 @@ mod tests {
     #[test]
     fn the_sequence_may_wrap() {
         let slots = memory(0);
-        let mut keeper = Keeper { slots: &slots, checksum: Software, sequence: u32::MAX - 3 };
+        let mut keeper = Keeper { slots: &slots, checksum: Software(CRC.digest()), sequence: u32::MAX - 3 };
         for number in 0..8 {
             keeper.write(&content(number));
             assert_eq!(found(&slots), Found::Kept(content(number)));

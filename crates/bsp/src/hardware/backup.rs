@@ -1,8 +1,7 @@
 //! The backup SRAM: what is written there outlives a loss of power, as long as there is a battery behind VBAT.
 
-use stm32f4xx_hal::crc32::Crc32;
 use stm32f4xx_hal::pac::{CRC, PWR};
-use stm32f4xx_hal::rcc::{Enable, Rcc};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 use crate::kept::{Checksum, Content, Found, Keeper, Slots};
 
@@ -14,15 +13,32 @@ const _: () = assert!(size_of::<Slots>() <= 4096);
 /// The memory, written through the copies of [`Keeper`].
 pub struct BackupMemory {
     power: PWR,
-    keeper: Keeper<'static, Crc32>,
+    keeper: Keeper<'static, CrcUnit>,
 }
 
 /// CRC-32/MPEG-2, by the unit of the chip (RM0390, 4).
-impl Checksum for Crc32 {
-    fn of(&mut self, sequence: u32, content: &Content) -> u32 {
-        self.init();
-        self.update(&[sequence]);
-        self.update(content)
+struct CrcUnit(CRC);
+
+impl CrcUnit {
+    fn new(crc: CRC, rcc: &mut Rcc) -> CrcUnit {
+        CRC::enable(rcc);
+        CRC::reset(rcc);
+        CrcUnit(crc)
+    }
+}
+
+impl Checksum for CrcUnit {
+    fn start(&mut self, word: u32) {
+        self.0.cr().write(|w| w.reset().set_bit());
+        self.add(word);
+    }
+
+    fn add(&mut self, word: u32) {
+        self.0.dr().write(|w| w.dr().set(word));
+    }
+
+    fn value(&self) -> u32 {
+        self.0.dr().read().bits()
     }
 }
 
@@ -38,7 +54,7 @@ impl BackupMemory {
         // SAFETY: the memory is there, on and aligned, and any bits of it are numbers. `power` is given to this function
         // only, once, so nothing else refers to it.
         let slots = unsafe { &*BASE };
-        let (keeper, found) = Keeper::open(slots, Crc32::new(crc, rcc));
+        let (keeper, found) = Keeper::open(slots, CrcUnit::new(crc, rcc));
         (BackupMemory { power, keeper }, found)
     }
 

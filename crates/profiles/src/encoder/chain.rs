@@ -106,12 +106,22 @@ impl Encoder {
 
     /// What is to outlive a loss of power: see [`Kept`].
     #[must_use]
+    #[inline]
     pub fn kept(&self) -> Kept {
-        let mut kept = self.kept;
-        for (kept, channel) in kept.channels.iter_mut().zip(&self.channels) {
-            *kept = channel.as_ref().map_or(*kept, Channel::kept);
-        }
-        kept
+        let ([first, second], [before, before_too]) = (&self.channels, &self.kept.channels);
+        let kept = |channel: &Option<Channel>, before: &KeptChannel| match channel {
+            Some(channel) => channel.kept(),
+            None => *before,
+        };
+        let channels = [kept(first, before), kept(second, before_too)];
+        Kept { channels, operating_time: self.kept.operating_time }
+    }
+
+    /// The same as it is stored: see [`Kept::to_words`]. Not inlined: this crate is compiled for speed, its callers for size.
+    #[must_use]
+    #[inline(never)]
+    pub fn kept_words(&self) -> [u32; Kept::WORDS] {
+        self.kept().to_words()
     }
 }
 

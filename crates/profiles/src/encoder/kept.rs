@@ -112,7 +112,6 @@ impl Kept {
 
     /// The form to be stored. It has no check of its own: whoever stores it adds one.
     #[must_use]
-    #[inline]
     pub fn to_words(&self) -> [u32; Kept::WORDS] {
         let OperatingTime { tenths, millis } = self.operating_time;
         let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] =
@@ -130,7 +129,6 @@ impl Kept {
 }
 
 impl KeptChannel {
-    #[inline]
     fn to_words(self) -> [u32; CHANNEL] {
         let flags = u32::from_le_bytes([self.kind, self.referenced.into(), self.reversed.into(), 0]);
         let ([total, total_high], [range, range_high]) =
