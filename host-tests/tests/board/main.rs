@@ -8,3 +8,4 @@ mod faults;
 mod measuring;
 mod running;
 mod support;
+mod timing;
