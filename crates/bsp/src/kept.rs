@@ -92,7 +92,9 @@ impl Slot {
         let sequence = self.sequence.load(Ordering::Relaxed);
         let content = self.content.each_ref().map(|word| word.load(Ordering::Relaxed));
         checksum.start(sequence);
-        content.iter().for_each(|word| checksum.add(*word));
+        for word in &content {
+            checksum.add(*word);
+        }
         let is_good = self.has_mark() && self.checksum.load(Ordering::Relaxed) == checksum.value();
         is_good.then_some((sequence, content))
     }

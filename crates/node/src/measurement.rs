@@ -98,17 +98,20 @@ impl Measurement {
         buttons: [bool; BUTTONS],
         snapshot: &mut Snapshot,
     ) {
-        match self.has_pressure {
-            true => self.pressure.update(raw, snapshot.pressure.get_or_insert_default()),
-            false => snapshot.pressure = None,
+        if self.has_pressure {
+            self.pressure.update(raw, snapshot.pressure.get_or_insert_default());
+        } else {
+            snapshot.pressure = None;
         }
-        match self.has_encoder {
-            true => self.encoder.update(encoder, snapshot.encoder.get_or_insert_default()),
-            false => snapshot.encoder = None,
+        if self.has_encoder {
+            self.encoder.update(encoder, snapshot.encoder.get_or_insert_default());
+        } else {
+            snapshot.encoder = None;
         }
-        match self.has_lift {
-            true => self.update_lift(&RawLift { encoder: *encoder, pressure: *raw, buttons }, snapshot),
-            false => snapshot.lift = None,
+        if self.has_lift {
+            self.update_lift(&RawLift { encoder: *encoder, pressure: *raw, buttons }, snapshot);
+        } else {
+            snapshot.lift = None;
         }
     }
 
