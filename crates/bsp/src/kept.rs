@@ -178,7 +178,7 @@ mod tests {
 
     /// What `write` with this number keeps.
     fn content(number: u32) -> Content {
-        core::array::from_fn(|n| number.wrapping_mul(0x9E37_79B9).rotate_left(n as u32))
+        core::array::from_fn(|n| number.wrapping_mul(0x9E37_79B9).rotate_left(u32::try_from(n).unwrap()))
     }
 
     fn written(writes: u32) -> Slots {
