@@ -27,8 +27,8 @@ pub fn world(options: &Options) -> Result<World> {
     let boards = options.nodes.iter().map(|node| board(node, options, &images));
     let boards = boards.collect::<Result<Vec<Board>>>()?;
     let mut world = World::new(boards, options.bitrate, options.load);
-    let Options { pressure, temperature, shaft, button, fault, .. } = options;
-    [pressure, temperature, shaft, button, fault]
+    let Options { pressure, temperature, thermistor, shaft, button, fault, .. } = options;
+    [pressure, temperature, thermistor, shaft, button, fault]
         .into_iter()
         .flatten()
         .for_each(|stimulus| world.apply(stimulus));

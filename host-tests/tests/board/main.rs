@@ -3,6 +3,7 @@
 mod bus_faults;
 mod chip_faults;
 mod configuring;
+mod cost;
 mod differential;
 mod encoder;
 mod faults;

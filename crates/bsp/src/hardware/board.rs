@@ -81,6 +81,7 @@ impl Board {
             timer: device.TIM3,
             pressure: gpioa.pa0.into_analog(),
             supply: gpioa.pa1.into_analog(),
+            thermistor: gpioc.pc2.into_analog(),
         };
         let sampling = Sampling::new(front_end, &mut rcc);
         let streams = StreamsTuple::new(device.DMA1, &mut rcc);
@@ -101,7 +102,7 @@ impl Board {
             data: gpiob.pb14,
         };
         let ssi = Ssi::new(absolute, &mut rcc);
-        let (backup, found) = BackupMemory::open(device.PWR, &mut rcc);
+        let (backup, found) = BackupMemory::open(device.PWR, device.CRC, &mut rcc);
         let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
         let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
         let led = Led::new(gpioa.pa5);

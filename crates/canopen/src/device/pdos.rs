@@ -202,7 +202,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         let transmission = Transmission::parse(low_byte(self.number(entry.index(), 2)));
         let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
         let is_empty = self.number(pdo.mapping(), 0) == 0;
-        let is_not_sent = self.is_multiplexed(pdo) && transmission != Some(Transmission::Event);
+        let is_not_sent =
+            self.is_multiplexed(pdo) && !transmission.is_some_and(Transmission::is_event_driven);
         let is_taken = !is_predefined && new.id.is_restricted();
         let cannot_exist = moves || contradicts || is_empty || is_not_sent || is_taken;
         if !new.bit31 && cannot_exist { Err(Abort::InvalidValue) } else { Ok(()) }
@@ -214,8 +215,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         let transmission = Transmission::parse(low_byte(value)).ok_or(Abort::InvalidValue)?;
         let no_remote = self.cob_id(pdo).is_some_and(|cob_id| !cob_id.bit31 && cob_id.bit30);
         let is_receive = pdo.direction == Direction::Receive;
-        let is_not_sent =
-            self.is_multiplexed(pdo) && transmission != Transmission::Event && self.is_valid(pdo);
+        let is_not_sent = self.is_multiplexed(pdo) && !transmission.is_event_driven() && self.is_valid(pdo);
         if is_not_sent || transmission.needs_remote() && (no_remote || is_receive) {
             return Err(Abort::InvalidValue);
         }
