@@ -3,6 +3,7 @@
 mod configuring;
 mod encoder;
 mod faults;
+mod lift;
 mod measuring;
 mod running;
 mod support;
