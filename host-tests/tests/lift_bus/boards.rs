@@ -235,5 +235,5 @@ pub(crate) fn positions(log: &[Stamped]) -> impl Iterator<Item = (Instant, f64)>
     })
 }
 
-/// A position is at most this old when its frame has ended: that of the last sample, and the wait for the bus.
-pub(crate) const OLDEST: Duration = Duration(1_300);
+/// A position is at most this old when its frame has ended: the way of a sample to the dictionary, and the wait for the bus.
+pub(crate) const OLDEST: Duration = Duration(800);

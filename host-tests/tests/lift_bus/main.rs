@@ -189,18 +189,24 @@ fn a_small_lift_of_boards() {
     assert_eq!(velocities.max(), Some(FAST));
 }
 
-/// To one measuring step, between the instant of the sample and that at which the frame has ended.
+/// To one measuring step. At full speed the car is ahead by what it goes between the sample and the end of the frame: that
+/// is less than a sample, and the same each time to one step.
 #[cfg(feature = "board")]
 fn every_position_is_one_that_the_car_has_just_had(lift: &boards::Boards) {
-    let mut frames = 0;
+    let (mut frames, mut ahead) = (0, vec![]);
     for (at, position) in boards::positions(&lift.log) {
+        let before = canopen::Instant(at.0 - boards::OLDEST.0);
         // The car was at 3 m from the end of the tape when the preset made that 10 m.
-        let [oldest, newest] =
-            [canopen::Instant(at.0 - boards::OLDEST.0), at].map(|at| lift.car(at) + 7_000.0);
+        let [oldest, newest] = [before, at].map(|at| lift.car(at) + 7_000.0);
         let (low, high) = (oldest.min(newest) - 1.0, oldest.max(newest) + 1.0);
         assert!((low..=high).contains(&position), "{position} at {at:?}, not {low} to {high}");
+        let is_fast = newest - oldest > 0.999 * boards::OLDEST.0 as f64 * 1e-6 * f64::from(FAST);
+        ahead.extend(is_fast.then_some(newest - position));
         frames += 1;
     }
-    println!("{frames} positions of an emulated board");
+    let least = ahead.iter().copied().fold(f64::MAX, f64::min);
+    let most = ahead.iter().copied().fold(f64::MIN, f64::max);
+    println!("{frames} positions; at 2.5 m/s the car is {least:.2} to {most:.2} mm ahead");
     assert!(frames > 2_500, "one a millisecond while it drives: {frames}");
+    assert!(ahead.len() > 300 && most - least <= 1.0, "{least} to {most} mm in {} frames", ahead.len());
 }
