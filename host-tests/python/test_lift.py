@@ -19,12 +19,14 @@ OFF = {264, 385, 386}
 CONSUMED = {2, 3, 4, 5, 6, 7, 8, 257}
 
 
-def rows():
+def rows() -> list:
+    found = []
     with TABLE.open() as table:
         for row in csv.DictReader(table):
             is_produced, number = row["direction"] == "TPDO", int(row["number"])
             if number in (PRODUCED if is_produced else CONSUMED):
-                yield pytest.param(row, is_produced, number, id=f"{row['direction']}{number}")
+                found.append(pytest.param(row, is_produced, number, id=f"{row['direction']}{number}"))
+    return found
 
 
 def can_id(row: dict) -> int:
@@ -62,7 +64,7 @@ def test_there_is_no_other_pdo(dictionary):
 
 def test_a_master_reads_what_the_node_sends():
     """The firmware on an emulated board: the master's own PDO objects decode its frames."""
-    simulator = Simulator("--node", f"{NODE_ID}:lift", "--bitrate", "1000", "--shaft", "const:0.5", speed="real")
+    simulator = Simulator("--node", f"{NODE_ID}:lift", "--bitrate", "1000", speed="real")
     master = Master(simulator)
     try:
         node = master.network.add_node(NODE_ID, str(EDS))
@@ -73,9 +75,16 @@ def test_a_master_reads_what_the_node_sends():
         assert (node.tpdo[258].cob_id, node.tpdo[263].cob_id) == (0x188, 0x18C)
         assert [variable.name for variable in node.tpdo[258].map] == ["Load signals.Load signal", "Load values.Load value"]
         node.nmt.send_command(1)
-        assert node.tpdo[263].wait_for_reception(PATIENCE) is not None
-        # The tape is the wheel of 200 mm a revolution.
-        assert node.tpdo[263].map[0].raw == 100
+        position = node.tpdo[263]
+        assert position.wait_for_reception(PATIENCE) is not None
+        assert position.map[0].raw == 0
+        # Half a revolution of a wheel of 200 mm.
+        simulator.command(f"shaft {NODE_ID}=ramp:0,0.5,0.2")
+        for _ in range(200):
+            if position.map[0].raw == 100:
+                break
+            position.wait_for_reception(0.1)
+        assert position.map[0].raw == 100
     finally:
         master.close()
         simulator.process.kill()
