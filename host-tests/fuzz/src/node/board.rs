@@ -154,7 +154,7 @@ impl Board {
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
             Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
-            Step::PowerCycle => self.power_on(Start::Kept(self.measurement.kept())),
+            Step::PowerCycle => self.power_on(self.kept()),
             Step::PowerCut { after } => self.flash.cut_after(after),
         }
         self.settle();
@@ -186,13 +186,20 @@ impl Board {
         }
     }
 
+    /// What a loss of power leaves.
+    fn kept(&self) -> Start {
+        self.measurement.kept().map_or(Start::First, Start::Kept)
+    }
+
     fn sample(&mut self, raw: &node::RawSample, encoder: u16) {
         self.now = self.now + Duration::from_millis(1);
         if let Some(parameters) = self.protocol.take_parameters() {
             self.measurement.apply(&parameters);
         }
         let shaft = RawEncoder { counter: encoder, ..RawEncoder::default() };
-        let snapshot = self.measurement.sample(raw, &shaft);
+        // No other input for them is needed: the count takes every value.
+        let buttons = [encoder & 1 != 0, encoder & 2 != 0];
+        let snapshot = self.measurement.sample(raw, &shaft, buttons);
         self.protocol.publish(&snapshot, self.now, &mut self.out);
     }
 
@@ -219,7 +226,7 @@ impl Board {
             let Some(request) = self.protocol.take_request() else { return };
             match request {
                 Request::ResetNode | Request::Bootloader => {
-                    self.power_on(Start::Kept(self.measurement.kept()));
+                    self.power_on(self.kept());
                 }
                 Request::ResetCommunication => self.start(),
                 Request::Filters => {
