@@ -5,11 +5,9 @@ use std::collections::BTreeSet;
 
 use canopen::dictionary::{Access, Object, Type};
 use host_tests::bench::{Bench, ID};
+use host_tests::lift417;
 use host_tests::tables::{Row, table};
 use node::{Personality, combined, encoder, lift, pressure};
-
-/// The multiplexed one, the virtual input, the load and the positions.
-const TPDOS_OF_THE_LIFT: [u16; 7] = [2, 130, 258, 263, 264, 385, 386];
 
 const ACCESS: u32 = 0x0601_0000;
 const NOT_MAPPABLE: u32 = 0x0604_0041;
