@@ -39,7 +39,8 @@ fn without_tpdos(personality: Personality) -> Bench {
     let mut bench = Bench::booted_as(personality);
     match personality {
         Personality::Lift => {
-            TPDOS_OF_THE_LIFT.into_iter().for_each(|number| bench.switch_tpdo_off(number - 1))
+            let own = lift417::pdos().filter(|pdo| pdo.is_produced && pdo.is_of_the_node());
+            own.for_each(|pdo| bench.switch_tpdo_off(pdo.number - 1));
         }
         _ => (0..4).for_each(|number| bench.disable_tpdo(number)),
     }
