@@ -1,5 +1,7 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
 
+mod bus_faults;
+mod chip_faults;
 mod configuring;
 mod differential;
 mod encoder;
@@ -8,3 +10,4 @@ mod lift;
 mod measuring;
 mod running;
 mod support;
+mod timing;
