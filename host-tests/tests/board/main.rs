@@ -7,6 +7,7 @@ mod cost;
 mod differential;
 mod encoder;
 mod faults;
+mod lift;
 mod measuring;
 mod running;
 mod support;
