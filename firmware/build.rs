@@ -4,5 +4,5 @@
 mod link;
 
 fn main() {
-    link::image("APPLICATION");
+    link::image("APPLICATION", "link.x");
 }

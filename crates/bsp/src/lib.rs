@@ -15,6 +15,7 @@ pub mod bus_state;
 pub mod crash_record;
 pub mod extension;
 pub mod filters;
+pub mod handover;
 pub mod losses;
 pub mod mailbox;
 pub mod reset_cause;

@@ -70,29 +70,20 @@ impl Board {
     }
 }
 
-/// The LED alone, with the clock as it is after a reset: the bootloader needs no more.
-pub fn led(device: Peripherals) -> Led {
-    let mut rcc = device.RCC.constrain();
-    Led::new(device.GPIOA.split(&mut rcc).pa5)
-}
-
-/// Frequency of the core after a reset, in hertz (HSI).
-pub const RESET_CLOCK_HZ: u32 = 16_000_000;
-
 /// Reads and clears the flags, so that the next reset tells its own cause only.
-fn reset_cause(rcc: &RCC) -> ResetCause {
+pub(super) fn reset_cause(rcc: &RCC) -> ResetCause {
     let cause = ResetCause::from_csr(rcc.csr().read().bits());
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
     cause
 }
 
 /// Keeps the debug port clocked while the core sleeps: RTT is read then.
-fn keep_debugger(debug: &DBGMCU) {
+pub(super) fn keep_debugger(debug: &DBGMCU) {
     debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 }
 
 /// 144 MHz from HSE, APB1 at 36 MHz for the sake of the bit rates, APB2 at 72 MHz.
-fn clocks(rcc: RCC) -> Rcc {
+pub(super) fn clocks(rcc: RCC) -> Rcc {
     let config = Config::hse(8.MHz()).sysclk(144.MHz()).pclk1(36.MHz()).pclk2(72.MHz());
     // The NUCLEO gets its 8 MHz from the ST-LINK, boards with the other chips have a crystal.
     let config = if cfg!(feature = "stm32f446") { config.bypass_hse_oscillator() } else { config };

@@ -160,6 +160,12 @@ impl Transmitter {
     pub fn acknowledge(&mut self) {
         self.0.clear_interrupt_flags();
     }
+
+    /// Whether all mailboxes are empty: everything that was sent is on the wire.
+    pub fn is_idle(&self) -> bool {
+        let status = registers().tsr().read();
+        status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
+    }
 }
 
 impl Mailboxes for Transmitter {

@@ -1,31 +1,25 @@
-//! The crash record in RAM that survives a reset, and the panic handler that writes one.
+//! The crash record, and the panic handler that writes one.
 
 use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicU32, Ordering};
 
-use super::memory;
-use crate::crash_record::{Crash, Fault, Place, Sealed, WORDS};
-
-/// At one address in both images (memory.x, RETAINED), and never initialised. `used`, so that the compiler does not
-/// take it for zero at the start.
-#[used]
-#[unsafe(link_section = ".retained")]
-static RECORD: [AtomicU32; WORDS] = [const { AtomicU32::new(0) }; WORDS];
+use super::{memory, retained};
+use crate::crash_record::{Crash, Fault, Place, WORDS};
 
 /// The crash that ended the last run, and forgets it.
 pub fn take() -> Option<Crash> {
-    let mut words: Sealed = [0; WORDS];
-    for (to, from) in words.iter_mut().zip(&RECORD) {
-        *to = from.swap(0, Ordering::Relaxed);
-    }
-    Crash::open(&words)
+    let crash = Crash::open(&retained::crash());
+    retained::set_crash([0; WORDS]);
+    crash
+}
+
+/// Whether the last run ended in a crash that nobody has taken yet.
+pub(super) fn is_recorded() -> bool {
+    Crash::open(&retained::crash()).is_some()
 }
 
 /// Writes the record and restarts.
 pub(crate) fn restart(crash: &Crash) -> ! {
-    for (to, from) in RECORD.iter().zip(crash.seal()) {
-        to.store(from, Ordering::Relaxed);
-    }
+    retained::set_crash(crash.seal());
     cortex_m::peripheral::SCB::sys_reset()
 }
 

@@ -8,13 +8,17 @@ pub mod factory;
 mod fault;
 pub mod flash;
 pub mod led;
+pub mod loader;
 pub mod memory;
+mod program_flash;
 mod receive;
+pub mod retained;
 mod sampling;
 mod time_base;
 mod watchdog;
 
 pub use board::Board;
+pub use program_flash::ProgramFlash;
 pub use receive::{Frames, ReceiveQueue, Received, Receiver};
 pub use sampling::{Sampling, Sums};
 pub use stm32f4xx_hal::pac;

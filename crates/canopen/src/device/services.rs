@@ -21,7 +21,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             self.on_sdo(frame, now, out);
         } else if frame.id() == lss::REQUEST.get() {
             self.on_lss(frame, now, out);
-        } else if frame.id() & 0x780 == ERROR_CONTROL {
+        } else if frame.id() & 0x780 == ERROR_CONTROL && !A::SERVICES_ONLY {
             self.core.on_heartbeat(frame, now);
         }
     }
@@ -69,9 +69,13 @@ impl<A: Application, const N: usize> Device<A, N> {
             let out = &mut self.gate(out);
             self.poll_lss(now, out);
             self.poll_heartbeat(now, out);
-            self.poll_watches(now);
+            if !A::SERVICES_ONLY {
+                self.poll_watches(now);
+            }
             if self.core.state.has_services() {
-                self.core.emcy.poll(now, out);
+                if !A::SERVICES_ONLY {
+                    self.core.emcy.poll(now, out);
+                }
                 self.poll_sdo(now, out);
             }
             self.core.services_due = self.next_service();
