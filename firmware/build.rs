@@ -5,4 +5,5 @@ mod link;
 
 fn main() {
     link::image("APPLICATION", "link.x");
+    println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
 }

@@ -10,19 +10,26 @@
 #![no_main]
 
 mod dictionary;
+mod outbox;
 mod program;
 mod run;
 mod session;
 mod start;
 mod target;
 
+/// Without the place: the names of all of them would take 3 KiB.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    bsp::crash::panicked(None)
+}
+
 #[rtic::app(device = bsp::pac, peripherals = true)]
 mod app {
     use bsp::loader::Loader;
     use bsp::losses::Losses;
-    use bsp::transmit_queue::TransmitQueue;
     use bsp::{ReceiveQueue, Receiver, TimeInterrupt, application};
 
+    use crate::outbox::Outbox;
     use crate::run::Run;
     use crate::session::Session;
     use crate::start::{self, Outcome};
@@ -62,7 +69,7 @@ mod app {
         let run = Run {
             session: Session::new(reason, note, loader.flash, bus.can),
             frames: [process_frames, service_frames],
-            queue: TransmitQueue::new(),
+            queue: Outbox::new(),
             transmitter: bus.transmitter,
             alarm: bus.alarm,
             watchdog: loader.watchdog,

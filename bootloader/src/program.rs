@@ -15,6 +15,13 @@ const START: u8 = 1;
 const RESET: u8 = 2;
 const CLEAR: u8 = 3;
 
+const HARDWARE: Field = DICTIONARY.field(0x1009, 0);
+const IDENTITY: [Field; 4] = [
+    DICTIONARY.field(0x1018, 1),
+    DICTIONARY.field(0x1018, 2),
+    DICTIONARY.field(0x1018, 3),
+    DICTIONARY.field(0x1018, 4),
+];
 const PROGRAM_CONTROL: Field = DICTIONARY.field(0x1F51, 1);
 const IDENTIFICATION: Field = DICTIONARY.field(0x1F56, 1);
 const STATUS: Field = DICTIONARY.field(0x1F57, 1);
@@ -86,10 +93,10 @@ impl Application for Program {
     const SERVICES_ONLY: bool = true;
 
     fn initialise(&mut self, image: &mut [u8]) {
-        DICTIONARY.field(0x1009, 0).set(image, board::NAME.as_bytes());
+        HARDWARE.set(image, board::NAME.as_bytes());
         let identity = [VENDOR, PRODUCT, REVISION, factory::serial_number()];
-        for (sub, value) in (1..).zip(identity) {
-            DICTIONARY.field(0x1018, sub).store(image, value.to_le_bytes());
+        for (field, value) in IDENTITY.into_iter().zip(identity) {
+            field.store(image, value.to_le_bytes());
         }
         self.readings().store(image);
     }

@@ -3,11 +3,11 @@
 use bsp::can::Transmitter;
 use bsp::filters::Fifo;
 use bsp::led::Led;
-use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, StartUpWatchdog};
 use canopen::{Duration, Instant};
 use cortex_m::peripheral::SCB;
 
+use crate::outbox::Outbox;
 use crate::session::{Session, Then};
 
 /// Frames wait for a mailbox: no interrupt tells when one is free.
@@ -18,7 +18,7 @@ pub(crate) struct Run {
     pub(crate) session: Session,
     /// Of FIFO 0 and 1.
     pub(crate) frames: [Frames; 2],
-    pub(crate) queue: TransmitQueue,
+    pub(crate) queue: Outbox,
     pub(crate) transmitter: Transmitter,
     pub(crate) alarm: Alarm,
     pub(crate) watchdog: StartUpWatchdog,
@@ -74,7 +74,7 @@ impl Run {
     }
 }
 
-/// Two short flashes a second.
+/// Two short flashes and a pause, in a little more than a second: 2^17 us each.
 fn blink(now: Instant) -> bool {
-    matches!(now.0 % 1_000_000 / 100_000, 0 | 2)
+    matches!(now.0 >> 17 & 7, 0 | 2)
 }

@@ -7,11 +7,11 @@ use bsp::can::Controller;
 use bsp::filters::{self, Banks, Fifo};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
-use canopen::sdo::Abort;
-use canopen::{Action, CanId, Device, Duration, Instant, NodeId, Transmit};
+use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
 use update::{Next, Phase, Updater};
 
 use crate::dictionary::{DICTIONARY, IMAGE_SIZE};
+use crate::outbox::Outbox;
 use crate::program::Program;
 use crate::start::Reason;
 use crate::target::TARGET;
@@ -76,7 +76,7 @@ impl Session {
     }
 
     /// Goes on the bus.
-    pub(crate) fn join(&mut self, out: &mut impl Transmit) {
+    pub(crate) fn join(&mut self, out: &mut Outbox) {
         if self.is_silent {
             return;
         }
@@ -87,7 +87,7 @@ impl Session {
     }
 
     /// A frame of FIFO 0 or 1 has come.
-    pub(crate) fn take(&mut self, fifo: Fifo, received: &Received, out: &mut impl Transmit) {
+    pub(crate) fn take(&mut self, fifo: Fifo, received: &Received, out: &mut Outbox) {
         let Received { frame, at } = received;
         match fifo {
             Fifo::Process => self.device.on_process_frame(frame, *at, out),
@@ -98,7 +98,7 @@ impl Session {
     }
 
     /// One step of everything.
-    pub(crate) fn step(&mut self, out: &mut impl Transmit) -> Then {
+    pub(crate) fn step(&mut self, out: &mut Outbox) -> Then {
         let now = Clock::now();
         self.watch_bus(now);
         let next = self.advance(now, out);
@@ -113,7 +113,7 @@ impl Session {
     }
 
     /// One step of the update. An image that is good is copied at once: 1F57h is busy until it can be started.
-    fn advance(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+    fn advance(&mut self, now: Instant, out: &mut Outbox) -> Next {
         let program = self.device.application_mut();
         let mut next = program.updater().poll();
         if program.updater().phase() == Phase::Committed {
@@ -129,7 +129,7 @@ impl Session {
     }
 
     /// A silent copy has come to its end: the application is started, or the bus is told.
-    fn end_silence(&mut self, now: Instant, out: &mut impl Transmit) {
+    fn end_silence(&mut self, now: Instant, out: &mut Outbox) {
         self.is_silent = false;
         if self.device.application_mut().updater().phase() == Phase::Installed {
             self.reset = Some(now);
@@ -144,7 +144,7 @@ impl Session {
     }
 
     /// Does what the device asks for, until it asks for nothing.
-    fn fulfil(&mut self, out: &mut impl Transmit) {
+    fn fulfil(&mut self, out: &mut Outbox) {
         while let Some(action) = self.device.take_action() {
             match action {
                 Action::ResetNode | Action::Bootloader => self.reset_soon(),
@@ -156,8 +156,8 @@ impl Session {
                     self.note();
                     self.filter();
                 }
-                // What is configured by LSS lasts until the next reset: the parameters are the application's.
-                Action::Store(_) => self.device.finish(Err(Abort::NotStored), Clock::now(), out),
+                // The parameters are the application's.
+                Action::Store(_) => (),
             }
         }
         if self.device.application().starts() {

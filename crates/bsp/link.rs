@@ -19,7 +19,7 @@ pub(crate) fn image(region: &str, script: &str) {
     for directory in [Path::new(&out), &root, here] {
         println!("cargo:rustc-link-search={}", directory.display());
     }
-    for argument in [&format!("-T{script}"), "-Tdefmt.x", "--nmagic"] {
+    for argument in [&format!("-T{script}"), "--nmagic"] {
         println!("cargo:rustc-link-arg-bins={argument}");
     }
 }

@@ -43,6 +43,12 @@ impl Protocol {
         self.device.start(now, out);
     }
 
+    /// The node-ID in use; `None` while it waits for LSS to give it one.
+    #[must_use]
+    pub fn node_id(&self) -> Option<NodeId> {
+        self.device.node_id()
+    }
+
     /// The NMT state.
     #[must_use]
     pub fn state(&self) -> State {

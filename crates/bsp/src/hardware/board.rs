@@ -71,7 +71,7 @@ impl Board {
 }
 
 /// Reads and clears the flags, so that the next reset tells its own cause only.
-pub(super) fn reset_cause(rcc: &RCC) -> ResetCause {
+fn reset_cause(rcc: &RCC) -> ResetCause {
     let cause = ResetCause::from_csr(rcc.csr().read().bits());
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
     cause
@@ -83,7 +83,7 @@ pub(super) fn keep_debugger(debug: &DBGMCU) {
 }
 
 /// 144 MHz from HSE, APB1 at 36 MHz for the sake of the bit rates, APB2 at 72 MHz.
-pub(super) fn clocks(rcc: RCC) -> Rcc {
+fn clocks(rcc: RCC) -> Rcc {
     let config = Config::hse(8.MHz()).sysclk(144.MHz()).pclk1(36.MHz()).pclk2(72.MHz());
     // The NUCLEO gets its 8 MHz from the ST-LINK, boards with the other chips have a crystal.
     let config = if cfg!(feature = "stm32f446") { config.bypass_hse_oscillator() } else { config };

@@ -1,6 +1,6 @@
-//! The crash record, and the panic handler that writes one.
+//! The crash record, and what writes one at a panic.
 
-use core::panic::PanicInfo;
+use core::panic::Location;
 
 use super::{memory, retained};
 use crate::crash_record::{Crash, Fault, Place, WORDS};
@@ -47,9 +47,10 @@ fn log_fault(fault: &Fault) {
     defmt::error!("CFSR {=u32:#010x}, HFSR {=u32:#010x}, address {=u32:#010x}", cfsr, hfsr, address);
 }
 
-#[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
+/// What the panic handler of an image does. One that does not say where is linked without the names of all places at which
+/// it could panic.
+pub fn panicked(place: Option<&Location<'_>>) -> ! {
     cortex_m::interrupt::disable();
-    let place = info.location().map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));
+    let place = place.map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));
     restart(&Crash::Panic(place))
 }

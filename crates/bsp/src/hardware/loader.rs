@@ -1,7 +1,6 @@
 //! Bring-up of the board for the bootloader, in two steps: what the decision at every start needs, and the bus.
 
-use stm32f4xx_hal::pac::{CAN1, FLASH, GPIOA, GPIOB, RCC, TIM2};
-use stm32f4xx_hal::pac::Peripherals;
+use stm32f4xx_hal::pac::{CAN1, GPIOA, GPIOB, Peripherals, RCC, TIM2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use update::Reset;
@@ -10,7 +9,7 @@ use super::can::{Controller, Transmitter};
 use super::flash::Flash;
 use super::led::Led;
 use super::time_base::{self, Alarm, TimeInterrupt};
-use super::{ProgramFlash, StartUpWatchdog, board, crash};
+use super::{ProgramFlash, StartUpWatchdog, board, clock_tree, crash};
 use crate::reset_cause::ResetCause;
 
 /// Clock, watchdog and flash.
@@ -55,7 +54,8 @@ impl Loader {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
         board::keep_debugger(&device.DBGMCU);
         let reset = reset(&device.RCC);
-        let rcc = board::clocks(device.RCC);
+        clock_tree::raise(&device.RCC, &device.FLASH);
+        let rcc = device.RCC.constrain();
         let flash = ProgramFlash::new(Flash::new(device.FLASH));
         let rest = Rest { rcc, can: device.CAN1, timer: device.TIM2, ports: (device.GPIOA, device.GPIOB) };
         Loader { reset, watchdog, flash, rest }
@@ -73,20 +73,9 @@ impl Rest {
         Bus { time, alarm, can, transmitter, led: Led::new(gpioa.pa5) }
     }
 
-    /// Puts the clocks back as a reset leaves them, for the application to raise (RM0390, 6.3.1 to 6.3.3).
+    /// The application starts: it finds the clocks as a reset leaves them.
     pub fn stop(self) {
-        let rcc = self.rcc;
-        rcc.cr().modify(|_, w| w.hsion().set_bit());
-        while rcc.cr().read().hsirdy().bit_is_clear() {}
-        rcc.cfgr().reset();
-        while !rcc.cfgr().read().sws().is_hsi() {}
-        rcc.cr().modify(|_, w| w.pllon().clear_bit().hseon().clear_bit());
-        while rcc.cr().read().pllrdy().bit_is_set() {}
-        rcc.cr().modify(|_, w| w.hsebyp().clear_bit());
-        rcc.pllcfgr().reset();
-        // SAFETY: the flash driver has done its work, and without operations under way the wait states and the caches are
-        // nobody's: ACR as a reset leaves it suits the 16 MHz of now.
-        unsafe { (*FLASH::ptr()).acr().reset() };
+        clock_tree::lower(&self.rcc);
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod application;
 pub mod board;
 pub mod can;
+mod clock_tree;
 pub mod crash;
 pub mod factory;
 mod fault;

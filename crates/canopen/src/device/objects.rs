@@ -7,6 +7,8 @@ use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Duration, Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
+    const BLOCK_UPLOAD: bool = !A::SERVICES_ONLY;
+
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
         if !entry.access.is_readable() {

@@ -126,6 +126,9 @@ impl<A: Application, const N: usize> Device<A, N> {
         now: Instant,
         out: &mut impl Transmit,
     ) {
+        if A::SERVICES_ONLY {
+            return self.respond_lss(Slave::stored(false), now, out);
+        }
         match self.core.jobs.begin(Job::Configure(configuration)) {
             Ok(()) => self.core.jobs.lss_waits = true,
             Err(_) => self.respond_lss(Slave::stored(false), now, out),

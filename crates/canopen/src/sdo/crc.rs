@@ -1,8 +1,9 @@
-//! The CRC of block transfers: CRC-16/XMODEM (CiA 301, 7.2.4.3.16).
+//! The CRC of block transfers: CRC-16/XMODEM (CiA 301, 7.2.4.3.16). Bit by bit: seven bytes a frame are few, and the table
+//! would be half a kilobyte of the bootloader.
 
-use crc::{CRC_16_XMODEM, Crc, Table};
+use crc::{CRC_16_XMODEM, Crc, NoTable};
 
-const ALGORITHM: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_XMODEM);
+const ALGORITHM: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
 
 /// The CRC of some data, given that of what came before it; 0 before the first.
 pub(super) fn extend(crc: u16, bytes: &[u8]) -> u16 {
