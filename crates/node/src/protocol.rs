@@ -5,7 +5,7 @@ use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
 use crate::{Parameters, Personality, Request, Setup, Snapshot, flags, pressure};
 use canopen::nmt::State;
-use canopen::{Action, CanId, Device, Frame, Instant, Job, Transmit};
+use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
 use profiles::pressure::Conditions;
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
