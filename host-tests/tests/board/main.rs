@@ -4,3 +4,4 @@ mod configuring;
 mod faults;
 mod running;
 mod support;
+mod update;
