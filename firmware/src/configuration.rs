@@ -24,13 +24,19 @@ pub(crate) fn load(
         Err(error) => {
             defmt::error!("the parameter store cannot be read: {=str}", reason(&error));
             let setup = setup(None);
-            return (place.write(Protocol::new(&setup)), setup, None);
+            return (make(place, &setup), setup, None);
         }
     };
     let setup = setup(view.device().ok().flatten());
-    let protocol = place.write(Protocol::new(&setup));
+    let protocol = make(place, &setup);
     protocol.load(&mut view);
     (protocol, setup, prepare(view))
+}
+
+/// Not inlined: the stack on which the value is made is free again for what reads the flash.
+#[inline(never)]
+fn make(place: &'static mut MaybeUninit<Protocol>, setup: &Setup) -> &'static mut Protocol {
+    place.write(Protocol::new(setup))
 }
 
 /// May erase pages: half a second in which the core stands still, so it is done before the node goes on the bus.
@@ -100,7 +106,7 @@ pub(crate) fn calibration() -> FactoryCalibration {
 }
 
 /// The front end's sums as the measurement takes them.
-pub(crate) fn raw_sample(sums: Sums, factory: FactoryCalibration) -> RawSample {
+pub(crate) fn raw_sample(sums: &Sums, factory: FactoryCalibration) -> RawSample {
     let [pressure, supply, temperature, vrefint] = sums.channels;
-    RawSample { pressure, supply, temperature, vrefint, count: Sums::COUNT, factory }
+    RawSample { pressure, supply, temperature, vrefint, thermistor: 0, count: Sums::COUNT, factory }
 }

@@ -8,6 +8,7 @@
 //! | 4 | `transmit` | the mailboxes hold three frames; locking the queue delays no sample |
 //! | 3 | `process` | SYNC, RPDO, TPDO: never behind an SDO transfer |
 //! | 2 | `serve` | SDO, NMT, heartbeat, EMCY, errors of the bus |
+//! | 2 | `remember` | the position to battery-backed memory, not behind a save: half a turn may pass in 5 ms |
 //! | 1 | `keep` | stores parameters: whatever it waits for, nobody waits for it |
 //! | 0 | `idle` | sleeps |
 //!
@@ -21,7 +22,9 @@ mod bus;
 mod configuration;
 mod keeper;
 mod process;
+mod remembering;
 mod services;
+mod shaft;
 mod shared;
 
 use bsp::pac::Interrupt;
@@ -33,6 +36,8 @@ const PROCESS: Interrupt = Interrupt::TIM2;
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
 /// Pended by whoever has something to store. The interrupt is that of a peripheral which the board does not use.
 const KEEPER: Interrupt = Interrupt::SDIO;
+/// Pended when there is another position to remember. The interrupt is that of a peripheral which the board does not use.
+const REMEMBER: Interrupt = Interrupt::TAMP_STAMP;
 /// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
 const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 /// Pended by whoever has put a frame into the transmit queue.
@@ -51,17 +56,19 @@ mod app {
 
     use bsp::can::Transmitter;
     use bsp::losses::Losses;
+    use bsp::reset_cause::ResetCause;
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
-    use bsp::{Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
-    use node::{FactoryCalibration, Measurement, Parameters, Parcel, Protocol, Snapshot};
+    use bsp::{BackupMemory, Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
+    use node::{EncoderBoard, FactoryCalibration, Kept, Measurement, Parameters, Parcel, Protocol, Snapshot};
 
     use crate::bit_rate::Rate;
     use crate::keeper::Keeper;
     use crate::process::Process;
     use crate::services::{Findings, Services};
+    use crate::shaft::Shaft;
     use crate::shared::Shared as _;
-    use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration};
+    use crate::{FIRST_SAMPLE, PROCESS, REMEMBER, SERVICES, configuration, remembering};
 
     #[shared]
     struct Shared {
@@ -71,6 +78,8 @@ mod app {
         snapshot: Option<Snapshot>,
         /// New ones, until the sampling task has taken them.
         parameters: Option<Parameters>,
+        /// The latest, until it is in battery-backed memory.
+        kept: Option<Kept>,
         watchdog: Watchdog,
     }
 
@@ -79,13 +88,15 @@ mod app {
         receiver_process: Receiver,
         receiver_services: Receiver,
         sampling: Sampling,
-        measurement: Measurement,
+        shaft: Shaft,
+        measurement: &'static mut Measurement,
         factory: FactoryCalibration,
         transmitter: Transmitter,
         time: TimeInterrupt,
         process: Process,
         services: Services,
         keeper: Keeper,
+        backup: BackupMemory,
     }
 
     #[init(local = [
@@ -94,6 +105,7 @@ mod app {
         lost: Losses = Losses::new(),
         // Too large to be handed around on the stack.
         protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
+        measurement_place: MaybeUninit<Measurement> = MaybeUninit::uninit(),
         parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
@@ -102,6 +114,8 @@ mod app {
         let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new()));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
+        let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
+        let surroundings = EncoderBoard { watchdog_reset, ..EncoderBoard::default() };
         let lost: &'static Losses = cx.local.lost;
         let (receiver_process, process_frames) = Receiver::new(0, cx.local.process_queue, lost);
         let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
@@ -112,13 +126,15 @@ mod app {
             transmit: TransmitQueue::new(),
             snapshot: None,
             parameters: None,
+            kept: None,
             watchdog: board.watchdog.supervise(),
         };
         let mut local = Local {
             receiver_process,
             receiver_services,
             sampling: board.sampling,
-            measurement: Measurement::new(),
+            shaft: Shaft::new(board.encoder, board.ssi, surroundings),
+            measurement: cx.local.measurement_place.write(Measurement::new(remembering::start(&board.found))),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
@@ -133,6 +149,7 @@ mod app {
                 findings,
             ),
             keeper,
+            backup: board.backup,
         };
         local.sampling.start();
         (shared, local)
@@ -158,8 +175,8 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, measurement, factory],
-           shared = [snapshot, parameters, &watchdog])]
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, measurement, factory],
+           shared = [snapshot, parameters, kept, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(sums) = cx.local.sampling.take() else { return };
         match cx.local.sampling.lost() {
@@ -168,9 +185,15 @@ mod app {
         }
         if let Some(parameters) = cx.shared.parameters.lock(Option::take) {
             cx.local.measurement.apply(&parameters);
+            cx.local.shaft.apply(&parameters);
         }
-        let raw = configuration::raw_sample(sums, *cx.local.factory);
-        let snapshot = cx.local.measurement.sample(&raw);
+        let raw = configuration::raw_sample(&sums, *cx.local.factory);
+        let snapshot = cx.local.measurement.sample(&raw, &cx.local.shaft.read(&sums));
+        if snapshot.encoder.is_some() {
+            let now = cx.local.measurement.kept();
+            cx.shared.kept.lock(|kept| *kept = Some(now));
+            rtic::pend(REMEMBER);
+        }
         cx.shared.snapshot.lock(|latest| *latest = Some(snapshot));
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
@@ -201,6 +224,13 @@ mod app {
             cx.shared.parameters.lock(|parameters| *parameters = Some(new));
         }
         cx.shared.watchdog.progress(Part::Services);
+    }
+
+    #[task(binds = TAMP_STAMP, priority = 2, local = [backup], shared = [kept])]
+    fn remember(mut cx: remember::Context) {
+        if let Some(kept) = cx.shared.kept.lock(Option::take) {
+            remembering::keep(cx.local.backup, &kept);
+        }
     }
 
     #[task(binds = SDIO, priority = 1, local = [keeper], shared = [protocol, transmit])]

@@ -3,11 +3,11 @@
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
 use node::{
-    BitRate, FactoryCalibration, Measurement, Parcel, Personality, Protocol, RawSample, Request as Demand,
-    Setup,
+    BitRate, FactoryCalibration, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample,
+    Request as Demand, Setup, Start,
 };
 use std::collections::VecDeque;
-use storage::{Memory, Pages, Store, View};
+use storage::{DeviceRecord, Memory, Pages, Store, View};
 
 use crate::sdo::{Channel, Client, Failure};
 
@@ -42,6 +42,10 @@ pub struct Bench {
     pub now: Instant,
     /// What it stores.
     pub store: Flash,
+    /// What is read of the encoder.
+    pub encoder: RawEncoder,
+    /// What it is where nothing is stored.
+    setup: Setup,
     demands: VecDeque<Demand>,
 }
 
@@ -78,8 +82,19 @@ pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
         supply,
         temperature: (16.0 * temperature).round() as u32,
         vrefint: 16 * 1500,
+        thermistor: 0,
         count: 16,
         factory,
+    }
+}
+
+/// As the firmware takes what is stored of the device.
+fn stored_setup(record: DeviceRecord, unless_stored: &Setup) -> Setup {
+    Setup {
+        personality: Personality::numbered(record.personality()).expect("a personality"),
+        node_id: NodeId::new(record.node_id()),
+        bit_rate: BitRate::from_kbit(record.bit_rate_kbit()).expect("a bit rate"),
+        ..*unless_stored
     }
 }
 
@@ -108,21 +123,32 @@ impl Bench {
         Bench::with_flash(ERASED.to_vec())
     }
 
+    /// A node of this personality that has booted.
+    #[must_use]
+    pub fn booted_as(personality: Personality) -> Bench {
+        Bench::start(ERASED.to_vec(), &Setup { personality, ..setup() }, Start::First)
+    }
+
     /// A node that has booted with this content of its parameter pages.
-    ///
-    /// # Panics
-    /// When the store cannot be prepared.
     #[must_use]
     pub fn with_flash(flash: Vec<u8>) -> Bench {
+        Bench::start(flash, &setup(), Start::First)
+    }
+
+    fn start(flash: Vec<u8>, unless_stored: &Setup, kept: Start) -> Bench {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
-        let mut protocol = Protocol::new(&setup());
+        let record = view.device().expect("a record or none");
+        let mut protocol =
+            Protocol::new(&record.map_or(*unless_stored, |record| stored_setup(record, unless_stored)));
         protocol.load(&mut view);
         let mut bench = Bench {
             protocol,
-            measurement: Measurement::new(),
+            measurement: Measurement::new(kept),
             out: Queue::default(),
             now: Instant(0),
             store: Store::prepare(view).expect("a store"),
+            encoder: RawEncoder::default(),
+            setup: *unless_stored,
             demands: VecDeque::new(),
         };
         bench.protocol.start(bench.now, &mut bench.out);
@@ -133,7 +159,8 @@ impl Bench {
     /// Switches the power off and on.
     #[must_use]
     pub fn power_cycled(self) -> Bench {
-        Bench::with_flash(self.store.into_flash().0)
+        let (flash, kept) = (self.store.into_flash().0, self.measurement.kept());
+        Bench::start(flash, &self.setup, Start::Kept(kept))
     }
 
     /// The next thing that the node asks of its firmware, but for storing, which it has got.
@@ -188,7 +215,7 @@ impl Bench {
         if let Some(parameters) = self.protocol.take_parameters() {
             self.measurement.apply(&parameters);
         }
-        let snapshot = self.measurement.sample(raw);
+        let snapshot = self.measurement.sample(raw, &self.encoder);
         self.protocol.publish(&snapshot, self.now, &mut self.out);
         self.poll();
     }

@@ -6,3 +6,4 @@ pub mod lss;
 pub mod network;
 pub mod pressure;
 pub mod sdo;
+pub mod tables;

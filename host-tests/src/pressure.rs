@@ -1,7 +1,7 @@
 //! The pressure node as a station of a network: both halves, its parameter store, and readings that do not change.
 
 use canopen::{Duration, Frame, Instant, NodeId, Transmit};
-use node::{BitRate, Measurement, Protocol, RawSample, Request, Setup};
+use node::{BitRate, Measurement, Protocol, RawEncoder, RawSample, Request, Setup, Start};
 
 use crate::bench::{Flash, deliver, empty_store, setup};
 use crate::network::Unit;
@@ -28,7 +28,7 @@ impl PressureNode {
         let setup = Setup { node_id, bit_rate: BitRate::FASTEST, serial_number, ..setup() };
         PressureNode {
             protocol: Protocol::new(&setup),
-            measurement: Measurement::new(),
+            measurement: Measurement::new(Start::First),
             store: empty_store(),
             raw,
             next_sample: Instant::NEVER,
@@ -41,7 +41,7 @@ impl PressureNode {
         if let Some(parameters) = self.protocol.take_parameters() {
             self.measurement.apply(&parameters);
         }
-        let snapshot = self.measurement.sample(&self.raw);
+        let snapshot = self.measurement.sample(&self.raw, &RawEncoder::default());
         self.protocol.publish(&snapshot, now, out);
     }
 }

@@ -3,7 +3,9 @@
 
 use std::collections::BTreeSet;
 
-use profiles::lift::catalogue::{CobId, Content, Object, PDOS, Pdo, by_can_id};
+use profiles::lift::catalogue::{
+    CobId, Content, Definition, Object, PDOS, Pdo, by_cob_id, by_number, name_of,
+};
 
 const TABLE: &str = include_str!("../tables/lift417.csv");
 
@@ -79,7 +81,7 @@ fn consumed(pdo: &Pdo, producer: u8) -> Row {
 
 fn catalogue() -> BTreeSet<Row> {
     let mut rows: BTreeSet<Row> = PDOS.iter().map(produced).collect();
-    for pdo in &PDOS {
+    for pdo in PDOS {
         let producers = match pdo.cob_id {
             CobId::Fixed(_) => 1..=1,
             CobId::PlusNode(_) => 1..=127,
@@ -100,7 +102,7 @@ fn every_row_is_in_the_catalogue_and_nothing_else_is() {
 #[test]
 fn every_identifier_of_the_table_is_found_with_its_producer() {
     for row in table().iter().filter(|row| row.direction == "RPDO") {
-        let (pdo, producer) = by_can_id(hex(&row.cob_id)).unwrap();
+        let Definition { pdo, producer } = by_cob_id(hex(&row.cob_id).into()).unwrap();
         let index = pdo.rpdo_index(producer.unwrap_or(1));
         assert_eq!(index, Some(row.communication), "{}", row.cob_id);
     }
@@ -109,15 +111,64 @@ fn every_identifier_of_the_table_is_found_with_its_producer() {
 #[test]
 fn other_identifiers_are_not_claimed() {
     for id in
-        [0x000, 0x080, 0x17F, 0x184, 0x187, 0x18B, 0x190, 0x204, 0x208, 0x480, 0x500, 0x580, 0x601, 0x701]
+        [0x000, 0x080, 0x17F, 0x184, 0x187, 0x18B, 0x190, 0x204, 0x208, 0x480, 0x500, 0x580, 0x601, 0x701_u32]
     {
-        assert_eq!(by_can_id(id), None, "{id:#X}");
+        assert_eq!(by_cob_id(id), None, "{id:#X}");
     }
+    assert_eq!(by_cob_id(0x2000_0180), None, "an extended frame");
+    assert!(by_cob_id(0xC000_0180).is_some(), "flags do not matter");
+}
+
+#[test]
+fn the_fields_of_a_frame_are_read_by_name() {
+    let command = by_cob_id(0x182).unwrap();
+    assert_eq!((command.pdo.name, command.producer), ("car drive, velocity command", None));
+    let data = [0x0F, 0x00, 0x02, 0x00, 0x18, 0xFC, 0xFF, 0xFF];
+    let fields: Vec<_> = command.fields().map(|field| (field.object.name, field.value(&data))).collect();
+    let expected = [
+        ("controlword", Some(0x0F)),
+        ("mode of operation", Some(2)),
+        ("reserved", Some(0)),
+        ("target velocity", Some(0xFFFF_FC18)),
+    ];
+    assert_eq!(fields, expected);
+    assert_eq!(command.fields().last().unwrap().value(&data[..7]), None, "too short");
+
+    let input = by_cob_id(0x480 + 33).unwrap();
+    assert_eq!((input.pdo.number, input.producer), (130, Some(33)));
+    assert_eq!(input.fields().next().unwrap().value(&[1, 2, 3, 4, 5, 6]), Some(0x0605_0403_0201));
+    assert_eq!(by_cob_id(0x521).unwrap().fields().count(), 0, "a multiplexed PDO names its object itself");
+}
+
+#[test]
+fn every_definition_and_every_object_has_a_name_and_no_two_have_the_same() {
+    let names: BTreeSet<_> = PDOS.iter().map(|pdo| pdo.name).collect();
+    assert_eq!((names.len(), names.contains("")), (19, false));
+    let mut objects = BTreeSet::new();
+    for Object { index, sub, name, .. } in PDOS.iter().flat_map(|pdo| match pdo.content {
+        Content::Objects(objects) => objects,
+        Content::Multiplexed => &[],
+    }) {
+        assert_eq!(name_of(*index, *sub), Some(*name));
+        objects.insert((*index, *sub, *name));
+    }
+    let names: BTreeSet<_> = objects.iter().map(|(.., name)| name).collect();
+    assert_eq!((names.len(), names.contains(&"")), (objects.len(), false));
+    assert_eq!(name_of(0x6383, 5), None);
+}
+
+#[test]
+fn a_number_is_found_and_the_gap_is_none() {
+    for number in 0..=512 {
+        let expected = PDOS.iter().find(|pdo| pdo.number == number);
+        assert_eq!(by_number(number), expected, "{number}");
+    }
+    assert_eq!(by_number(266), None, "the profile leaves it out");
 }
 
 #[test]
 fn no_pdo_is_longer_than_a_frame() {
-    for pdo in &PDOS {
+    for pdo in PDOS {
         if let Content::Objects(objects) = pdo.content {
             assert!(objects.iter().map(|object| u32::from(object.bits)).sum::<u32>() <= 64, "{}", pdo.name);
         }

@@ -4,6 +4,7 @@ mod command;
 mod eds;
 mod images;
 mod native;
+mod plots;
 mod python;
 mod sign;
 mod sim;
@@ -37,6 +38,8 @@ enum Command {
     },
     /// Write eds/*.eds and docs/object-dictionary.md from the dictionary tables
     Eds,
+    /// Write docs/plots/*.svg and the tables of docs/measuring.md from the measurement chain
+    Plots,
     /// Make signing keys and sign images for the field update (docs/update.md; `cargo xtask sign --help`)
     #[command(disable_help_flag = true)]
     Sign {
@@ -57,6 +60,7 @@ fn main() -> ExitCode {
         Command::Images => images::build().map(|_| ExitCode::SUCCESS),
         Command::Sim { flags } => sim::run(&flags),
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
+        Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
         Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };

@@ -1,13 +1,44 @@
 //! Faults: from the sensor, from the bus, and from the firmware.
 
-use crate::{BusEvent, Protocol};
+use crate::profile::Profile;
+use crate::{BusEvent, Protocol, Snapshot};
 use canopen::emcy::Fault;
 use canopen::{Instant, Transmit};
-use profiles::pressure::Conditions;
+use profiles::{encoder, pressure};
 
 /// Sub-indexes of 1029h.
 const COMMUNICATION_ERROR: u8 = 1;
 const DEVICE_ERROR: u8 = 2;
+
+/// What the measurement finds wrong.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Conditions {
+    pressure: pressure::Conditions,
+    encoder: encoder::Conditions,
+}
+
+impl Conditions {
+    /// What is not measured has no fault.
+    pub(crate) fn of(snapshot: &Snapshot) -> Conditions {
+        Conditions {
+            pressure: snapshot.pressure.map(|values| values.conditions).unwrap_or_default(),
+            encoder: snapshot.encoder.map(|values| values.conditions).unwrap_or_default(),
+        }
+    }
+
+    fn faults(self) -> [(Fault, bool); 7] {
+        let Conditions { pressure, encoder } = self;
+        [
+            (Fault::SensorBreak, pressure.sensor_break),
+            (Fault::PressureRail, pressure.pressure_rail),
+            (Fault::TemperatureRail, pressure.temperature_rail),
+            (Fault::EncoderBreak, encoder.sensor_break),
+            (Fault::InputCurrent, encoder.current),
+            (Fault::InputVoltage, encoder.voltage),
+            (Fault::HardwareMemory, encoder.memory),
+        ]
+    }
+}
 
 impl Protocol {
     /// Takes note of an event on the bus.
@@ -38,12 +69,11 @@ impl Protocol {
         self.device.clear(Fault::BusOffRecovered, now);
     }
 
-    /// Sets or clears a fault that the firmware has found: in the flags of 3000h, the error register and an EMCY.
+    /// Sets or clears a fault that the firmware has found: in the flags of 3000h where there are any, the error register
+    /// and an EMCY.
     pub fn set_fault(&mut self, fault: Fault, active: bool, now: Instant, out: &mut impl Transmit) {
-        let profile = self.device.application_mut();
-        let has_flag = profile.flags.set(fault, active);
-        let flags = profile.flags;
-        flags.store(self.device.image_mut());
+        let has_flag = self.device.application_mut().flags.set(fault, active);
+        self.device.show(Profile::show_flags);
         if active {
             self.device.raise(fault, now);
         } else {
@@ -58,12 +88,8 @@ impl Protocol {
     /// Turns the conditions that have changed into faults.
     pub(crate) fn take_conditions(&mut self, new: Conditions, now: Instant, out: &mut impl Transmit) {
         let old = core::mem::replace(&mut self.conditions, new);
-        let changes = [
-            (Fault::SensorBreak, old.sensor_break, new.sensor_break),
-            (Fault::PressureRail, old.pressure_rail, new.pressure_rail),
-            (Fault::TemperatureRail, old.temperature_rail, new.temperature_rail),
-        ];
-        for (fault, _, active) in changes.into_iter().filter(|(_, old, new)| old != new) {
+        let changes = old.faults().into_iter().zip(new.faults()).filter(|(old, new)| old != new);
+        for (_, (fault, active)) in changes {
             self.set_fault(fault, active, now, out);
         }
     }

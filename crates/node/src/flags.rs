@@ -1,15 +1,29 @@
 //! Status flags: faults as they appear in 3000h, and their summary in 1002h.
 
-use crate::pressure::DICTIONARY;
-use canopen::dictionary::Field;
+use canopen::dictionary::{Dictionary, Field};
 use canopen::emcy::Fault;
 
-const SENSOR: Field = DICTIONARY.field(0x3000, 1);
-const INTERNAL: Field = DICTIONARY.field(0x3000, 2);
-const SYSTEM: Field = DICTIONARY.field(0x3000, 3);
-const SUMMARY: Field = DICTIONARY.field(0x1002, 0);
+/// Where they are in the image of a dictionary that has them.
+pub(crate) struct Fields {
+    sensor: Field,
+    internal: Field,
+    system: Field,
+    summary: Field,
+}
 
-/// The flags that are set. They outlive a reset of the dictionary, as what they report does.
+impl Fields {
+    /// Looks them up, during compilation.
+    pub(crate) const fn new(d: &Dictionary) -> Fields {
+        Fields {
+            sensor: d.field(0x3000, 1),
+            internal: d.field(0x3000, 2),
+            system: d.field(0x3000, 3),
+            summary: d.field(0x1002, 0),
+        }
+    }
+}
+
+/// The flags that are set, whether the dictionary shows them or not. They outlive a reset of the dictionary, as what they report does.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Flags {
     sensor: u32,
@@ -27,24 +41,29 @@ impl Flags {
 
     /// Writes the flags and their summary: bit 0 any sensor error, bit 1 any internal protocol error (there is none),
     /// bit 2 any system error.
-    pub(crate) fn store(self, image: &mut [u8]) {
+    pub(crate) fn store(self, fields: &Fields, image: &mut [u8]) {
         let summary = u32::from(self.sensor != 0) | u32::from(self.system != 0) << 2;
-        SENSOR.store(image, self.sensor.to_le_bytes());
-        INTERNAL.store(image, [0; 4]);
-        SYSTEM.store(image, self.system.to_le_bytes());
-        SUMMARY.store(image, summary.to_le_bytes());
+        fields.sensor.store(image, self.sensor.to_le_bytes());
+        fields.internal.store(image, [0; 4]);
+        fields.system.store(image, self.system.to_le_bytes());
+        fields.summary.store(image, summary.to_le_bytes());
     }
 }
 
-/// The bits of a fault in 3000h:1 and 3000h:3.
+/// The bits of a fault in 3000h:1 and 3000h:3. Bits 0 to 6 are those of a pressure transmitter, the rest is the encoder's.
 fn bits(fault: Fault) -> (u32, u32) {
     match fault {
+        // The sensor was not set up as it should: it runs with the calibration of no device.
+        Fault::CalibrationData => (1, 0),
         Fault::SensorClock => (1 << 1, 0),
         Fault::SensorBoot => (1 << 2, 0),
         Fault::TemperatureRail => (1 << 3, 0),
         Fault::PressureRail => (1 << 4, 0),
         Fault::SensorBreak => (1 << 5, 0),
         Fault::SensorMemory => (1 << 6, 0),
+        Fault::EncoderBreak => (1 << 8, 0),
+        Fault::InputCurrent => (1 << 9, 0),
+        Fault::InputVoltage => (1 << 10, 0),
         Fault::ModuleInitialisation => (0, 1 << 0),
         Fault::HardwareIdentification => (0, 1 << 1),
         Fault::ParameterStore => (0, 1 << 2),
@@ -52,6 +71,7 @@ fn bits(fault: Fault) -> (u32, u32) {
         Fault::CommunicationData => (0, 1 << 4),
         Fault::ApplicationData => (0, 1 << 5),
         Fault::UnexpectedReset => (0, 1 << 6),
+        Fault::HardwareMemory => (0, 1 << 8),
         _ => (0, 0),
     }
 }

@@ -6,12 +6,18 @@
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
+pub mod combined;
+mod communication;
+mod configured;
 pub mod encoder;
 mod faults;
 mod flags;
 mod keeping;
+pub mod lift;
+mod manufacturer;
 mod measurement;
 mod parcel;
+mod personality;
 pub mod pressure;
 mod profile;
 mod protocol;
@@ -26,7 +32,11 @@ pub use canopen::nmt::State;
 pub use canopen::{Frame, Instant, NodeId, QueueFull, Transmit};
 pub use measurement::{Measurement, Parameters, Snapshot};
 pub use parcel::Parcel;
+pub use personality::Personality;
+pub use profiles::encoder::{
+    Board as EncoderBoard, ChannelParameters as EncoderChannel, Frame as SsiFrame, Kept, RawEncoder, Start,
+};
 pub use profiles::pressure::{FactoryCalibration, RawSample};
 pub use protocol::Protocol;
-pub use setup::{Personality, REVISION, Setup, VENDOR_ID};
+pub use setup::{REVISION, Setup, VENDOR_ID};
 pub use signal::{BusEvent, Request};

@@ -1,68 +1,121 @@
 //! The application of the CANopen device: what the personality adds to it.
 
+use crate::configured::Configured;
 use crate::flags::Flags;
+use crate::manufacturer::PERSONALITY;
+use crate::personality::Definition;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
-use crate::{Personality, REVISION, Setup, VENDOR_ID, pressure};
-use canopen::dictionary::{Dictionary, Entry, Group, packed_size};
+use crate::{REVISION, Setup, VENDOR_ID, combined, encoder, pressure};
+use canopen::dictionary::{Entry, Group, Object, packed_size};
 use canopen::emcy::Fault;
 use canopen::sdo::Abort;
 use canopen::{Application, Part};
 
+/// The tables of all personalities.
+const TABLES: [&[Object]; 3] = [&pressure::OBJECTS, &encoder::OBJECTS, &combined::OBJECTS];
+
 /// Large enough for the values of every personality.
-pub(crate) const IMAGE_SIZE: usize = pressure::IMAGE_SIZE;
+pub(crate) const IMAGE_SIZE: usize =
+    largest([pressure::IMAGE_SIZE, encoder::IMAGE_SIZE, combined::IMAGE_SIZE]);
 
 /// The same for the parameters as they are stored.
-pub(crate) const COMMUNICATION_SIZE: usize = packed_size(&pressure::OBJECTS, Group::Communication);
-pub(crate) const APPLICATION_SIZE: usize = packed_size(&pressure::OBJECTS, Group::Application);
+pub(crate) const COMMUNICATION_SIZE: usize = largest_packed(Group::Communication);
+pub(crate) const APPLICATION_SIZE: usize = largest_packed(Group::Application);
+pub(crate) const CALIBRATION_SIZE: usize = largest_packed(Group::Calibration);
 const _: () = assert!(COMMUNICATION_SIZE <= storage::MAX_VALUE && APPLICATION_SIZE <= storage::MAX_VALUE);
+const _: () = assert!(CALIBRATION_SIZE <= storage::MAX_VALUE);
 
-impl Personality {
-    /// The dictionary that the node runs.
-    pub(crate) fn dictionary(self) -> &'static Dictionary {
-        match self {
-            Personality::Pressure => &pressure::DICTIONARY,
-        }
+const fn largest_packed(group: Group) -> usize {
+    let [a, b, c] = TABLES;
+    largest([packed_size(a, group), packed_size(b, group), packed_size(c, group)])
+}
+
+const fn largest(sizes: [usize; TABLES.len()]) -> usize {
+    let (mut largest, mut i) = (0, 0);
+    while i < sizes.len() {
+        largest = if sizes[i] > largest { sizes[i] } else { largest };
+        i += 1;
     }
+    largest
 }
 
 /// The personality at work.
 #[derive(Debug)]
 pub(crate) struct Profile {
     pub(crate) setup: Setup,
+    pub(crate) configured: Configured,
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
     pub(crate) buffer: TransferBuffer,
 }
 
+impl Profile {
+    pub(crate) fn new(setup: &Setup) -> Profile {
+        Profile {
+            setup: *setup,
+            configured: Configured::of(setup),
+            flags: Flags::default(),
+            stored: Stored::NOTHING,
+            buffer: TransferBuffer::EMPTY,
+        }
+    }
+
+    pub(crate) fn definition(&self) -> &'static Definition {
+        self.setup.personality.definition()
+    }
+
+    /// Shows the flags, where the personality has them.
+    pub(crate) fn show_flags(&self, image: &mut [u8]) {
+        if let Some(fields) = self.definition().flags {
+            self.flags.store(fields, image);
+        }
+    }
+
+    /// Shows the personality after the next reset.
+    pub(crate) fn show_personality(&self, image: &mut [u8]) {
+        self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
+    }
+
+    fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
+        if let Ok(entry) = self.definition().dictionary.find(index, sub) {
+            entry.field().set(image, bytes);
+        }
+    }
+}
+
 impl Application for Profile {
     fn initialise(&mut self, image: &mut [u8]) {
         let setup = &self.setup;
-        let dictionary = setup.personality.dictionary();
-        let mut set = |index, sub, bytes: &[u8]| {
-            if let Ok(entry) = dictionary.find(index, sub) {
-                entry.field().set(image, bytes);
-            }
-        };
-        set(0x1009, 0, setup.hardware_version.as_bytes());
-        set(0x100A, 0, setup.software_version.as_bytes());
-        set(0x1018, 1, &VENDOR_ID.to_le_bytes());
-        set(0x1018, 2, &setup.personality.product_code().to_le_bytes());
-        set(0x1018, 3, &REVISION.to_le_bytes());
-        set(0x1018, 4, &setup.serial_number.to_le_bytes());
-        set(0x1F56, 1, &setup.program_id.to_le_bytes());
-        set(0x1F57, 1, &self.stored.flash_status().to_le_bytes());
-        self.flags.store(image);
+        let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
+        show(0x1009, 0, setup.hardware_version.as_bytes());
+        show(0x100A, 0, setup.software_version.as_bytes());
+        show(0x1018, 1, &VENDOR_ID.to_le_bytes());
+        show(0x1018, 2, &setup.personality.product_code().to_le_bytes());
+        show(0x1018, 3, &REVISION.to_le_bytes());
+        show(0x1018, 4, &setup.serial_number.to_le_bytes());
+        show(0x1F56, 1, &setup.program_id.to_le_bytes());
+        show(0x1F57, 1, &self.stored.flash_status().to_le_bytes());
+        if let Some(fields) = self.definition().encoder {
+            fields.initialise(setup.serial_number, image);
+        }
+        self.show_personality(image);
+        self.show_flags(image);
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {
-        self.stored.get(group)
+        match self.definition().pressure {
+            // It is that of the pressure channel: what does not have one lets it be.
+            None if group == Group::Calibration => self.stored.get(Group::Volatile),
+            _ => self.stored.get(group),
+        }
     }
 
     fn loaded(&mut self, group: Group, good: bool) {
         let fault = match group {
             Group::Communication => Fault::CommunicationData,
             Group::Application => Fault::ApplicationData,
+            Group::Calibration => Fault::CalibrationData,
             Group::Volatile => return,
         };
         self.flags.set(fault, !good);
@@ -77,8 +130,12 @@ impl Application for Profile {
     }
 
     fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        match self.setup.personality {
-            Personality::Pressure => pressure::write(number, entry, bytes, image),
+        match self.definition() {
+            Definition { encoder: Some(fields), .. } if number >= encoder::FIRST_RULE => {
+                fields.write(number, entry, bytes, image)
+            }
+            Definition { pressure: Some(fields), .. } => fields.write(number, entry, bytes, image),
+            _ => Ok(()),
         }
     }
 }

@@ -1,12 +1,10 @@
 //! The protocol half: the CANopen device with everything it owns.
 
+use crate::faults::Conditions;
 use crate::profile::{IMAGE_SIZE, Profile};
-use crate::stored::Stored;
-use crate::transfer_buffer::TransferBuffer;
-use crate::{Parameters, Personality, Request, Setup, Snapshot, flags, pressure};
+use crate::{Parameters, Request, Setup, Snapshot};
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
-use profiles::pressure::Conditions;
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
 ///
@@ -26,14 +24,9 @@ impl Protocol {
     /// A node that has not started: it is silent and hears nothing until `start`.
     #[must_use]
     pub fn new(setup: &Setup) -> Protocol {
-        let profile = Profile {
-            setup: *setup,
-            flags: flags::Flags::default(),
-            stored: Stored::NOTHING,
-            buffer: TransferBuffer::EMPTY,
-        };
+        let dictionary = setup.personality.definition().dictionary;
         let device =
-            Device::new(setup.personality.dictionary(), setup.node_id, profile).with_bit_rate(setup.bit_rate);
+            Device::new(dictionary, setup.node_id, Profile::new(setup)).with_bit_rate(setup.bit_rate);
         Protocol { device, conditions: Conditions::default(), is_bus_off: false, job: None }
     }
 
@@ -65,11 +58,23 @@ impl Protocol {
         self.device.on_service_frame(frame, now, out);
     }
 
-    /// Takes the values of the last millisecond into the dictionary and sends what their change triggers.
+    /// Takes the values of the last millisecond into the dictionary and sends what their change triggers. Before the
+    /// measurement has parameters there are none.
     pub fn publish(&mut self, snapshot: &Snapshot, now: Instant, out: &mut impl Transmit) {
-        pressure::publish(&snapshot.pressure, self.device.image_mut());
-        if self.conditions != snapshot.pressure.conditions {
-            self.take_conditions(snapshot.pressure.conditions, now, out);
+        if snapshot.is_empty() {
+            return;
+        }
+        let definition = self.device.application().definition();
+        let image = self.device.image_mut();
+        if let (Some(fields), Some(snapshot)) = (definition.pressure, &snapshot.pressure) {
+            fields.publish(snapshot, image);
+        }
+        if let (Some(fields), Some(snapshot)) = (definition.encoder, &snapshot.encoder) {
+            fields.publish(snapshot, image);
+        }
+        let conditions = Conditions::of(snapshot);
+        if self.conditions != conditions {
+            self.take_conditions(conditions, now, out);
         }
         self.device.changed(now, out);
     }
@@ -102,9 +107,11 @@ impl Protocol {
     /// The parameters for `Measurement::apply`, when they have changed since the last call (and after `start`).
     pub fn take_parameters(&mut self) -> Option<Parameters> {
         let image = self.device.take_parameters_changed().then(|| self.device.image())?;
-        match self.device.application().setup.personality {
-            Personality::Pressure => Some(Parameters { pressure: pressure::parameters(image) }),
-        }
+        let definition = self.device.application().definition();
+        Some(Parameters {
+            pressure: definition.pressure.map(|fields| fields.parameters(image)),
+            encoder: definition.encoder.map(|fields| fields.parameters(image)),
+        })
     }
 
     /// Identifiers for FIFO 0, data and remote frames.

@@ -1,5 +1,6 @@
 //! What a node must know before it starts.
 
+use crate::Personality;
 use canopen::NodeId;
 use canopen::lss::BitRate;
 
@@ -7,41 +8,6 @@ use canopen::lss::BitRate;
 pub const VENDOR_ID: u32 = 0;
 /// Revision number of object 1018h:3: major in the high word, minor in the low word.
 pub const REVISION: u32 = 0x0001_0000;
-
-/// Which device the node is: its dictionary, its default parameters and its profile.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Personality {
-    /// Pressure and temperature transmitter, CiA 404.
-    #[default]
-    Pressure,
-}
-
-impl Personality {
-    /// The personality of a number in the device record; `None` for one that this image does not have.
-    #[must_use]
-    pub const fn numbered(number: u8) -> Option<Personality> {
-        match number {
-            0 => Some(Personality::Pressure),
-            _ => None,
-        }
-    }
-
-    /// Its number in the device record.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        match self {
-            Personality::Pressure => 0,
-        }
-    }
-
-    /// Product code of object 1018h:2.
-    #[must_use]
-    pub const fn product_code(self) -> u32 {
-        match self {
-            Personality::Pressure => 1,
-        }
-    }
-}
 
 /// Everything that comes from outside the dictionary: configuration of the board and of the image.
 #[derive(Clone, Copy, Debug)]

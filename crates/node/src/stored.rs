@@ -1,7 +1,8 @@
 //! What the parameter store holds of the dictionary, kept in RAM for the resets to come: reset communication must not
 //! wait for the flash.
 
-use crate::profile::{APPLICATION_SIZE, COMMUNICATION_SIZE};
+use crate::Personality;
+use crate::profile::{APPLICATION_SIZE, CALIBRATION_SIZE, COMMUNICATION_SIZE};
 use canopen::dictionary::Group;
 use embedded_storage::nor_flash::ReadNorFlash;
 use heapless::{Vec, VecView};
@@ -9,7 +10,16 @@ use storage::{Health, View};
 
 /// Version of the packed form (`canopen::dictionary`). The form says itself which objects it holds, so a dictionary
 /// that grows needs no new version.
-pub(crate) const LAYOUT: u16 = 1;
+const FORM: u8 = 1;
+
+/// The version under which a group is stored: the form in the low byte, and in the high byte the personality whose
+/// dictionary it fits.
+pub(crate) fn layout(personality: Personality) -> u16 {
+    u16::from_le_bytes([FORM, personality.number()])
+}
+
+/// The calibration is that of the device, whatever its personality.
+pub(crate) const CALIBRATION_LAYOUT: u16 = FORM as u16;
 
 /// The packed values of one group.
 #[derive(Debug)]
@@ -21,8 +31,8 @@ pub(crate) struct Kept<const N: usize> {
 impl<const N: usize> Kept<N> {
     const EMPTY: Kept<N> = Kept { packed: Vec::new(), is_sound: true };
 
-    fn load<F: ReadNorFlash>(&mut self, group: storage::Group, view: &mut View<F>) {
-        self.is_sound = read(group, view, &mut self.packed) && view.health(group) == Health::Good;
+    fn load<F: ReadNorFlash>(&mut self, group: storage::Group, layout: u16, view: &mut View<F>) {
+        self.is_sound = read(group, layout, view, &mut self.packed) && view.health(group) == Health::Good;
     }
 
     /// Takes what has just been stored.
@@ -36,45 +46,57 @@ impl<const N: usize> Kept<N> {
     }
 }
 
-/// The packed values of the groups that 1010h stores.
+/// The packed values of the groups that are stored.
 #[derive(Debug)]
 pub(crate) struct Stored {
     pub(crate) communication: Kept<COMMUNICATION_SIZE>,
     pub(crate) application: Kept<APPLICATION_SIZE>,
+    pub(crate) calibration: Kept<CALIBRATION_SIZE>,
 }
 
 impl Stored {
-    pub(crate) const NOTHING: Stored = Stored { communication: Kept::EMPTY, application: Kept::EMPTY };
+    pub(crate) const NOTHING: Stored =
+        Stored { communication: Kept::EMPTY, application: Kept::EMPTY, calibration: Kept::EMPTY };
 
-    /// Reads both groups. What cannot be read counts as not stored, and as a fault.
-    pub(crate) fn load<F: ReadNorFlash>(&mut self, view: &mut View<F>) {
-        self.communication.load(storage::Group::Communication, view);
-        self.application.load(storage::Group::Application, view);
+    /// Reads all groups. What cannot be read counts as not stored, and as a fault.
+    pub(crate) fn load<F: ReadNorFlash>(&mut self, layout: u16, view: &mut View<F>) {
+        self.communication.load(storage::Group::Communication, layout, view);
+        self.application.load(storage::Group::Application, layout, view);
+        self.calibration.load(storage::Group::Calibration, CALIBRATION_LAYOUT, view);
     }
 
     /// 1F57h:1 as the running program gives it (CiA 302-3): 0, or in bits 1 to 7 code 3, format or CRC error.
     pub(crate) fn flash_status(&self) -> u32 {
-        if self.communication.is_sound && self.application.is_sound { 0 } else { 3 << 1 }
+        let is_sound = self.communication.is_sound && self.application.is_sound && self.calibration.is_sound;
+        if is_sound { 0 } else { 3 << 1 }
     }
 
     pub(crate) fn get(&self, group: Group) -> canopen::Stored<'_> {
         match group {
             Group::Communication => self.communication.get(),
             Group::Application => self.application.get(),
+            Group::Calibration => self.calibration.get(),
             Group::Volatile => canopen::Stored { packed: &[], is_sound: true },
         }
     }
 }
 
 /// Whether what is stored could be read; nothing stored is good, too.
-fn read<F: ReadNorFlash>(group: storage::Group, view: &mut View<F>, packed: &mut VecView<u8>) -> bool {
+fn read<F: ReadNorFlash>(
+    group: storage::Group,
+    layout: u16,
+    view: &mut View<F>,
+    packed: &mut VecView<u8>,
+) -> bool {
     packed.clear();
     let _ = packed.resize(packed.capacity(), 0);
-    let loaded = view.load(group, packed);
-    let known = match &loaded {
-        Ok(Some(loaded)) if loaded.version == LAYOUT => loaded.len,
-        _ => 0,
+    let (len, is_good) = match view.load(group, packed) {
+        Ok(Some(loaded)) if loaded.version == layout => (loaded.len, loaded.len > 0),
+        // What another personality has stored is nothing to this one.
+        Ok(Some(loaded)) => (0, loaded.version.to_le_bytes()[0] == FORM),
+        Ok(None) => (0, true),
+        Err(_) => (0, false),
     };
-    packed.truncate(known);
-    matches!(loaded, Ok(None)) || known > 0
+    packed.truncate(len);
+    is_good
 }

@@ -14,6 +14,8 @@ use crate::unmodelled::{Direction, Reason};
 enum Refusal {
     /// The register, or a setting of it, is not modelled.
     NotModelled,
+    /// The backup domain is write-protected.
+    Protected,
     /// The peripheral answers with an error.
     Bus,
 }
@@ -73,6 +75,7 @@ impl Stm32f4 {
         };
         match self.write_unit(block.unit, offset, word, now) {
             Err(Refusal::NotModelled) => self.note(block, offset, Direction::Write, Reason::NotModelled),
+            Err(Refusal::Protected) => self.note(block, offset, Direction::Write, Reason::Protected),
             Err(Refusal::Bus) => return Err(BusFault),
             Ok(()) => {}
         }
@@ -116,6 +119,7 @@ impl Stm32f4 {
             Unit::Spi(index) => self.spis[index].read(offset),
             Unit::Iwdg => self.iwdg.read(offset, now),
             Unit::Crc => self.crc.read(offset),
+            Unit::BackupRam => self.backup_ram.read(offset),
             Unit::Signature => signature::read(self.variant, self.board.unique_id, offset),
             Unit::Absent => None,
         }
@@ -140,6 +144,8 @@ impl Stm32f4 {
             Unit::Spi(index) => self.spis[index].write(offset, value, now),
             Unit::Iwdg => self.write_iwdg(offset, value, now),
             Unit::Crc => self.crc.write(offset, value),
+            Unit::BackupRam if !self.pwr.backup_is_writable() => return Err(Refusal::Protected),
+            Unit::BackupRam => self.backup_ram.write(offset, value),
             Unit::Signature | Unit::Absent => None,
         };
         done.ok_or(Refusal::NotModelled)
@@ -162,7 +168,9 @@ impl Stm32f4 {
     fn write_timer(&mut self, index: usize, offset: u32, value: u32, now: Time) -> Option<()> {
         let done = self.timers[index].write(offset, value, now);
         self.pass_trigger(index, now);
-        done
+        // DMA at an update is modelled where the ADC is started by it too.
+        let served = !self.timers[index].requests_on_update() || self.trigger_timer() == Some(index);
+        done.filter(|()| served)
     }
 
     fn write_adc(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {

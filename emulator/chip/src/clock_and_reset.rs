@@ -3,6 +3,7 @@
 use canbus::Time;
 
 use crate::adc::AdcCommon;
+use crate::backup_ram::BackupRam;
 use crate::clocks::Clocks;
 use crate::crc_unit::CrcUnit;
 use crate::dma::Dma;
@@ -11,15 +12,19 @@ use crate::gpio::Gpio;
 use crate::iwdg::Iwdg;
 use crate::map::{self, SPIS, TIMERS, Unit};
 use crate::peripherals::Effect;
-use crate::pwr::Pwr;
 use crate::rcc::Cause;
 use crate::stm32f4::Stm32f4;
 use crate::syscfg::Syscfg;
 use crate::timer::Timer;
 
 impl Stm32f4 {
-    /// A reset of the whole chip, by the supply or for the cause that is known.
+    /// A reset of the whole chip, by the supply or for the cause that is known. Whether the backup domain has outlived a
+    /// loss of the supply is decided when that comes back.
     pub(crate) fn reset_all(&mut self, power: bool, now: Time) {
+        if power && !self.backup_is_kept(now) {
+            self.backup_ram = BackupRam::default();
+            self.pwr.keep_backup(false);
+        }
         let cause = self.asked.take().unwrap_or(Cause::Software);
         self.rcc.reset((!power).then_some(cause));
         self.flash.reset(&mut self.effects);
@@ -66,7 +71,7 @@ impl Stm32f4 {
                 self.timers[index] = Timer::new(place.kind, self.clocks.timer_cycle(place.bus));
             }
             Unit::Gpio(port) => self.ports[port] = Gpio::new(port),
-            Unit::Pwr => self.pwr = Pwr::new(self.variant),
+            Unit::Pwr => self.pwr.reset(),
             Unit::Syscfg => self.syscfg = Syscfg::new(),
             Unit::Exti => self.exti = Exti::default(),
             Unit::Adc => self.adc.reset(),
@@ -77,7 +82,7 @@ impl Stm32f4 {
             Unit::Can(_) => self.can.reset_can2(),
             Unit::Iwdg => self.iwdg = Iwdg::new(),
             Unit::Crc => self.crc = CrcUnit::new(),
-            Unit::Rcc | Unit::Flash | Unit::Dbgmcu | Unit::Signature | Unit::Absent => {}
+            Unit::Rcc | Unit::Flash | Unit::Dbgmcu | Unit::BackupRam | Unit::Signature | Unit::Absent => {}
         }
     }
 }

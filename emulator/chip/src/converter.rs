@@ -1,19 +1,25 @@
 //! From the trigger to memory: timer, ADC and DMA at work together.
 //!
 //! Conversions are made up when somebody looks: at an access to one of the three, at an interrupt and at each half and
-//! full transfer, when what was transferred reaches memory. Each conversion still has the voltage of its own instant.
+//! full transfer, when what was transferred reaches memory. Each conversion still has the voltage of its own instant. So
+//! do the copies of the encoder's count that DMA makes at the same triggers.
 
 use canbus::Time;
 
 use crate::adc::{Sample, Trigger};
 use crate::clocks::times;
 use crate::dma::{Direction, Line, Stream, Transfer, line};
+use crate::map::TIM3_UPDATE;
 use crate::peripherals::{BusFault, Effect, Memory};
 use crate::plant::front_end::quantise;
 use crate::stm32f4::Stm32f4;
 
-/// DMA2, as an index.
+/// DMA1 and DMA2, as an index.
+const DMA1: usize = 0;
 const DMA2: usize = 1;
+/// TIM3 and TIM4, as an index.
+const TIM3: usize = 1;
+const TIM4: usize = 2;
 /// The requests of ADC1 (RM0390 table 29).
 const ADC1: [Line; 2] = [line(0, 0), line(4, 0)];
 /// ADC input of the reference.
@@ -46,7 +52,7 @@ impl Stm32f4 {
         self.trigger_timer().map_or(never, |timer| self.timers[timer].trigger_output())
     }
 
-    fn trigger_timer(&self) -> Option<usize> {
+    pub(crate) fn trigger_timer(&self) -> Option<usize> {
         self.adc.trigger().map(|trigger| match trigger {
             Trigger::Tim2 => 0,
             Trigger::Tim3 => 1,
@@ -57,6 +63,9 @@ impl Stm32f4 {
         if let Some(timer) = self.trigger_timer() {
             self.run_timer(timer, at);
             self.adc.on_trigger(at);
+            if timer == TIM3 && self.timers[TIM3].requests_on_update() {
+                self.copy_count(&TIM3_UPDATE, at);
+            }
         }
     }
 
@@ -125,6 +134,12 @@ impl Stm32f4 {
         Ok(())
     }
 
+    /// Serves a request of TIM3 that may be for the count of the encoder.
+    pub(crate) fn copy_count(&mut self, request: &[Line], at: Time) {
+        self.run_timer(TIM4, at);
+        self.transfer_to_memory(DMA1, request, at);
+    }
+
     /// Serves a request towards a peripheral.
     pub(crate) fn transfer_to_peripheral(
         &mut self,
@@ -155,15 +170,17 @@ impl Stm32f4 {
         }
     }
 
-    /// Stores to memory; what follows the last store becomes one with it.
+    /// Stores to memory. What follows one of the last two stores becomes one with it: two streams may take turns.
     fn keep(&mut self, address: u32, new: &[u8]) {
-        if let Some(Effect::Store { address: start, bytes }) = self.effects.back_mut()
-            && start.wrapping_add(bytes.len() as u32) == address
-        {
-            bytes.extend_from_slice(new);
-            return;
+        let recent = self.effects.iter_mut().rev().take(2).map_while(|effect| match effect {
+            Effect::Store { address, bytes } => Some((*address, bytes)),
+            _ => None,
+        });
+        let before = |(start, bytes): &(u32, &mut Vec<u8>)| start.wrapping_add(bytes.len() as u32) == address;
+        match recent.into_iter().find(before) {
+            Some((_, bytes)) => bytes.extend_from_slice(new),
+            None => self.effects.push_back(Effect::Store { address, bytes: new.to_vec() }),
         }
-        self.effects.push_back(Effect::Store { address, bytes: new.to_vec() });
     }
 
     /// When conversions next do something that can be seen from outside.

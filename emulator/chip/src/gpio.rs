@@ -47,7 +47,7 @@ impl Outside {
         self.levels = self.levels & !(1 << pin) | u16::from(level == Some(true)) << pin;
     }
 
-    fn level(self, pin: u32) -> Option<bool> {
+    pub(crate) fn level(self, pin: u32) -> Option<bool> {
         (self.driven >> pin & 1 != 0).then_some(self.levels >> pin & 1 != 0)
     }
 }

@@ -7,9 +7,9 @@
 //! |---|---|
 //! | `map`, `access`, `lane` | addresses: which peripheral answers, whether it is clocked, narrow accesses |
 //! | `stm32f4`, `schedule`, `clock_and_reset` | the peripherals together: time, interrupt lines, clocks, resets |
-//! | `converter`, `pins` | what crosses peripherals: timer to ADC to DMA to memory; encoder to timers and EXTI |
+//! | `converter`, `pins` | what crosses peripherals: timer to ADC to DMA to memory; encoders and buttons to their pins |
 //! | one file or folder each | the peripherals, which know nothing of each other |
-//! | `plant` | pressure, temperature, shaft, faults and the board's analogue front end |
+//! | `plant` | pressure, temperature, shaft, buttons, faults and the board's analogue front end |
 //!
 //! Nothing is stepped: a peripheral computes its state at the instant of an access from its state at the last one, and
 //! `deadline` tells when something can be seen without an access. An access that the models cannot answer as silicon
@@ -20,6 +20,7 @@
 
 mod access;
 mod adc;
+mod backup_ram;
 mod board;
 pub mod can;
 mod clock_and_reset;

@@ -1,5 +1,6 @@
 //! Which peripheral is at which address (RM0390 table 1, RM0090 table 1) and what gates its clock.
 
+use crate::backup_ram;
 use crate::clocks::Apb;
 use crate::dma::{Line, line};
 use crate::rcc::Gate;
@@ -30,6 +31,7 @@ pub(crate) enum Unit {
     /// The index into `SPIS`.
     Spi(usize),
     Crc,
+    BackupRam,
     Signature,
     /// The chip has it, the emulator has not.
     Absent,
@@ -159,7 +161,7 @@ const BLOCKS: &[Block] = &[
     block(0x4002_3000, "CRC", Unit::Crc, Gate::ahb1(12)),
     block(0x4002_3800, "RCC", Unit::Rcc, None),
     block(0x4002_3C00, "FLASH", Unit::Flash, None),
-    absent(0x4002_4000, "BKPSRAM", Gate::ahb1(18)).size(4 * KIB),
+    block(0x4002_4000, "BKPSRAM", Unit::BackupRam, Gate::ahb1(18)).size(backup_ram::SIZE),
     block(0x4002_6000, "DMA1", Unit::Dma(0), Gate::ahb1(21)),
     block(0x4002_6400, "DMA2", Unit::Dma(1), Gate::ahb1(22)),
     absent(0x4002_8000, "ETH", Gate::ahb1(25)).size(0x1400).on(On::F407),
@@ -194,13 +196,26 @@ pub(crate) struct TimerPlace {
 }
 
 const fn timer(wide: bool, channels: u32, bus: Apb, irq: u8) -> TimerPlace {
-    TimerPlace { kind: Kind { wide, channels }, bus, irq }
+    TimerPlace { kind: Kind { wide, channels, requests: 0 }, bus, irq }
+}
+
+/// The DMA requests of TIM3 that are modelled, as bits of DIER (UDE and CC2DE) and as lines to streams of DMA1 (RM0390
+/// table 28).
+const TIM3_REQUESTS: u32 = 1 << 8 | 1 << 10;
+pub(crate) const TIM3_UPDATE: [Line; 1] = [line(2, 5)];
+pub(crate) const TIM3_CHANNEL_2: [Line; 1] = [line(5, 5)];
+
+impl TimerPlace {
+    const fn requests(mut self, requests: u32) -> Self {
+        self.kind.requests = requests;
+        self
+    }
 }
 
 /// TIM2 to TIM7, TIM9 to TIM14.
 pub(crate) const TIMERS: [TimerPlace; 12] = [
     timer(true, 4, Apb::One, 28),
-    timer(false, 4, Apb::One, 29),
+    timer(false, 4, Apb::One, 29).requests(TIM3_REQUESTS),
     timer(false, 4, Apb::One, 30),
     timer(true, 4, Apb::One, 50),
     timer(false, 0, Apb::One, 54),

@@ -1,18 +1,32 @@
-//! Pins and what the board wires to them: the encoder on PB5 (index, also TIM3 channel 2), PB6 and PB7 (A and B, also
-//! TIM4 channels 1 and 2), and levels that a test drives.
+//! Pins and what the board wires to them, besides levels that a test drives:
+//!
+//! | pins | what |
+//! |---|---|
+//! | PB5, PB6, PB7 | index, A and B of the incremental encoder: TIM3 channel 2, TIM4 channels 1 and 2 |
+//! | PB13, PB14 | clock and data of the absolute encoder: SPI2 |
+//! | PC13, PC10 | buttons to ground; the first one, that of the NUCLEO, has a pull-up resistor |
 
 use canbus::Time;
 
 use crate::gpio::Outside;
-use crate::plant::first_change;
+use crate::map::TIM3_CHANNEL_2;
+use crate::plant::{BUTTONS, first_change};
 use crate::stm32f4::Stm32f4;
 
 const PORT_B: usize = 1;
+const PORT_C: usize = 2;
 const INDEX: u32 = 5;
 const PHASE_A: u32 = 6;
 const PHASE_B: u32 = 7;
+const SSI_CLOCK: u32 = 13;
+const SSI_DATA: u32 = 14;
+/// The pins of the buttons, and the level of one that is not pressed.
+const BUTTON_PINS: [(u32, Option<bool>); BUTTONS] = [(13, Some(true)), (10, None)];
 /// AF2 is TIM3 on PB5 and TIM4 on PB6 and PB7 (DS10693 table 11).
 const TIMER_FUNCTION: u32 = 2;
+/// AF5 is SPI2 on PB13 and PB14.
+const SPI_FUNCTION: u32 = 5;
+const SPI2: usize = 1;
 const TIM3: usize = 1;
 const TIM4: usize = 2;
 /// How far ahead edges are looked for.
@@ -28,11 +42,34 @@ impl Stm32f4 {
             outside.set(PHASE_A, Some(a));
             outside.set(PHASE_B, Some(b));
         }
+        if port == PORT_C {
+            self.press(&mut outside, now);
+        }
         outside
     }
 
-    /// The encoder's position as a timer sees it, in quarter periods; `None` when it sees no encoder. Only TIM4 is wired, and only while both of its
-    /// pins are switched to it.
+    /// A level that a test drives comes first.
+    fn press(&self, outside: &mut Outside, now: Time) {
+        for ((pin, released), closed) in BUTTON_PINS.into_iter().zip(self.plant.closed(now)) {
+            if outside.level(pin).is_none() {
+                outside.set(pin, if closed { Some(false) } else { released });
+            }
+        }
+    }
+
+    /// Whether the absolute encoder is on an SPI: on SPI2 only, and while both of its pins are switched to it.
+    pub(crate) fn ssi_is_wired(&self, spi: usize) -> bool {
+        spi == SPI2
+            && [SSI_CLOCK, SSI_DATA].iter().all(|&pin| self.ports[PORT_B].alternate(pin, SPI_FUNCTION))
+    }
+
+    /// What an SPI reads from a line that nobody drives.
+    pub(crate) fn open_input(&self, spi: usize) -> bool {
+        spi == SPI2 && self.ports[PORT_B].level(SSI_DATA, self.outside[PORT_B])
+    }
+
+    /// The encoder's position as a timer sees it, in quarter periods; `None` when it sees no encoder. Only TIM4 is
+    /// wired, and only while both of its pins are switched to it.
     pub(crate) fn encoder_position(&self, timer: usize, now: Time) -> Option<i64> {
         let wired = timer == TIM4
             && [PHASE_A, PHASE_B].iter().all(|&pin| self.ports[PORT_B].alternate(pin, TIMER_FUNCTION));
@@ -78,7 +115,9 @@ impl Stm32f4 {
         }
         if self.index_is_captured() {
             self.run_timer(TIM3, now);
-            self.timers[TIM3].capture(1, level);
+            if self.timers[TIM3].capture(1, level) {
+                self.copy_count(&TIM3_CHANNEL_2, now);
+            }
         }
     }
 

@@ -1,11 +1,15 @@
 //! PWR: voltage scaling, over-drive and the access to the backup domain (RM0390 section 5.4, RM0090 section 5.4).
-//! The regulator is ready at once; stop and standby modes are not entered.
+//! The regulators are ready at once; stop and standby modes are not entered.
 
 use crate::register::{Plain, RegisterFile, bit, flag};
 use crate::variant::Variant;
 
 const CR: u32 = 0x00;
 const CSR: u32 = 0x04;
+/// CR: the backup domain can be written.
+const DBP: u32 = 8;
+/// CSR: the backup regulator is on. The bit is in the backup domain itself: no reset clears it.
+const BRE: u32 = 9;
 
 const F446: &[Plain] = &[Plain::new(CR, 0xC000, 0x003F_EFF3), Plain::new(CSR, 0, 0x0000_0380)];
 const F405: &[Plain] = &[Plain::new(CR, 0x4000, 0x0000_43F3), Plain::new(CSR, 0, 0x0000_0300)];
@@ -22,6 +26,27 @@ impl Pwr {
         Self { plain: RegisterFile::new(if over_drive { F446 } else { F405 }), over_drive }
     }
 
+    /// After a reset, which the backup regulator does not see.
+    pub(crate) fn reset(&mut self) {
+        let keeps = self.keeps_backup();
+        self.plain.reset();
+        self.keep_backup(keeps);
+    }
+
+    /// Whether the backup SRAM can be written.
+    pub(crate) fn backup_is_writable(&self) -> bool {
+        bit(self.plain.get(CR), DBP)
+    }
+
+    /// Whether the backup SRAM is supplied from VBAT when the main supply is gone.
+    pub(crate) fn keeps_backup(&self) -> bool {
+        bit(self.plain.get(CSR), BRE)
+    }
+
+    pub(crate) fn keep_backup(&mut self, keeps: bool) {
+        self.plain.write(CSR, flag(keeps, BRE));
+    }
+
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         let value = self.plain.read(offset)?;
         Some(if offset == CSR { value | self.ready_bits() } else { value })
@@ -35,7 +60,6 @@ impl Pwr {
     fn ready_bits(&self) -> u32 {
         let control = self.plain.get(CR);
         let on = |n| self.over_drive && bit(control, n);
-        let backup_regulator = bit(self.plain.get(CSR), 9);
-        flag(backup_regulator, 3) | flag(true, 14) | flag(on(16), 16) | flag(on(17), 17)
+        flag(self.keeps_backup(), 3) | flag(true, 14) | flag(on(16), 16) | flag(on(17), 17)
     }
 }

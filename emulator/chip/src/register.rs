@@ -29,6 +29,11 @@ impl RegisterFile {
         Self { layout, values }
     }
 
+    /// All values as after a reset.
+    pub(crate) fn reset(&mut self) {
+        *self = Self::new(self.layout);
+    }
+
     /// The value at `offset`; `None` when no register of this file is there.
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         self.position(offset).map(|index| self.values[index])

@@ -7,6 +7,7 @@ use crate::iwdg::Iwdg;
 use crate::map::{ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS};
 use crate::peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
 use crate::rcc::Cause;
+use crate::spi::Far;
 use crate::stm32f4::Stm32f4;
 use crate::timer::Timer;
 
@@ -96,8 +97,9 @@ impl Stm32f4 {
 
     /// Ends the frames of an SPI that are due, and has DMA fetch what came.
     pub(crate) fn run_spi(&mut self, index: usize, now: Time) {
+        let (wired, open) = (self.ssi_is_wired(index), Far::Nothing(self.open_input(index)));
         let plant = &self.plant;
-        self.spis[index].run(now, |at| plant.revolutions(at));
+        self.spis[index].run(now, |at| plant.absolute(at).filter(|_| wired).map_or(open, Far::Position));
         let place = &SPIS[index];
         while self.spis[index].asks_to_store()
             && self.transfer_to_memory(place.dma, &place.receive, now).is_some()

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use canbus::Time;
 
 use crate::adc::{Adc, AdcCommon};
+use crate::backup_ram::BackupRam;
 use crate::board::Board;
 use crate::can::{BxCan, DualCan};
 use crate::clocks::{Clocks, times};
@@ -53,6 +54,7 @@ pub struct Stm32f4 {
     pub(crate) can: DualCan,
     pub(crate) iwdg: Iwdg,
     pub(crate) crc: CrcUnit,
+    pub(crate) backup_ram: BackupRam,
     pub(crate) clocks: Clocks,
     pub(crate) effects: VecDeque<Effect>,
     pub(crate) record: Record,
@@ -86,6 +88,7 @@ impl Stm32f4 {
             can: DualCan::new(clocks.pclk1()),
             iwdg: Iwdg::new(),
             crc: CrcUnit::new(),
+            backup_ram: BackupRam::default(),
             clocks,
             effects: VecDeque::new(),
             record: Record::default(),
@@ -151,6 +154,21 @@ impl Stm32f4 {
     /// CAN2 as a participant of a bus.
     pub fn can2_mut(&mut self) -> &mut BxCan {
         &mut self.can.can2
+    }
+
+    /// What the battery keeps of the backup SRAM while the main supply is gone; `None` when it keeps nothing.
+    pub fn kept_by_battery(&self, now: Time) -> Option<Vec<u8>> {
+        self.backup_is_kept(now).then(|| self.backup_ram.bytes())
+    }
+
+    /// Contents of the backup SRAM that a battery has kept, from its start.
+    pub fn set_kept_by_battery(&mut self, bytes: &[u8]) {
+        self.backup_ram.set_bytes(bytes);
+        self.pwr.keep_backup(true);
+    }
+
+    pub(crate) fn backup_is_kept(&self, now: Time) -> bool {
+        self.pwr.keeps_backup() && self.plant.has_battery(now)
     }
 
     /// The flash controller, to look at or to cut the power in one of its operations.

@@ -19,6 +19,8 @@ pub enum Reason {
     NotModelled,
     /// The clock of the peripheral is off or its reset is held: silicon reads 0 and ignores writes.
     ClockOff,
+    /// The backup domain cannot be written (PWR_CR, DBP): silicon ignores writes.
+    Protected,
 }
 
 /// Accesses of one kind to one register.
@@ -45,6 +47,7 @@ impl fmt::Display for Unmodelled {
         let reason = match self.reason {
             Reason::NotModelled => "not modelled",
             Reason::ClockOff => "clock is off",
+            Reason::Protected => "backup domain is protected",
         };
         write!(f, "{} ({:#010x}) {direction}: {reason}, {} times", self.name, self.address, self.count)
     }

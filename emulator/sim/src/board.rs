@@ -31,6 +31,15 @@ pub struct Images {
     pub(crate) bootloader: Option<Image>,
 }
 
+/// What a board has kept while it was off.
+#[derive(Clone, Copy)]
+pub(crate) struct Contents<'a> {
+    /// The flash array.
+    pub(crate) flash: &'a [u8],
+    /// The backup SRAM; `None` when no battery has kept it.
+    pub(crate) backup: Option<&'a [u8]>,
+}
+
 /// One emulated board.
 pub struct Board {
     id: u8,
@@ -45,15 +54,21 @@ pub struct Board {
 }
 
 impl Board {
-    /// A board with these contents of its flash, over which the images are written as a debug probe does it.
-    /// It is switched on.
+    /// A board with these contents of its memory. The images are written over its flash as a debug probe does it. It is
+    /// switched on.
     ///
     /// # Errors
     /// When an image does not fit the chip.
-    pub(crate) fn new(id: u8, personality: Personality, flash: &[u8], images: Rc<Images>) -> Result<Board> {
-        let chip = Stm32f4::new(Variant::F446, wiring(id));
+    pub(crate) fn new(
+        id: u8,
+        personality: Personality,
+        contents: Contents,
+        images: Rc<Images>,
+    ) -> Result<Board> {
+        let mut chip = Stm32f4::new(Variant::F446, wiring(id));
+        contents.backup.into_iter().for_each(|backup| chip.set_kept_by_battery(backup));
         let mut machine = Machine::new(Model::stm32f4(flash::SIZE as u32), chip)?;
-        machine.set_flash(flash)?;
+        machine.set_flash(contents.flash)?;
         let bootloader = images.bootloader.as_ref().map(|image| load(&mut machine, image)).transpose()?;
         let bootloader_flash = bootloader.map_or(0, |bootloader| bootloader.flash_size);
         let firmware = load(&mut machine, &images.firmware)?;
@@ -115,6 +130,11 @@ impl Board {
     /// The flash array.
     pub fn flash(&self) -> Vec<u8> {
         self.machine.flash()
+    }
+
+    /// What the battery keeps when the board is switched off now.
+    pub fn backup(&self) -> Option<Vec<u8>> {
+        self.machine.peripherals().kept_by_battery(self.machine.now())
     }
 
     pub(crate) fn status(&self, heard: Heard) -> NodeStatus {

@@ -53,7 +53,7 @@ pub struct Options {
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub duration: Option<Time>,
 
-    /// Keep the boards' flash in this directory between runs, one file a node.
+    /// Keep the boards' flash in this directory between runs, one file a node, and beside it what the battery keeps.
     #[arg(long, value_name = "DIR")]
     pub flash: Option<PathBuf>,
 
@@ -76,6 +76,10 @@ pub struct Options {
     /// The encoder's shaft in revolutions, or its speed, e.g. const:0.25 or rpm:6000.
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("shaft", text))]
     pub shaft: Vec<Targeted<Stimulus>>,
+
+    /// Press or release a button, e.g. 1:down.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("button", text))]
+    pub button: Vec<Targeted<Stimulus>>,
 
     /// A fault from a time on, e.g. open-sensor@2.5.
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("fault", text))]
@@ -198,7 +202,7 @@ mod tests {
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 \
-             --shaft 2=rpm:6000 --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
+             --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));

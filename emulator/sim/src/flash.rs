@@ -1,4 +1,4 @@
-//! The boards' flash as files, so that parameters outlive a run.
+//! What boards keep without power as files, so that it outlives a run: the flash, and the backup SRAM.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -8,33 +8,64 @@ use anyhow::{Context, Result, ensure};
 
 /// Bytes of the STM32F446RE's flash.
 pub const SIZE: usize = 512 * 1024;
+/// Bytes of its backup SRAM.
+const BACKUP_SIZE: usize = 4 * 1024;
 
 /// One file a node.
 pub fn file(dir: &Path, node: u8) -> PathBuf {
     dir.join(format!("node-{node}.flash"))
 }
 
+fn backup_file(dir: &Path, node: u8) -> PathBuf {
+    dir.join(format!("node-{node}.backup"))
+}
+
 /// The kept contents of a board's flash; `None` when there are none yet.
 pub fn load(dir: &Path, node: u8) -> Result<Option<Vec<u8>>> {
-    let path = file(dir, node);
-    let bytes = match fs::read(&path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        bytes => bytes.with_context(|| format!("cannot read {}", path.display()))?,
-    };
-    ensure!(bytes.len() == SIZE, "{} has {} bytes; a flash has {SIZE}", path.display(), bytes.len());
-    Ok(Some(bytes))
+    read(&file(dir, node), SIZE)
+}
+
+/// What a board's battery has kept; `None` when it has kept nothing.
+pub(crate) fn load_backup(dir: &Path, node: u8) -> Result<Option<Vec<u8>>> {
+    read(&backup_file(dir, node), BACKUP_SIZE)
 }
 
 /// Keeps the contents of a board's flash. A reader sees the old or the new contents, never a part.
 pub fn save(dir: &Path, node: u8, bytes: &[u8]) -> Result<()> {
-    let path = file(dir, node);
+    write(dir, &file(dir, node), bytes)
+}
+
+/// Keeps what a board's battery keeps: with `None` nothing is kept any more.
+pub(crate) fn save_backup(dir: &Path, node: u8, bytes: Option<&[u8]>) -> Result<()> {
+    let path = backup_file(dir, node);
+    match bytes {
+        Some(bytes) => write(dir, &path, bytes),
+        None => match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("cannot remove {}", path.display()))
+            }
+            _ => Ok(()),
+        },
+    }
+}
+
+fn read(path: &Path, size: usize) -> Result<Option<Vec<u8>>> {
+    let bytes = match fs::read(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        bytes => bytes.with_context(|| format!("cannot read {}", path.display()))?,
+    };
+    ensure!(bytes.len() == size, "{} has {} bytes; it must have {size}", path.display(), bytes.len());
+    Ok(Some(bytes))
+}
+
+fn write(dir: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
     let temporary = path.with_extension("new");
     let write = || {
         fs::create_dir_all(dir)?;
         let mut file = fs::File::create(&temporary)?;
         file.write_all(bytes)?;
         file.sync_all()?;
-        fs::rename(&temporary, &path)
+        fs::rename(&temporary, path)
     };
     write().with_context(|| format!("cannot write {}", path.display()))
 }
@@ -59,6 +90,18 @@ mod tests {
         assert_eq!(load(&dir, 5).unwrap(), Some(vec![0x5A; SIZE]));
         assert_eq!(load(&dir, 6).unwrap(), None);
         assert_eq!(fs::read_dir(&dir).unwrap().count(), 1, "no temporary file is left");
+        fs::remove_dir_all(dir).unwrap();
+    }
+
+    #[test]
+    fn an_empty_battery_leaves_no_file() {
+        let dir = dir("backup");
+        save_backup(&dir, 5, None).unwrap();
+        save_backup(&dir, 5, Some(&[7; BACKUP_SIZE])).unwrap();
+        assert_eq!(load_backup(&dir, 5).unwrap(), Some(vec![7; BACKUP_SIZE]));
+        assert_eq!(load(&dir, 5).unwrap(), None, "it is not the flash");
+        save_backup(&dir, 5, None).unwrap();
+        assert_eq!(load_backup(&dir, 5).unwrap(), None);
         fs::remove_dir_all(dir).unwrap();
     }
 

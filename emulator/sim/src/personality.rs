@@ -11,16 +11,22 @@ use serde::Serialize;
 pub enum Personality {
     /// Pressure and temperature transmitter (CiA 404).
     Pressure,
+    /// Encoder (CiA 406).
+    Encoder,
+    /// Both, as a module of two devices.
+    Combined,
 }
 
 impl Personality {
     /// Every personality that the firmware has.
-    const ALL: [Personality; 1] = [Personality::Pressure];
+    const ALL: [Personality; 3] = [Personality::Pressure, Personality::Encoder, Personality::Combined];
 
     /// The number in the device record.
     pub fn number(self) -> u8 {
         match self {
             Personality::Pressure => 0,
+            Personality::Encoder => 1,
+            Personality::Combined => 2,
         }
     }
 }
@@ -29,6 +35,8 @@ impl fmt::Display for Personality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Personality::Pressure => "pressure",
+            Personality::Encoder => "encoder",
+            Personality::Combined => "combined",
         })
     }
 }
@@ -54,6 +62,6 @@ mod tests {
         for personality in Personality::ALL {
             assert_eq!(personality.to_string().parse(), Ok(personality));
         }
-        assert!("encoder".parse::<Personality>().unwrap_err().contains("it has: pressure"));
+        assert!("valve".parse::<Personality>().unwrap_err().contains("it has: pressure, encoder, combined"));
     }
 }

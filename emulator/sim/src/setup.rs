@@ -5,7 +5,7 @@ use std::rc::Rc;
 use anyhow::{Context, Result, ensure};
 use storage::{DeviceRecord, Memory, Pages, View};
 
-use crate::board::{Board, Images};
+use crate::board::{Board, Contents, Images};
 use crate::cli::{Node, Options, UNCONFIGURED};
 use crate::flash;
 use crate::image::Image;
@@ -29,8 +29,11 @@ pub fn world(options: &Options) -> Result<World> {
     let boards = options.nodes.iter().map(|node| board(node, options, &images));
     let boards = boards.collect::<Result<Vec<Board>>>()?;
     let mut world = World::new(boards, options.bitrate, options.load);
-    let Options { pressure, temperature, shaft, fault, .. } = options;
-    [pressure, temperature, shaft, fault].into_iter().flatten().for_each(|stimulus| world.apply(stimulus));
+    let Options { pressure, temperature, shaft, button, fault, .. } = options;
+    [pressure, temperature, shaft, button, fault]
+        .into_iter()
+        .flatten()
+        .for_each(|stimulus| world.apply(stimulus));
     Ok(world)
 }
 
@@ -40,7 +43,9 @@ fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
     let kept = options.flash.as_deref().map(|dir| flash::load(dir, node.id)).transpose()?.flatten();
     let mut contents = kept.unwrap_or_else(|| vec![0xFF; flash::SIZE]);
     provision(&mut contents, node, options.bitrate)?;
-    Board::new(node.id, node.personality, &contents, Rc::clone(images))
+    let backup = options.flash.as_deref().map(|dir| flash::load_backup(dir, node.id)).transpose()?.flatten();
+    let contents = Contents { flash: &contents, backup: backup.as_deref() };
+    Board::new(node.id, node.personality, contents, Rc::clone(images))
 }
 
 /// Tells a fresh board what it is. A board that knows it already, because its flash was kept, is left as it is.
@@ -57,8 +62,11 @@ fn provision(flash: &mut [u8], node: &Node, bit_rate: u16) -> Result<()> {
     done.map_err(|error| anyhow::anyhow!("the parameter store takes no device record: {error:?}"))
 }
 
-/// Writes the boards' flash back to where it was read from.
+/// Writes what the boards keep without power back to where it was read from.
 pub fn keep_flash(options: &Options, world: &World) -> Result<()> {
     let Some(dir) = &options.flash else { return Ok(()) };
-    world.boards().iter().try_for_each(|board| flash::save(dir, board.id(), &board.flash()))
+    world.boards().iter().try_for_each(|board| {
+        flash::save(dir, board.id(), &board.flash())?;
+        flash::save_backup(dir, board.id(), board.backup().as_deref())
+    })
 }

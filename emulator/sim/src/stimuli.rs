@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use canbus::Time;
-use chip::plant::{Fault, Motion, Plant, Signal};
+use chip::plant::{Fault, Motion, Plant, Push, Signal};
 
 use crate::cli::board_number;
 
@@ -17,12 +17,14 @@ pub enum Stimulus {
     Temperature(Signal),
     /// In revolutions, or a speed.
     Shaft(Motion),
+    /// A button is pressed or released.
+    Button(Push),
     /// A defect of the wiring or of a sensor.
     Fault(Fault),
 }
 
 impl Stimulus {
-    /// Reads `[ID=]SPEC` of a kind: pressure, temperature, shaft or fault.
+    /// Reads `[ID=]SPEC` of a kind: pressure, temperature, shaft, button or fault.
     ///
     /// # Errors
     /// One line that says what is wrong.
@@ -31,8 +33,11 @@ impl Stimulus {
             "pressure" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Pressure)),
             "temperature" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Temperature)),
             "shaft" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Shaft)),
+            "button" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Button)),
             "fault" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Fault)),
-            _ => Err(format!("{kind:?} is no stimulus; there are pressure, temperature, shaft and fault")),
+            _ => Err(format!(
+                "{kind:?} is no stimulus; there are pressure, temperature, shaft, button and fault"
+            )),
         }
     }
 
@@ -42,6 +47,7 @@ impl Stimulus {
             Stimulus::Pressure(signal) => plant.set_pressure(signal, now),
             Stimulus::Temperature(signal) => plant.set_temperature(signal, now),
             Stimulus::Shaft(motion) => plant.set_shaft(motion, now),
+            Stimulus::Button(push) => plant.push(push, now),
             Stimulus::Fault(fault) => plant.add_fault(fault),
         }
     }

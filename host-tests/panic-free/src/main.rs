@@ -7,7 +7,7 @@
 
 use canopen::{Frame, Instant, QueueFull, Transmit};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use node::{BusEvent, Fault, Measurement, Parcel, Protocol, RawSample, Setup, Snapshot};
+use node::{BusEvent, Fault, Measurement, Parcel, Protocol, RawEncoder, RawSample, Setup, Snapshot, Start};
 use storage::{Pages, Store, View};
 
 unsafe extern "C" {
@@ -106,12 +106,24 @@ extern "C" fn fail(protocol: &mut Protocol, fault: &Fault, event: &BusEvent, act
 
 /// The measurement, and its way into the dictionary.
 #[unsafe(no_mangle)]
-extern "C" fn measure(protocol: &mut Protocol, measurement: &mut Measurement, raw: &RawSample, now: u64) {
+extern "C" fn measure(
+    protocol: &mut Protocol,
+    measurement: &mut Measurement,
+    raw: &RawSample,
+    encoder: &RawEncoder,
+    now: u64,
+) {
     if let Some(parameters) = protocol.take_parameters() {
         measurement.apply(&parameters);
     }
-    let snapshot: Snapshot = measurement.sample(raw);
+    let snapshot: Snapshot = measurement.sample(raw, encoder);
     protocol.publish(&snapshot, Instant(now), &mut Queue);
+}
+
+/// What the encoder keeps, out and in again.
+#[unsafe(no_mangle)]
+extern "C" fn power_cycle(measurement: &mut Measurement) {
+    *measurement = Measurement::new(Start::Kept(measurement.kept()));
 }
 
 /// Storing.

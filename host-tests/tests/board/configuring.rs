@@ -189,3 +189,25 @@ fn program_control_restarts_without_an_answer() {
     assert!(master.heard(&mut world, 0x581).is_empty());
     assert_eq!(world.traffic().node(1).boot_ups, 2);
 }
+
+fn device_type(world: &mut World, master: &Master) -> Vec<u8> {
+    master.ask(world, 1, &[0x40, 0, 0x10, 0, 0, 0, 0, 0])[4..].to_vec()
+}
+
+#[test]
+fn a_node_is_what_it_is_told_to_be_on_the_command_line_and_then_by_sdo() {
+    let types = [0x0002_0194_u32, 0x0005_0196, 0xFFFF_0196].map(u32::to_le_bytes);
+    for (number, name) in ["pressure", "encoder", "combined"].into_iter().enumerate() {
+        let mut world = world(&format!("--bitrate 1000 --node 1:{name}"));
+        let master = Master::join(&mut world);
+        world.run_until(SECOND);
+        assert_eq!(device_type(&mut world, &master), types[number]);
+        let other = (number + 1) % types.len();
+        assert_eq!(write(&mut world, &master, 0x2000, 0, &[other as u8])[0], 0x60);
+        assert_eq!(device_type(&mut world, &master), types[number], "not before a reset");
+        master.send(&mut world, 0, &[0x81, 1]);
+        let reset = world.now();
+        world.run_until(reset + SECOND);
+        assert_eq!(device_type(&mut world, &master), types[other]);
+    }
+}

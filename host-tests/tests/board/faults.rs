@@ -97,6 +97,22 @@ fn a_node_recovers_from_bus_off() {
     assert!(node.incidents.is_empty(), "{after}");
 }
 
+/// A line that destroys every frame sees less and less of the node: it waits twice as long each time, up to 3.2 s.
+#[test]
+fn a_node_on_a_broken_line_tries_less_and_less_often() {
+    let mut world = running();
+    world.bus().faults.noise(1, 1.0);
+    let first = run(&mut world, SECOND).bus.errors;
+    let before = run(&mut world, SECOND * 19).bus.errors;
+    let last = run(&mut world, SECOND * 10).bus.errors - before;
+    println!("{first} error frames in the first second, {last} in ten seconds later on");
+    // Each try ends after 32 errors of the transmitter.
+    assert!(first > 64 && last <= 4 * 33, "{first}, {last}");
+    world.bus().faults.quiet();
+    let after = run(&mut world, SECOND * 6);
+    assert_eq!(after.nodes[0].heard.last_emcy, Some(0), "it is back and well: {after}");
+}
+
 /// Without an application the bootloader stays where it is instead of jumping into erased flash.
 #[test]
 fn the_bootloader_does_not_start_an_erased_application() {

@@ -1,7 +1,9 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
 
 mod configuring;
+mod encoder;
 mod faults;
+mod measuring;
 mod running;
 mod support;
 mod update;

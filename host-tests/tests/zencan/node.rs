@@ -100,9 +100,13 @@ async fn every_object_is_written_as_its_access_says() {
         client.set_tpdo_cob_id(number, config.comm.cob_id, false, false).await.unwrap();
         client.write_u8(0x1A00 + number as u16, 0, 0).await.unwrap();
     }
+    client.download(0x2203, 0, b"cali").await.unwrap();
     for row in OBJECTS.iter().filter(|row| row.access == Access::ReadWrite) {
-        // 1010h, 1011h and 1F51h take commands. A domain is empty until it is written.
-        if matches!(row.index, 0x1010 | 0x1011 | 0x1F51) && row.sub > 0 || is_domain(row) {
+        // 1010h, 1011h, 1F51h and 2204h take commands. A domain is empty until it is written.
+        if matches!(row.index, 0x1010 | 0x1011 | 0x1F51) && row.sub > 0
+            || row.index == 0x2204
+            || is_domain(row)
+        {
             continue;
         }
         let value = client.upload(row.index, row.sub).await.unwrap();

@@ -1,7 +1,7 @@
 //! The devices that the project builds, one for each personality.
 
 use canopen::dictionary::Object as Row;
-use node::{Personality, pressure};
+use node::{Personality, combined, encoder, pressure};
 
 /// A device: what its data sheet is made from.
 #[derive(Clone, Copy, Debug)]
@@ -17,9 +17,23 @@ pub struct Device {
 }
 
 /// All of them.
-pub static DEVICES: [Device; 1] = [Device {
-    file_name: "pressure.eds",
-    description: "Pressure and temperature transmitter, CiA 404",
-    personality: Personality::Pressure,
-    rows: &pressure::OBJECTS,
-}];
+pub static DEVICES: [Device; 3] = [
+    Device {
+        file_name: "pressure.eds",
+        description: "Pressure and temperature transmitter, CiA 404",
+        personality: Personality::Pressure,
+        rows: &pressure::OBJECTS,
+    },
+    Device {
+        file_name: "encoder.eds",
+        description: "Encoder, CiA 406",
+        personality: Personality::Encoder,
+        rows: &encoder::OBJECTS,
+    },
+    Device {
+        file_name: "combined.eds",
+        description: "Encoder and transmitter in one, CiA 406 and CiA 404",
+        personality: Personality::Combined,
+        rows: &combined::OBJECTS,
+    },
+];

@@ -1,16 +1,22 @@
 //! Bring-up of the whole board in one place: clocks, pins, and who owns which peripheral.
 
+use stm32f4xx_hal::dma::StreamsTuple;
 use stm32f4xx_hal::pac::{DBGMCU, Peripherals, RCC};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 
+use super::backup::BackupMemory;
 use super::can::{Controller, Transmitter};
+use super::digital::{Buttons, Lamps};
+use super::encoder::{self, Encoder};
 use super::flash::{Flash, ParameterFlash};
 use super::led::Led;
 use super::sampling::{Parts, Sampling};
+use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::watchdog::StartUpWatchdog;
 use crate::bit_timing::APB1_HZ;
+use crate::kept::Found;
 use crate::reset_cause::ResetCause;
 
 /// The board's name, object 1009h.
@@ -38,6 +44,18 @@ pub struct Board {
     pub parameters: ParameterFlash,
     /// The front end, ready to start.
     pub sampling: Sampling,
+    /// The incremental encoder; it is read along with the front end.
+    pub encoder: Encoder,
+    /// The absolute encoder.
+    pub ssi: Ssi,
+    /// What outlives a loss of power.
+    pub backup: BackupMemory,
+    /// What was in it.
+    pub found: Found,
+    /// The digital inputs.
+    pub buttons: Buttons,
+    /// The digital outputs.
+    pub lamps: Lamps,
     /// The status LED.
     pub led: Led,
 }
@@ -54,6 +72,7 @@ impl Board {
         let (time, alarms) = time_base::start(device.TIM2, &mut rcc);
         let gpioa = device.GPIOA.split(&mut rcc);
         let gpiob = device.GPIOB.split(&mut rcc);
+        let gpioc = device.GPIOC.split(&mut rcc);
         let (can, transmitter) = Controller::new(device.CAN1, gpiob.pb9, gpiob.pb8, &mut rcc);
         let front_end = Parts {
             adc: device.ADC1,
@@ -64,9 +83,46 @@ impl Board {
             supply: gpioa.pa1.into_analog(),
         };
         let sampling = Sampling::new(front_end, &mut rcc);
+        let streams = StreamsTuple::new(device.DMA1, &mut rcc);
+        let counter = encoder::Parts {
+            timer: device.TIM4,
+            at_scan: streams.2,
+            at_index: streams.5,
+            index: gpiob.pb5,
+            a: gpiob.pb6,
+            b: gpiob.pb7,
+        };
+        let encoder = Encoder::new(counter, sampling.scans(), &mut rcc);
+        let absolute = ssi::Parts {
+            spi: device.SPI2,
+            receive: streams.3,
+            send: streams.4,
+            clock: gpiob.pb13,
+            data: gpiob.pb14,
+        };
+        let ssi = Ssi::new(absolute, &mut rcc);
+        let (backup, found) = BackupMemory::open(device.PWR, &mut rcc);
+        let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
+        let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
         let led = Led::new(gpioa.pa5);
         let parameters = ParameterFlash::new(Flash::new(device.FLASH));
-        Board { reset_cause, watchdog, time, alarms, can, transmitter, parameters, sampling, led }
+        Board {
+            reset_cause,
+            watchdog,
+            time,
+            alarms,
+            can,
+            transmitter,
+            parameters,
+            sampling,
+            encoder,
+            ssi,
+            backup,
+            found,
+            buttons,
+            lamps,
+            led,
+        }
     }
 }
 

@@ -2,11 +2,9 @@
 
 use core::ops::Range;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use update::{HEADER_LEN, Header};
 
-/// In flash: its table is too large for the stack.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use crate::checksum::CRC;
 
 unsafe extern "C" {
     static _stack_start: u8;

@@ -1,10 +1,13 @@
 //! The modules that touch hardware.
 
 pub mod application;
+mod backup;
 pub mod board;
 pub mod can;
 mod clock_tree;
 pub mod crash;
+mod digital;
+mod encoder;
 pub mod factory;
 mod fault;
 pub mod flash;
@@ -15,13 +18,18 @@ mod program_flash;
 mod receive;
 pub mod retained;
 mod sampling;
+mod ssi;
 mod time_base;
 mod watchdog;
 
+pub use backup::BackupMemory;
 pub use board::Board;
+pub use digital::{Buttons, Lamps};
+pub use encoder::{Counted, Encoder};
 pub use program_flash::ProgramFlash;
 pub use receive::{Frames, ReceiveQueue, Received, Receiver};
 pub use sampling::{Sampling, Sums};
+pub use ssi::Ssi;
 pub use stm32f4xx_hal::pac;
 pub use time_base::{Alarm, Clock, TimeInterrupt};
 pub use watchdog::{StartUpWatchdog, Watchdog};

@@ -12,7 +12,7 @@ use crate::losses::Losses;
 /// Channels of one scan: pressure, its supply, temperature sensor, VREFINT.
 const CHANNELS: [u8; 4] = [0, 1, TEMPERATURE, 17];
 /// Scans in a millisecond.
-const SCANS: usize = 16;
+pub(super) const SCANS: usize = 16;
 /// Conversions in a half of the buffer.
 const HALF: usize = SCANS * CHANNELS.len();
 /// Counts of TIM3 between two scans: 72 MHz / 16 kHz.
@@ -46,6 +46,8 @@ static BUFFER: [AtomicU16; 2 * HALF] = [const { AtomicU16::new(0) }; 2 * HALF];
 pub struct Sums {
     /// Per channel: pressure, supply, temperature sensor, VREFINT.
     pub channels: [u32; 4],
+    /// Which half of the buffers they come from.
+    pub(super) half: usize,
 }
 
 impl Sums {
@@ -81,6 +83,11 @@ impl Sampling {
         Sampling { dma, timer, lost: Losses::new(), _parts: (adc, pressure, supply) }
     }
 
+    /// What paces it, for those who have something to do at the same instants.
+    pub(crate) fn scans(&self) -> &TIM3 {
+        &self.timer
+    }
+
     /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this is
     /// the last thing that an initialisation does.
     pub fn start(&mut self) {
@@ -97,7 +104,8 @@ impl Sampling {
             (false, true) => 1,
             (true, true) => self.latest_of_two(),
         };
-        BUFFER.as_chunks::<HALF>().0.get(half).map(sum)
+        let values = BUFFER.as_chunks::<HALF>().0.get(half)?;
+        Some(Sums { channels: sum(values), half })
     }
 
     /// Milliseconds that nobody collected in time, since the last call.
@@ -113,10 +121,10 @@ impl Sampling {
     }
 }
 
-fn sum(half: &[AtomicU16; HALF]) -> Sums {
-    let mut sums = Sums::default();
+fn sum(half: &[AtomicU16; HALF]) -> [u32; 4] {
+    let mut sums = [0; 4];
     for scan in half.as_chunks::<{ CHANNELS.len() }>().0 {
-        for (sum, value) in sums.channels.iter_mut().zip(scan) {
+        for (sum, value) in sums.iter_mut().zip(scan) {
             *sum += u32::from(value.load(Ordering::Relaxed));
         }
     }

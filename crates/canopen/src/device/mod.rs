@@ -30,8 +30,8 @@ use crate::sdo::{Response, Server};
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
 /// How many PDOs a device can have each way; which of them it has, the dictionary says.
-const TPDOS: usize = 8;
-const RPDOS: usize = 8;
+pub(crate) const TPDOS: usize = 8;
+pub(crate) const RPDOS: usize = 8;
 
 /// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
 #[derive(Debug)]
@@ -149,6 +149,12 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// The values of all objects, for the application to update. To be followed by [`changed`](Device::changed).
     pub fn image_mut(&mut self) -> &mut [u8] {
         &mut self.core.image
+    }
+
+    /// Lets the application show its state in the image. To be followed by [`changed`](Device::changed) where that can be
+    /// mapped.
+    pub fn show(&mut self, show: impl FnOnce(&A, &mut [u8])) {
+        show(&self.core.application, &mut self.core.image);
     }
 
     /// The application.

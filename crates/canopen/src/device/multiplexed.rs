@@ -1,11 +1,12 @@
 //! Multiplexed PDOs in the device: which objects the producer watches, and where a received one goes.
 
-use super::{Application, Core};
+use super::{Application, Core, TPDOS};
 use crate::dictionary::{Entry, Mapping};
 use crate::emcy::Fault;
-use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Tpdo, Watched};
+use crate::pdo::{Address, Addressing, Layout, Mpdo, ScannerSettings, Watched};
 use crate::sdo::Multiplexer;
 use crate::{Instant, NodeId};
+use heapless::Vec;
 
 /// Object scanner list (CiA 301, 7.5.2.44): which objects are sent in source address mode.
 const SCANNER_LIST: u16 = 0x1FA0;
@@ -28,16 +29,14 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.scanner = scanner;
     }
 
-    /// All that can be sent and that no TPDO carries.
+    /// All that can be sent and that is mapped into no TPDO. One that is switched off counts too: who does not want its
+    /// content sent does not want it in another way.
     fn not_mapped(&self) -> impl Iterator<Item = Watched> {
+        let layouts: Vec<Layout, TPDOS> = self.tpdo_layouts().take(TPDOS).collect();
+        let is_mapped = move |entry: &Entry| layouts.iter().any(|layout| layout.contains(entry.field));
         let entries = self.dictionary.entries().iter();
-        let free = entries.filter(|entry| is_sendable(entry) && !self.is_in_a_tpdo(entry));
+        let free = entries.filter(move |entry| is_sendable(entry) && !is_mapped(entry));
         free.map(|entry| Watched::new(multiplexer(entry), entry.field))
-    }
-
-    fn is_in_a_tpdo(&self, entry: &Entry) -> bool {
-        let mut layouts = self.tpdos.iter().filter_map(Tpdo::settings).map(|settings| &settings.layout);
-        layouts.any(|layout| layout.contains(entry.field))
     }
 
     /// What the scanner list names: blocks of sub-indexes of one object.

@@ -1,6 +1,6 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
-use super::{Application, Core, Part, STALE};
+use super::{Application, Core, Job, Part, STALE};
 use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
@@ -10,7 +10,7 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
     const BLOCK_UPLOAD: bool = !A::SERVICES_ONLY;
 
     fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
+        let entry = self.entry(at)?;
         if !entry.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
@@ -58,8 +58,17 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
-    fn writable_entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+    /// The entry, or the one that it is another name of.
+    fn entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
+        match entry.rule {
+            Rule::EventTimerOf(number) => self.dictionary.find(0x1800 | u16::from(number), 5),
+            _ => Ok(entry),
+        }
+    }
+
+    fn writable_entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+        let entry = self.entry(at)?;
         if entry.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
     }
 
@@ -89,6 +98,11 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.dictionary.find(index, sub).map_or(absent, |entry| self.word(entry.field))
     }
 
+    /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.
+    pub(super) fn default_number(&self, entry: &Entry) -> u32 {
+        self.dictionary.default_number(entry, self.node_id)
+    }
+
     fn word(&self, field: Field) -> u32 {
         little_endian(field.get(&self.image))
     }
@@ -104,9 +118,11 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
             Rule::Store | Rule::Restore => self.admit_store(entry, value),
+            Rule::StoreCalibration => self.admit_store_calibration(value),
+            Rule::Setting => self.begin_deferred(Job::Set(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
-            Rule::PdoCobId => self.admit_pdo_cob_id(entry, value),
+            Rule::PdoCobId | Rule::PdoPredefined => self.admit_pdo_cob_id(entry, value),
             Rule::PdoType => self.admit_pdo_type(entry, value),
             Rule::PdoInhibit | Rule::PdoSyncStart if self.pdo_is_valid(entry) => Err(Abort::InvalidValue),
             Rule::PdoCount => self.admit_pdo_count(entry, value),
@@ -117,7 +133,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// What follows from a new value.
     fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
-        self.pending.parameters |= entry.group == Group::Application;
+        self.pending.parameters |= matches!(entry.group, Group::Application | Group::Calibration);
         match entry.rule {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
@@ -131,13 +147,18 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::EmcyCobId => self.emcy.configure(value),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine => self.configure_pdos(now),
-            Rule::PdoCobId | Rule::PdoType | Rule::PdoInhibit | Rule::PdoEventTimer | Rule::PdoSyncStart => {
-                self.configure_pdo(entry, now);
-            }
+            Rule::PdoCobId
+            | Rule::PdoPredefined
+            | Rule::PdoType
+            | Rule::PdoInhibit
+            | Rule::PdoEventTimer
+            | Rule::PdoSyncStart => self.configure_pdo(entry, now),
             _ => (),
         }
-        self.pending.identifiers |=
-            matches!(entry.rule, Rule::SyncCobId | Rule::PdoCobId | Rule::HeartbeatWatch);
+        self.pending.identifiers |= matches!(
+            entry.rule,
+            Rule::SyncCobId | Rule::PdoCobId | Rule::PdoPredefined | Rule::HeartbeatWatch
+        );
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 }

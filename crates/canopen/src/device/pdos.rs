@@ -4,7 +4,7 @@
 //! entries, count, COB-ID valid.
 
 use super::{Application, Core};
-use crate::dictionary::Entry;
+use crate::dictionary::{Dictionary, Entry, Rule};
 use crate::pdo::{
     Addressing, Content, Direction, Layout, MappedObject, RpdoSettings, ScannerSettings, Settings,
     Transmission, locate,
@@ -13,10 +13,13 @@ use crate::sdo::Abort;
 use crate::{CobId, Duration, Instant};
 
 /// A PDO by the index of one of its objects.
+///
+/// A dictionary places its PDOs at any of the 512 numbers. In the device they have the first places, in the order of
+/// their numbers ([`Core::place`]).
 #[derive(Clone, Copy, Debug)]
 struct Pdo {
     direction: Direction,
-    /// From 0.
+    /// From 0 to 511.
     number: u16,
 }
 
@@ -33,38 +36,52 @@ impl Pdo {
     fn mapping(self) -> u16 {
         self.number | if self.direction == Direction::Transmit { 0x1A00 } else { 0x1600 }
     }
+
+    /// Those that a dictionary has, one way: each has a COB-ID.
+    fn all(dictionary: &Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
+        let first = Pdo { direction, number: 0 };
+        let objects = dictionary.between(first.communication(), first.mapping());
+        objects.iter().filter(|entry| entry.sub() == 1).map(Pdo::of)
+    }
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
     /// Gives every PDO its settings.
     pub(super) fn configure_pdos(&mut self, now: Instant) {
-        for number in (0..).take(self.tpdos.len()) {
-            self.apply(Pdo { direction: Direction::Transmit, number }, now);
-        }
-        for number in (0..).take(self.rpdos.len()) {
-            self.apply(Pdo { direction: Direction::Receive, number }, now);
+        for direction in [Direction::Transmit, Direction::Receive] {
+            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
+                self.apply(pdo, place, now);
+            }
         }
         self.configure_scanner(self.scanner_settings());
     }
 
     /// Gives the PDO to which the entry belongs its settings.
     pub(super) fn configure_pdo(&mut self, entry: &Entry, now: Instant) {
-        self.apply(Pdo::of(entry), now);
+        let pdo = Pdo::of(entry);
+        if let Some(place) = self.place(pdo) {
+            self.apply(pdo, place, now);
+        }
         self.configure_scanner(self.scanner_settings());
     }
 
-    fn apply(&mut self, pdo: Pdo, now: Instant) {
-        let [number, _] = pdo.number.to_le_bytes();
+    /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
+    fn place(&self, pdo: Pdo) -> Option<u8> {
+        let mut ranked = (0..).zip(Pdo::all(self.dictionary, pdo.direction));
+        ranked.find(|(_, other)| other.number == pdo.number).map(|(place, _)| place)
+    }
+
+    fn apply(&mut self, pdo: Pdo, place: u8, now: Instant) {
         match pdo.direction {
-            Direction::Transmit => self.configure_tpdo(pdo, number),
-            Direction::Receive => self.configure_rpdo(pdo, number, now),
+            Direction::Transmit => self.configure_tpdo(pdo, place),
+            Direction::Receive => self.configure_rpdo(pdo, place, now),
         }
     }
 
-    fn configure_tpdo(&mut self, pdo: Pdo, number: u8) {
+    fn configure_tpdo(&mut self, pdo: Pdo, place: u8) {
         let settings = self.tpdo_settings(pdo);
-        self.valid_tpdos.set(number, settings.is_some());
-        if let Some(tpdo) = self.tpdos.get_mut(usize::from(pdo.number)) {
+        self.valid_tpdos.set(place, settings.is_some());
+        if let Some(tpdo) = self.tpdos.get_mut(usize::from(place)) {
             tpdo.configure(settings);
             if self.state.has_pdos() {
                 tpdo.start();
@@ -72,13 +89,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    fn configure_rpdo(&mut self, pdo: Pdo, number: u8, now: Instant) {
+    fn configure_rpdo(&mut self, pdo: Pdo, place: u8, now: Instant) {
         let settings = self.rpdo_settings(pdo);
-        self.valid_rpdos.set(number, settings.is_some());
-        if let Some(rpdo) = self.rpdos.get_mut(usize::from(pdo.number)) {
+        self.valid_rpdos.set(place, settings.is_some());
+        if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
             rpdo.configure(settings);
         }
-        self.forget_rpdo_faults(number, now);
+        self.forget_rpdo_faults(place, now);
     }
 
     fn tpdo_settings(&self, pdo: Pdo) -> Option<Settings> {
@@ -100,17 +117,14 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Whether every mapping names objects that can be mapped. A stored one may be of an older dictionary.
     pub(super) fn mappings_are_sound(&self) -> bool {
-        let numbers = (0..).take(self.tpdos.len());
-        let pdos = numbers.flat_map(|number| {
-            [Direction::Transmit, Direction::Receive].map(|direction| Pdo { direction, number })
-        });
-        pdos.into_iter().all(|pdo| self.content(pdo).is_some())
+        let directions = [Direction::Transmit, Direction::Receive].into_iter();
+        let mut pdos = directions.flat_map(|direction| Pdo::all(self.dictionary, direction));
+        pdos.all(|pdo| self.content(pdo).is_some())
     }
 
     /// The one multiplexed TPDO that there can be (CiA 301, 7.2.2.6): the first that is valid.
     fn scanner_settings(&self) -> Option<ScannerSettings> {
-        let numbers = (0..).take(self.tpdos.len());
-        numbers.map(|number| Pdo { direction: Direction::Transmit, number }).find_map(|pdo| {
+        Pdo::all(self.dictionary, Direction::Transmit).find_map(|pdo| {
             let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
             let parameter = |sub| self.number(pdo.communication(), sub);
             let settings = Settings::new(self.cob_id_value(pdo), low_byte(parameter(2)))?;
@@ -127,6 +141,14 @@ impl<A: Application, const N: usize> Core<A, N> {
             Some(addressing) => Some(Content::Multiplexed(addressing)),
             None => self.layout(pdo, count).ok().map(Content::Objects),
         }
+    }
+
+    /// What is mapped into each TPDO, whether it is valid or not.
+    pub(super) fn tpdo_layouts(&self) -> impl Iterator<Item = Layout> {
+        Pdo::all(self.dictionary, Direction::Transmit).filter_map(|pdo| match self.content(pdo)? {
+            Content::Objects(layout) => Some(layout),
+            Content::Multiplexed(_) => None,
+        })
     }
 
     fn is_multiplexed(&self, pdo: Pdo) -> bool {
@@ -162,15 +184,22 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// The CAN-ID changes only while the PDO does not exist; to exist, it needs a CAN-ID that is free for PDOs, a
     /// mapping, and remote frames if its type lives on them. A multiplexed PDO is sent by event.
+    ///
+    /// A CAN-ID that a profile has pre-defined never changes, and is free for this PDO whatever CiA 301 says of it.
     pub(super) fn admit_pdo_cob_id(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let pdo = Pdo::of(entry);
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
+        let is_predefined = entry.rule == Rule::PdoPredefined;
+        if is_predefined && CobId::parse(self.default_number(entry)).is_none_or(|own| own.id != new.id) {
+            return Err(Abort::InvalidValue);
+        }
         let moves = self.cob_id(pdo).is_some_and(|old| !old.bit31 && old.id != new.id);
         let transmission = Transmission::parse(low_byte(self.number(entry.index(), 2)));
         let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
         let is_empty = self.number(pdo.mapping(), 0) == 0;
         let is_not_sent = self.is_multiplexed(pdo) && transmission != Some(Transmission::Event);
-        let cannot_exist = moves || contradicts || is_empty || is_not_sent || new.id.is_restricted();
+        let is_taken = !is_predefined && new.id.is_restricted();
+        let cannot_exist = moves || contradicts || is_empty || is_not_sent || is_taken;
         if !new.bit31 && cannot_exist { Err(Abort::InvalidValue) } else { Ok(()) }
     }
 

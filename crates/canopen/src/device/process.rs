@@ -48,6 +48,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// The application has updated values in the image: sends what a change triggers.
     pub fn changed(&mut self, now: Instant, out: &mut impl Transmit) {
         let out = &mut self.gate(out);
+        self.start_by_itself(now, out);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
             self.core.each_tpdo(|tpdo, image| tpdo.on_change(image, now, out));
             self.core.scanner.on_change(&self.core.image, now, out);

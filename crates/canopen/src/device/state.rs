@@ -42,6 +42,8 @@ pub(super) struct Pending {
     reset_untold: bool,
     pub(super) identifiers: bool,
     pub(super) parameters: bool,
+    /// The state to which the first values lead, where 1F80h asks for it: no PDO carries what nobody has measured.
+    with_values: Option<State>,
     /// Of LSS or of program control.
     pub(super) request: Option<Action>,
 }
@@ -53,14 +55,16 @@ impl Pending {
             reset_untold: false,
             identifiers: false,
             parameters: false,
+            with_values: None,
             request: None,
         }
     }
 }
 
 impl<A: Application, const N: usize> Device<A, N> {
-    /// Initialises what the last reset covers (at first everything), boots up, and starts by itself if 1F80h says so. A
-    /// node-ID that LSS has configured is taken now; without one, the device waits for LSS.
+    /// Initialises what the last reset covers (at first everything) and boots up; if 1F80h says so, the device starts by
+    /// itself with the next [`changed`](Device::changed). A node-ID that LSS has configured is taken now; without one, the
+    /// device waits for LSS.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) {
         self.forget_transfer();
         self.lss.reset();
@@ -72,10 +76,17 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         self.core.configure(now);
         self.core.enter(State::PreOperational);
+        let starts = self.core.number(0x1F80, 0) == SELF_START;
+        self.core.pending.with_values = starts.then_some(State::Operational);
         self.poll_services(now, out);
-        if self.core.number(0x1F80, 0) == SELF_START && self.core.emcy.register() == 0 {
-            self.core.enter(State::Operational);
-            self.poll_process(now, out);
+    }
+
+    /// There are values now. A device with an error, or one that its master has already told a state, does not start.
+    pub(super) fn start_by_itself(&mut self, now: Instant, out: &mut impl Transmit) {
+        let Some(state) = self.core.pending.with_values.take() else { return };
+        if self.core.emcy.register() == 0 {
+            self.core.enter(state);
+            self.send_process(now, out);
         }
     }
 
@@ -103,6 +114,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     pub(super) fn command(&mut self, command: Command) {
+        self.core.pending.with_values = None;
         match command {
             Command::Start => self.core.enter(State::Operational),
             Command::Stop => self.core.enter(State::Stopped),
@@ -194,6 +206,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.load_stored(Group::Communication);
         if everything {
             self.load_stored(Group::Application);
+            self.load_stored(Group::Calibration);
         }
         self.application.initialise(&mut self.image);
         self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };

@@ -1,4 +1,4 @@
-//! What the memory has to do with: objects 1010h, 1011h and 1F51h, the configuration of LSS, and what a start finds stored.
+//! What the memory has to do with: objects 1010h, 1011h and 1F51h, settings, the configuration of LSS, and what a start finds stored.
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
@@ -21,12 +21,14 @@ const RESET_PROGRAM: u32 = 2;
 /// Storage groups, by the sub-index of 1010h or 1011h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Selection {
-    /// Sub-index 1.
+    /// Sub-index 1: communication and application.
     All,
     /// Sub-index 2.
     Communication,
     /// Sub-index 3.
     Application,
+    /// None of 1010h: what [`Rule::StoreCalibration`] stores.
+    Calibration,
 }
 
 impl Selection {
@@ -43,9 +45,10 @@ impl Selection {
     #[must_use]
     pub fn contains(self, group: Group) -> bool {
         match self {
-            Selection::All => group != Group::Volatile,
+            Selection::All => matches!(group, Group::Communication | Group::Application),
             Selection::Communication => group == Group::Communication,
             Selection::Application => group == Group::Application,
+            Selection::Calibration => group == Group::Calibration,
         }
     }
 }
@@ -59,6 +62,8 @@ pub enum Job {
     Restore(Selection),
     /// Store node-ID and bit rate.
     Configure(Configuration),
+    /// Store the value of the entry with [`Rule::Setting`].
+    Set(u8),
 }
 
 /// What is stored of a group.
@@ -151,6 +156,17 @@ impl<A: Application, const N: usize> Core<A, N> {
             (Rule::Restore, LOAD) => Job::Restore(selection),
             _ => return Err(Abort::NotStored),
         };
+        self.begin_deferred(job)
+    }
+
+    /// The same for the calibration. There is no way back to the defaults: they are those of no device.
+    pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
+        let job = Job::Save(Selection::Calibration);
+        if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
+    }
+
+    /// Begins a job for whose end the answer to the client waits.
+    pub(super) fn begin_deferred(&mut self, job: Job) -> Result<(), Abort> {
         self.jobs.begin(job)?;
         self.jobs.is_deferred = true;
         Ok(())
@@ -186,8 +202,11 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Says on the bus what could not be loaded.
     pub(super) fn report_stored(&mut self, now: Instant) {
-        let faults =
-            [(Group::Communication, Fault::CommunicationData), (Group::Application, Fault::ApplicationData)];
+        let faults = [
+            (Group::Communication, Fault::CommunicationData),
+            (Group::Application, Fault::ApplicationData),
+            (Group::Calibration, Fault::CalibrationData),
+        ];
         for (group, fault) in faults {
             if self.unsound.get(group) { self.raise(fault, now) } else { self.clear(fault, now) }
         }
@@ -199,6 +218,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 pub(super) struct Unsound {
     communication: bool,
     application: bool,
+    calibration: bool,
 }
 
 impl Unsound {
@@ -206,6 +226,7 @@ impl Unsound {
         match group {
             Group::Communication => self.communication = is_unsound,
             Group::Application => self.application = is_unsound,
+            Group::Calibration => self.calibration = is_unsound,
             Group::Volatile => (),
         }
     }
@@ -214,6 +235,7 @@ impl Unsound {
         match group {
             Group::Communication => self.communication,
             Group::Application => self.application,
+            Group::Calibration => self.calibration,
             Group::Volatile => false,
         }
     }

@@ -1,6 +1,8 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::{Access, DefaultValue, Entry, Field, Group, Mapping, Object, Rule, Type};
+use crate::device::{RPDOS, TPDOS};
+use crate::pdo::WATCHED;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -109,22 +111,47 @@ const fn default_byte(value: DefaultValue, i: usize) -> u8 {
 }
 
 /// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
-/// are others, attributes that fit together.
+/// are others, attributes that fit together, no more PDOs than a device has room for.
 ///
 /// # Panics
 /// During compilation, when a row is wrong.
 pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    let mut i = 0;
+    assert!(pdos(rows, 0x1400) <= RPDOS, "more RPDOs than a device has");
+    assert!(pdos(rows, 0x1800) <= TPDOS, "more TPDOs than a device has");
+    let (mut i, mut sent) = (0, 0);
     while i < rows.len() {
         check_row(&rows[i]);
+        sent += matches!(rows[i].mapping, Mapping::Tpdo) as usize;
         if i > 0 {
             assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
         }
         let has_sub_0 = rows[i].sub == 0 || (i > 0 && rows[i - 1].index == rows[i].index);
         assert!(has_sub_0, "an object has no sub-index 0");
+        if let Rule::EventTimerOf(number) = rows[i].rule {
+            assert!(has(rows, (0x1800 | number as u32) << 8 | 5), "there is no such event timer");
+        }
         i += 1;
     }
+    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
+}
+
+/// PDOs with communication objects among the 512 indexes from `first` on.
+const fn pdos(rows: &[Object], first: u16) -> usize {
+    let (mut total, mut i) = (0, 0);
+    while i < rows.len() {
+        let is_one = rows[i].index & 0xFE00 == first && rows[i].sub == 1;
+        (total, i) = (total + is_one as usize, i + 1);
+    }
+    total
+}
+
+const fn has(rows: &[Object], key: u32) -> bool {
+    let mut i = 0;
+    while i < rows.len() && rows[i].key() != key {
+        i += 1;
+    }
+    i < rows.len()
 }
 
 const fn check_row(row: &Object) {
@@ -161,6 +188,13 @@ const fn check_row(row: &Object) {
     // An RPDO writes without a check, so what it writes must have none: any value of an integer type.
     let takes_any = matches!(row.rule, Rule::Plain) && row.limits.is_none() && row.kind.range().is_some();
     assert!(!rpdo || (row.access.is_writable() && takes_any), "an RPDO writes what takes any value");
+    let is_byte = matches!(row.kind, Type::Unsigned8);
+    assert!(!matches!(row.rule, Rule::Setting) || is_byte, "a setting is a number of eight bits");
+    let is_time = matches!(row.kind, Type::Unsigned16) && matches!(row.group, Group::Volatile);
+    assert!(
+        !matches!(row.rule, Rule::EventTimerOf(_)) || is_time,
+        "an event timer is saved under its own index"
+    );
     let listed = matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
     assert!(!listed || row.index == 0x1003, "the error list is object 1003h");
 }

@@ -1,6 +1,7 @@
 //! The dictionary at run time: entries without text, found by binary search.
 
 use super::{Access, Field, Group, Mapping, Rule, Type};
+use crate::NodeId;
 use crate::sdo::Abort;
 
 /// One entry as the node needs it.
@@ -104,6 +105,18 @@ impl Dictionary {
     #[must_use]
     pub const fn defaults(&self) -> &'static [u8] {
         self.defaults
+    }
+
+    /// The entries of the indexes from `first` up to the one before `end`.
+    pub(crate) fn between(&self, first: u16, end: u16) -> &'static [Entry] {
+        let place = |index| self.entries.partition_point(|entry| entry.index() < index);
+        self.entries.get(place(first)..place(end)).unwrap_or(&[])
+    }
+
+    /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.
+    pub(crate) fn default_number(&self, entry: &Entry, node_id: Option<NodeId>) -> u32 {
+        let node_id = node_id.filter(|_| entry.node_relative).map_or(0, NodeId::get);
+        little_endian(entry.field.get(self.defaults)).wrapping_add(node_id.into())
     }
 
     /// The entry of an index and a sub-index.

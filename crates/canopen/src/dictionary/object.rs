@@ -49,6 +49,8 @@ pub enum Group {
     Communication,
     /// Application parameters, sub-index 3.
     Application,
+    /// Calibration, saved by [`Rule::StoreCalibration`]: 1010h and 1011h do not touch it.
+    Calibration,
 }
 
 /// The value after a reset with nothing saved.
@@ -101,6 +103,9 @@ pub enum Rule {
     StartUp,
     /// 1400h.., 1800h..:1, COB-ID of a PDO.
     PdoCobId,
+    /// The same of a PDO to which a profile has given its CAN-ID: only the flags change. The profile may have chosen a
+    /// CAN-ID that CiA 301 restricts, as CiA 417 does with 180h.
+    PdoPredefined,
     /// 1400h.., 1800h..:2, transmission type.
     PdoType,
     /// 1800h..:3, inhibit time.
@@ -109,12 +114,18 @@ pub enum Rule {
     PdoEventTimer,
     /// 1800h..:6, SYNC start value.
     PdoSyncStart,
+    /// Another name of 1800h..:5, the event timer of this TPDO, from 0: the cyclic timer of a device profile.
+    EventTimerOf(u8),
     /// 1600h.., 1A00h..:0, number of mapped objects.
     PdoCount,
     /// 1600h.., 1A00h..:1 and up, a mapped object.
     PdoSlot,
     /// 1FA0h:1 and up, a line of the object scanner list.
     ScannerLine,
+    /// Stores the calibration, as 1010h does the other parameters.
+    StoreCalibration,
+    /// A setting that is stored at once: a write is answered when it is, and the application then shows it.
+    Setting,
     /// The application decides, by this number.
     Application(u8),
 }
@@ -122,12 +133,15 @@ pub enum Rule {
 impl Rule {
     /// Whether what is written is a command: the value that is read stays.
     pub(crate) const fn is_command(self) -> bool {
-        matches!(self, Rule::Store | Rule::Restore | Rule::ProgramControl)
+        matches!(
+            self,
+            Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::ProgramControl | Rule::Setting
+        )
     }
 
     /// Whether the value lives elsewhere and takes no place in the image.
     pub(crate) const fn is_computed(self) -> bool {
-        matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
+        matches!(self, Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_))
     }
 }
 

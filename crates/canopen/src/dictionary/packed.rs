@@ -110,8 +110,7 @@ impl Dictionary {
     }
 
     fn follows_node_id(&self, entry: &Entry, node_id: Option<NodeId>, image: &[u8]) -> bool {
-        let default = entry.field.u32(self.defaults()).wrapping_add(node_id.map_or(0, NodeId::get).into());
-        entry.node_relative && entry.field.u32(image) == default
+        entry.node_relative && entry.field.u32(image) == self.default_number(entry, node_id)
     }
 }
 

@@ -15,6 +15,14 @@ pub enum Fault {
     TemperatureRail,
     /// The pressure input is at a rail of the converter.
     PressureRail,
+    /// An encoder does not answer, or not as one.
+    EncoderBreak,
+    /// The encoders take too much current.
+    InputCurrent,
+    /// The supply of the encoders is out of its limits.
+    InputVoltage,
+    /// A memory of the hardware is damaged.
+    HardwareMemory,
     /// A module did not initialise.
     ModuleInitialisation,
     /// The image does not fit the hardware.
@@ -29,6 +37,8 @@ pub enum Fault {
     CommunicationData,
     /// Application parameters could not be loaded.
     ApplicationData,
+    /// The calibration could not be loaded.
+    CalibrationData,
     /// A received frame was lost.
     Overrun,
     /// The CAN controller is error passive.
@@ -43,26 +53,30 @@ pub enum Fault {
     MpdoNotTaken,
     /// The heartbeat of a node is missing: entry of 1016h, from 0.
     Heartbeat(u8),
-    /// An RPDO, from 0, was shorter than its mapping and is not processed.
+    /// An RPDO, counted from 0 among those of the dictionary, was shorter than its mapping and is not processed.
     RpdoTooShort(u8),
-    /// An RPDO, from 0, was longer than its mapping.
+    /// An RPDO, counted the same way, was longer than its mapping.
     RpdoTooLong(u8),
-    /// An RPDO, from 0, did not come in time.
+    /// An RPDO, counted the same way, did not come in time.
     RpdoDeadline(u8),
 }
 
 /// The first bit of communication faults in a set of faults.
-const COMMUNICATION: u8 = 16;
+const COMMUNICATION: u8 = 20;
 
 impl Fault {
     /// Those that exist once.
-    const SINGLE: [Fault; 19] = [
+    const SINGLE: [Fault; 24] = [
         Fault::SensorClock,
         Fault::SensorBoot,
         Fault::SensorBreak,
         Fault::SensorMemory,
         Fault::TemperatureRail,
         Fault::PressureRail,
+        Fault::EncoderBreak,
+        Fault::InputCurrent,
+        Fault::InputVoltage,
+        Fault::HardwareMemory,
         Fault::ModuleInitialisation,
         Fault::HardwareIdentification,
         Fault::ParameterStore,
@@ -70,6 +84,7 @@ impl Fault {
         Fault::BootData,
         Fault::CommunicationData,
         Fault::ApplicationData,
+        Fault::CalibrationData,
         Fault::Overrun,
         Fault::ErrorPassive,
         Fault::BusOffRecovered,
@@ -78,7 +93,8 @@ impl Fault {
         Fault::MpdoNotTaken,
     ];
 
-    fn all() -> impl Iterator<Item = Fault> {
+    /// Every fault that there is.
+    pub fn all() -> impl Iterator<Item = Fault> {
         Fault::SINGLE
             .into_iter()
             .chain((0..4).map(Fault::Heartbeat))
@@ -87,8 +103,8 @@ impl Fault {
             .chain((0..8).map(Fault::RpdoDeadline))
     }
 
-    /// Its bit in a set of faults, and its emergency error code: CiA 301, table 26, and the codes of the classes 50xxh,
-    /// 61xxh, 63xxh and 80xxh that are the manufacturer's.
+    /// Its bit in a set of faults, and its emergency error code: CiA 301, table 26, CiA 406, 5.1, and the codes of the
+    /// classes 50xxh, 61xxh, 63xxh and 80xxh that are the manufacturer's.
     const fn definition(self) -> (u8, u16) {
         match self {
             Fault::ModuleInitialisation => (0, 0x5001),
@@ -104,6 +120,11 @@ impl Fault {
             Fault::ApplicationData => (10, 0x6303),
             Fault::TemperatureRail => (11, 0x8001),
             Fault::PressureRail => (12, 0x8002),
+            Fault::EncoderBreak => (13, 0x5006),
+            Fault::InputCurrent => (14, 0x2110),
+            Fault::InputVoltage => (15, 0x3110),
+            Fault::HardwareMemory => (16, 0x5100),
+            Fault::CalibrationData => (17, 0x6300),
             Fault::Overrun => (COMMUNICATION, 0x8110),
             Fault::ErrorPassive => (COMMUNICATION + 1, 0x8120),
             Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),
@@ -123,7 +144,8 @@ impl Fault {
         self.definition().1
     }
 
-    /// Manufacturer-specific error field: which one, from 1, of those that exist several times.
+    /// Manufacturer-specific error field: which one, from 1, of those that exist several times; 1 for the encoder's
+    /// sensor, whose code is that of the pressure sensor.
     #[must_use]
     pub const fn detail(self) -> [u8; 5] {
         match self {
@@ -131,6 +153,7 @@ impl Fault {
             | Fault::RpdoTooShort(number)
             | Fault::RpdoTooLong(number)
             | Fault::RpdoDeadline(number) => [number.saturating_add(1), 0, 0, 0, 0],
+            Fault::EncoderBreak => [1, 0, 0, 0, 0],
             _ => [0; 5],
         }
     }
@@ -162,12 +185,19 @@ impl FaultSet {
     }
 
     pub(crate) fn iter(self) -> impl Iterator<Item = Fault> {
-        Fault::all().filter(move |fault| self.0 & 1 << fault.definition().0 != 0)
+        Fault::all().filter(move |fault| self.contains(*fault))
     }
 
-    /// The error register (1001h): the generic bit for any fault, the communication bit for those of communication.
+    /// The error register (1001h): bit 0 for any fault, bits 1 and 2 for current and voltage, bit 4 for communication.
     pub(crate) fn register(self) -> u8 {
-        u8::from(self.0 != 0) | u8::from(self.0 >> COMMUNICATION != 0) << 4
+        u8::from(self.0 != 0)
+            | u8::from(self.contains(Fault::InputCurrent)) << 1
+            | u8::from(self.contains(Fault::InputVoltage)) << 2
+            | u8::from(self.0 >> COMMUNICATION != 0) << 4
+    }
+
+    fn contains(self, fault: Fault) -> bool {
+        self.0 & 1 << fault.definition().0 != 0
     }
 }
 

@@ -12,7 +12,7 @@ pub use mapping::MappedObject;
 pub(crate) use mapping::{Content, Direction, Layout, locate};
 pub use multiplexed::{Address, Addressing, Mpdo};
 pub(crate) use rpdo::{Reception, Rpdo, RpdoSettings};
-pub(crate) use scanner::{Scanner, ScannerSettings, Watched};
+pub(crate) use scanner::{Scanner, ScannerSettings, WATCHED, Watched};
 pub(crate) use set::PdoSet;
 pub(crate) use tpdo::{Settings, Tpdo};
 pub use transmission::Transmission;

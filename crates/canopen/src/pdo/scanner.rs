@@ -11,8 +11,8 @@ use crate::transmit::RETRY;
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
-/// Objects that it can watch: one bit each.
-pub(crate) const WATCHED: usize = 32;
+/// Objects that it can watch, one bit each: all that a dictionary can send (`dictionary::check`).
+pub(crate) const WATCHED: usize = 48;
 
 /// What the dictionary says about the PDO.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +62,7 @@ pub(crate) struct Scanner {
     settings: Option<ScannerSettings>,
     watched: Vec<Watched, WATCHED>,
     /// Which of them are to be sent, a bit each.
-    pending: u32,
+    pending: u64,
     event_due: Instant,
     inhibited_until: Instant,
 }
@@ -96,7 +96,7 @@ impl Scanner {
     pub(crate) fn start(&mut self) {
         self.stop();
         if self.settings.is_some() {
-            self.pending = u32::MAX;
+            self.pending = u64::MAX;
         }
     }
 
@@ -126,7 +126,7 @@ impl Scanner {
         let Some(settings) = &self.settings else { return };
         let elapsed = now >= self.event_due;
         if elapsed {
-            self.pending = u32::MAX;
+            self.pending = u64::MAX;
         }
         if self.pending != 0 && !settings.event.is_zero() && (elapsed || self.event_due == Instant::NEVER) {
             self.event_due = now + settings.event;
@@ -153,6 +153,6 @@ impl Scanner {
     }
 }
 
-fn bit(number: u32) -> u32 {
-    1_u32.checked_shl(number).unwrap_or(0)
+fn bit(number: u32) -> u64 {
+    1_u64.checked_shl(number).unwrap_or(0)
 }

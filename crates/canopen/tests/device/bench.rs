@@ -88,6 +88,7 @@ const ROWS: &[Object] = &[
     parameter(0x1FD0, 0, Type::Unsigned8).limits(0, 2),
     parameter(0x1FD0, 1, Type::Unsigned64),
     parameter(0x1FD0, 2, Type::Unsigned64),
+    Object::new(0x5F00, 0, "", Type::Unsigned8, Access::ReadWrite).limits(0, 2).rule(Rule::Setting),
     Object::highest(0x6000, 3, ""),
     value(0x6000, 1, Type::Integer32),
     value(0x6000, 2, Type::Integer16),
@@ -97,6 +98,9 @@ const ROWS: &[Object] = &[
     Object::new(0x6102, 0, "", Type::Unsigned32, Access::WriteOnly).rule(Rule::Application(7)),
     Object::new(0x6103, 0, "", Type::VisibleString(20), Access::ReadWrite).saved(Group::Application),
     Object::new(0x6104, 0, "", Type::Domain, Access::ReadWrite).rule(Rule::Application(8)),
+    Object::new(0x6105, 0, "", Type::Unsigned16, Access::ReadWrite).rule(Rule::EventTimerOf(0)),
+    Object::new(0x6106, 0, "", Type::Real32, Access::ReadWrite).saved(Group::Calibration),
+    Object::new(0x6107, 0, "", Type::Unsigned32, Access::ReadWrite).value(1).rule(Rule::StoreCalibration),
     Object::new(0x6200, 0, "", Type::Unsigned16, Access::ReadWrite).mappable(Mapping::Rpdo),
 ];
 
@@ -120,8 +124,8 @@ pub(crate) struct Numbers {
     pub(crate) start_up: u8,
     pub(crate) domain: Vec<u8>,
     pub(crate) downloads: usize,
-    /// What is stored, communication and application.
-    pub(crate) stored: [Vec<u8>; 2],
+    /// What is stored: communication, application, calibration.
+    pub(crate) stored: [Vec<u8>; 3],
     pub(crate) is_damaged: bool,
     /// What the device said of the groups that it loaded.
     pub(crate) loaded: Vec<(Group, bool)>,
@@ -138,8 +142,13 @@ impl Application for Numbers {
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {
-        let [communication, application] = &self.stored;
-        let packed = if group == Group::Communication { communication } else { application };
+        let [communication, application, calibration] = &self.stored;
+        let packed: &[u8] = match group {
+            Group::Communication => communication,
+            Group::Application => application,
+            Group::Calibration => calibration,
+            Group::Volatile => &[],
+        };
         Stored { packed, is_sound: !self.is_damaged }
     }
 

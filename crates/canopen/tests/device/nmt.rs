@@ -130,12 +130,27 @@ fn start_up_takes_pre_operational_and_self_start_only() {
 }
 
 #[test]
-fn a_node_that_starts_by_itself_boots_up_first() {
+fn a_node_that_starts_by_itself_boots_up_first_and_waits_for_values() {
     let mut bench = Bench::unstarted();
     bench.device.application_mut().start_up = 8;
     bench.start();
+    assert_eq!(bench.device.state(), State::PreOperational);
+    assert_eq!(bench.sent(), [(0x705, vec![0])]);
+    bench.set_value(1, &[1, 2, 3, 4]);
     assert_eq!(bench.device.state(), State::Operational);
-    assert_eq!(bench.sent(), [(0x705, vec![0]), (0x185, vec![0; 4])]);
+    assert_eq!(bench.sent(), [(0x185, vec![1, 2, 3, 4])]);
+}
+
+#[test]
+fn a_master_that_was_faster_has_the_last_word() {
+    for (command, state) in [(STOP, State::Stopped), (PRE_OPERATIONAL, State::PreOperational)] {
+        let mut bench = Bench::unstarted();
+        bench.device.application_mut().start_up = 8;
+        bench.start();
+        bench.nmt(command);
+        bench.set_value(1, &[1, 2, 3, 4]);
+        assert_eq!(bench.device.state(), state);
+    }
 }
 
 #[test]
@@ -144,6 +159,7 @@ fn a_node_with_an_error_does_not_start_by_itself() {
     bench.device.application_mut().start_up = 8;
     bench.device.raise(Fault::UnexpectedReset, bench.now);
     bench.start();
+    bench.set_value(1, &[1, 2, 3, 4]);
     assert_eq!(bench.device.state(), State::PreOperational);
     assert_eq!(bench.sent(), [(0x705, vec![0]), (0x085, vec![0x01, 0x61, 1, 0, 0, 0, 0, 0])]);
 }

@@ -67,6 +67,29 @@ fn the_sub_index_says_what_is_stored_and_restored() {
 }
 
 #[test]
+fn the_calibration_is_stored_by_its_own_command() {
+    let mut bench = Bench::booted();
+    let value = 2.5_f32.to_le_bytes();
+    bench.write(0x6106, 0, &value).unwrap();
+    assert_eq!(begin(&mut bench, 0x6107, 0, SAVE), Job::Save(Selection::Calibration));
+    bench.device.application_mut().stored[2] = packed(&bench, Group::Calibration);
+    finish(&mut bench, Ok(()));
+    assert_eq!(bench.write(0x6107, 0, &LOAD), Err(0x0800_0020));
+    assert_eq!(bench.read(0x6107, 0), Ok(vec![1, 0, 0, 0]));
+    reset(&mut bench, RESET_NODE);
+    assert_eq!(bench.read(0x6106, 0), Ok(value.to_vec()));
+}
+
+#[test]
+fn the_other_commands_leave_the_calibration_alone() {
+    for selection in [Selection::All, Selection::Communication, Selection::Application] {
+        assert!(!selection.contains(Group::Calibration));
+    }
+    assert!(Selection::Calibration.contains(Group::Calibration));
+    assert!(!Selection::Calibration.contains(Group::Application));
+}
+
+#[test]
 fn a_wrong_signature_stores_nothing() {
     let mut bench = Bench::booted();
     bench.device.take_action();
@@ -200,7 +223,7 @@ fn a_memory_that_fell_back_to_older_values_is_reported() {
     bench.start();
     let codes: Vec<_> =
         bench.sent().into_iter().filter(|(id, _)| *id == 0x085).map(|(_, d)| d[..2].to_vec()).collect();
-    assert_eq!(codes, [0x6302_u16.to_le_bytes(), 0x6303_u16.to_le_bytes()]);
+    assert_eq!(codes, [0x6302_u16, 0x6303, 0x6300].map(u16::to_le_bytes));
 }
 
 #[test]
@@ -212,4 +235,17 @@ fn the_size_of_a_packed_group_is_known() {
         let packed = packed(&bench, group);
         assert_eq!(packed.len() + relative, canopen::dictionary::packed_size(&rows, group));
     }
+}
+
+#[test]
+fn a_setting_is_stored_at_once_and_shown_by_the_application() {
+    let mut bench = Bench::booted();
+    bench.device.take_action();
+    assert_eq!(bench.write(0x5F00, 0, &[3]), Err(0x0609_0031));
+    assert_eq!(bench.device.take_action(), None);
+    assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "the response waits");
+    assert_eq!(bench.device.take_action(), Some(Action::Store(Job::Set(2))));
+    assert_eq!(bench.read(0x5F00, 0), Ok(vec![0]), "it is not stored yet");
+    assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "asked again");
+    assert_eq!(finish(&mut bench, Ok(())), [0x60, 0, 0x5F, 0, 0, 0, 0, 0]);
 }

@@ -205,3 +205,14 @@ fn an_event_timer_changed_in_operational_starts_over() {
     bench.take();
     assert_eq!(bench.times_of(TPDO, Duration::from_millis(45)), [20_000, 40_000]);
 }
+
+#[test]
+fn the_event_timer_has_a_second_name() {
+    let mut bench = bench(255, 0, 100);
+    assert_eq!(bench.read(0x6105, 0), Ok(vec![100, 0]));
+    bench.take();
+    bench.write(0x6105, 0, &[20, 0]).unwrap();
+    assert_eq!(bench.read(0x1800, 5), Ok(vec![20, 0]));
+    assert_eq!(bench.times_of(TPDO, Duration::from_millis(45)), [0, 20_000, 40_000]);
+    assert_eq!(bench.write(0x6105, 0, &[1, 2, 3]), Err(0x0607_0012));
+}

@@ -44,7 +44,7 @@ const fn commands(sub: u8, name: &'static str) -> Object {
     Object::new(0x210A, sub, name, Type::Unsigned8, Access::ReadOnly)
 }
 
-pub(super) const OBJECTS: &[Object] = &[
+pub(crate) const SENSORS: &[Object] = &[
     Object::highest(0x2100, 2, "Sensor type"),
     sensor_type(1, "Sensor type channel 1", 1, 5),
     // 0: there is no second sensor.

@@ -1,55 +1,60 @@
-//! The encoder: its part of a dictionary, and how measured values and parameters come in and out of it.
+//! The encoder: its dictionary, and how measured values and parameters come in and out of it.
 //!
 //! The objects of the device profile (CiA 406, 6000h to 67FFh) and those of the manufacturer that it needs (21xxh).
 
 mod manufacturer;
+mod pdos;
 mod profile;
 mod rules;
+mod sensors;
 mod values;
 
-pub use rules::CYCLIC_TIMER;
-pub use values::Fields;
+pub(crate) use manufacturer::SENSORS;
+pub(crate) use pdos::{BY_EVENT, BY_SYNC};
+pub(crate) use rules::FIRST as FIRST_RULE;
+pub(crate) use sensors::Sensors;
+pub(crate) use values::{Fields, device_type};
 
+use crate::manufacturer::{TRANSFER_BUFFER, personality};
+use crate::personality::Definition;
+use crate::{Personality, communication};
 use canopen::dictionary::{self, Dictionary, Entry, Object};
-use canopen::sdo::Abort;
-use profiles::encoder::{Parameters, Snapshot};
 
 /// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 
-const PARTS: &[&[Object]] = &[manufacturer::OBJECTS, &PROFILE];
-static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
-const ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
-const DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
+/// The type of the encoder that the parameters describe by default.
+pub(crate) const DEFAULT_TYPE: u8 = 5;
+
+/// The device profile.
+pub(crate) static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
+
+const PARTS: &[&[Object]] = &[
+    &[communication::device_type(device_type(DEFAULT_TYPE) as i64), communication::ERROR_REGISTER],
+    communication::ERRORS_AND_SYNC,
+    &[communication::device_name("STM32F4 encoder")],
+    communication::SERVICES,
+    &communication::RPDOS,
+    communication::tpdos(&pdos::TPDOS).as_flattened(),
+    communication::tpdo_mappings(&pdos::TPDOS).as_flattened(),
+    communication::START_UP,
+    &[personality(Personality::Encoder)],
+    SENSORS,
+    &[TRANSFER_BUFFER],
+    &PROFILE,
+];
+static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
+static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
 const _: () = dictionary::check(&OBJECTS);
 
 /// Bytes of the image of all values.
-pub const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
+pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-/// The dictionary as the node runs it.
-pub const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static FIELDS: Fields = Fields::new(&DICTIONARY, 0x1000);
 
-/// Where the values of [`DICTIONARY`] are. Another dictionary that has the encoder's objects has its own.
-pub static FIELDS: Fields = Fields::new(&DICTIONARY);
-
-/// Takes a snapshot into the image.
-pub fn publish(snapshot: &Snapshot, image: &mut [u8]) {
-    FIELDS.publish(snapshot, image);
-}
-
-/// The parameters in the image.
-#[must_use]
-pub fn parameters(image: &[u8]) -> Parameters {
-    FIELDS.parameters(image)
-}
-
-/// Decides on a write to an object with one of the encoder's rules.
-///
-/// # Errors
-/// The reason to refuse it.
-pub fn write(rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-    FIELDS.write(rule, entry, bytes, image)
-}
+pub(crate) static DEFINITION: Definition =
+    Definition { dictionary: &DICTIONARY, flags: None, pressure: None, encoder: Some(&FIELDS) };
 
 #[cfg(test)]
 mod tests;

@@ -74,10 +74,10 @@ const POSITION: [Object; 3] = values(
 const SPEED: [Object; 3] =
     values(0x6030, ["Speed values", "Speed value channel 1", "Speed value channel 2"], Type::Integer16);
 
-/// Not saved here: 1800h:5 is the same value, and is saved.
+/// Hard-wired to 1800h:5, and saved as that.
 const TIMER: &[Object] = &[Object::new(0x6200, 0, "Cyclic timer", Type::Unsigned16, Access::ReadWrite)
     .unit("ms")
-    .rule(Rule::Application(rules::CYCLIC_TIMER))];
+    .rule(Rule::EventTimerOf(0))];
 
 const CAM_STATE: [Object; 3] =
     values(0x6300, ["Cam states", "Cam states channel 1", "Cam states channel 2"], Type::Unsigned8);

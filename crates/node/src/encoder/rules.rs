@@ -5,6 +5,8 @@ use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
 use profiles::encoder::{COMMISSIONING, ChannelParameters, Parameters, SCALING, SENSOR_HELD};
 
+/// The lowest number of them.
+pub(crate) const FIRST: u8 = OPERATING;
 /// 6000h.
 pub(super) const OPERATING: u8 = 0x20;
 /// 6001h.
@@ -15,24 +17,19 @@ pub(super) const RANGE: u8 = 0x22;
 pub(super) const PRESET: u8 = 0x23;
 /// 6005h:1.
 pub(super) const STEP: u8 = 0x24;
-/// 6200h takes any value; that it is 1800h:5 too is the affair of whoever has both.
-pub const CYCLIC_TIMER: u8 = 0x25;
 /// 2100h to 2103h.
-pub(super) const SENSOR: u8 = 0x26;
+pub(super) const SENSOR: u8 = 0x25;
 /// 2107h.
-pub(super) const FACTORY: u8 = 0x27;
+pub(super) const FACTORY: u8 = 0x26;
 /// 2109h.
-pub(super) const ACKNOWLEDGE: u8 = 0x28;
+pub(super) const ACKNOWLEDGE: u8 = 0x27;
 
 /// What 2108h takes to open 2107h: "fact".
 const FACTORY_SIGNATURE: [u8; 4] = *b"fact";
 
 impl Fields {
     /// Decides on a write to an object with one of the rules above.
-    ///
-    /// # Errors
-    /// The reason to refuse it.
-    pub fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    pub(crate) fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let mut word = [0; 4];
         word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
         let value = u32::from_le_bytes(word);
@@ -73,7 +70,7 @@ impl Fields {
         let field = entry.field();
         let before = Saved::of(field, image);
         field.set(image, bytes);
-        let result = allow(self.format(image).is_some() && self.parameters(image).is_consistent());
+        let result = allow(self.sensors.has_format(image) && self.parameters(image).is_consistent());
         field.set(image, before.bytes());
         result
     }

@@ -2,7 +2,8 @@ extern crate std;
 use std::vec::Vec;
 
 use canopen::dictionary::{Access, Group, Rule};
-use profiles::encoder::{ALARM_POSITION, Encoder, Frame, RawEncoder, SENSOR_NO_SIGNAL};
+use canopen::sdo::Abort;
+use profiles::encoder::{ALARM_POSITION, Encoder, Frame, Parameters, RawEncoder, SENSOR_NO_SIGNAL};
 
 use super::*;
 
@@ -16,14 +17,14 @@ struct Node {
 impl Node {
     fn new() -> Node {
         let mut node = Node { image: DEFAULTS, encoder: Encoder::default(), raw: RawEncoder::default() };
-        node.encoder.apply(&parameters(&node.image));
+        node.encoder.apply(&FIELDS.parameters(&node.image));
         node.sample();
         node
     }
 
     fn sample(&mut self) {
         let snapshot = self.encoder.sample(&self.raw);
-        publish(&snapshot, &mut self.image);
+        FIELDS.publish(&snapshot, &mut self.image);
     }
 
     fn turn_to(&mut self, counter: u16) {
@@ -34,7 +35,7 @@ impl Node {
     /// As the device does it: the rule, then the bytes; the parameters arrive before the next sample.
     fn write(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
         self.write_late(index, sub, value)?;
-        self.encoder.apply(&parameters(&self.image));
+        self.encoder.apply(&FIELDS.parameters(&self.image));
         Ok(())
     }
 
@@ -44,7 +45,7 @@ impl Node {
         let bytes = &value.to_le_bytes()[..size];
         let row = OBJECTS.iter().find(|row| (row.index, row.sub) == (index, sub)).unwrap();
         if let Rule::Application(rule) = row.rule {
-            write(rule, entry, bytes, &mut self.image)?;
+            FIELDS.write(rule, entry, bytes, &mut self.image)?;
         }
         entry.field().set(&mut self.image, bytes);
         Ok(())
@@ -58,17 +59,19 @@ impl Node {
 
 #[test]
 fn the_defaults_of_the_table_are_those_of_the_measurement() {
-    assert_eq!(parameters(&DEFAULTS), Parameters::default());
+    assert_eq!(FIELDS.parameters(&DEFAULTS), Parameters::default());
+}
+
+/// The objects of the encoder itself.
+fn own() -> impl Iterator<Item = &'static Object> {
+    SENSORS.iter().chain(&PROFILE)
 }
 
 #[test]
 fn every_parameter_is_saved_and_nothing_else() {
     // The cyclic timer is saved as 1800h:5.
-    let parameters = OBJECTS.iter().filter(|row| row.access == Access::ReadWrite && row.index != 0x6200);
-    assert!(parameters.into_iter().all(|row| row.group == Group::Application));
-    let others: Vec<u16> = OBJECTS
-        .iter()
-        .filter(|row| row.access == Access::ReadWrite && row.group != Group::Application)
+    let others: Vec<u16> = own()
+        .filter(|row| (row.access == Access::ReadWrite) != (row.group == Group::Application))
         .map(|row| row.index)
         .collect();
     assert_eq!(others, [0x6200]);
@@ -83,11 +86,11 @@ fn every_parameter_changes_what_the_measurement_gets() {
         (0x6005, 1) => 20_000,
         _ => 5,
     };
-    for row in OBJECTS.iter().filter(|row| row.group == Group::Application) {
+    for row in own().filter(|row| row.group == Group::Application) {
         let mut node = Node::new();
         node.write(0x2108, 0, i64::from(u32::from_le_bytes(*b"fact"))).unwrap();
         node.write(0x2100, 2, 7).unwrap();
-        let before = parameters(&node.image);
+        let before = FIELDS.parameters(&node.image);
         let value = match row.limits {
             Some((low, high)) => i64::clamp(special(row.index, row.sub), low, high),
             None => special(row.index, row.sub),
@@ -97,7 +100,7 @@ fn every_parameter_changes_what_the_measurement_gets() {
         } else {
             node.write(row.index, row.sub, value).unwrap();
         }
-        assert_ne!(parameters(&node.image), before, "{:X}h:{}", row.index, row.sub);
+        assert_ne!(FIELDS.parameters(&node.image), before, "{:X}h:{}", row.index, row.sub);
     }
 }
 
@@ -112,7 +115,7 @@ fn a_preset_is_read_at_once_and_stays() {
         assert_eq!((node.read(0x6004, 0), node.read(0x6020, 1)), (77, 77));
         node.sample();
         assert_eq!((node.read(0x6004, 0), node.read(0x6020, 1)), (77, 77));
-        node.encoder.apply(&parameters(&node.image));
+        node.encoder.apply(&FIELDS.parameters(&node.image));
         node.sample();
         let offset = (77_i32 - 1000).cast_unsigned();
         assert_eq!((node.read(0x6004, 0), node.read(0x6509, 0), node.read(0x650C, 1)), (77, offset, offset));
@@ -249,7 +252,7 @@ fn a_reset_of_the_dictionary_repeats_no_command() {
     node.sample();
     node.image = DEFAULTS;
     node.sample();
-    node.encoder.apply(&parameters(&node.image));
+    node.encoder.apply(&FIELDS.parameters(&node.image));
     node.turn_to(1001);
     assert_eq!(node.read(0x6004, 0), 78);
     node.write(0x6003, 0, 5).unwrap();
@@ -260,11 +263,11 @@ fn a_reset_of_the_dictionary_repeats_no_command() {
 #[test]
 fn the_type_follows_the_sensors() {
     let mut node = Node::new();
-    assert_eq!(parameters(&node.image).encoder_type(), 5);
+    assert_eq!(FIELDS.parameters(&node.image).encoder_type(), 5);
     node.write(0x2100, 1, 8).unwrap();
-    assert_eq!(parameters(&node.image).encoder_type(), 8);
+    assert_eq!(FIELDS.parameters(&node.image).encoder_type(), 8);
     node.write(0x2100, 2, 5).unwrap();
-    assert_eq!(parameters(&node.image).encoder_type(), 10);
+    assert_eq!(FIELDS.parameters(&node.image).encoder_type(), 10);
 }
 
 #[test]

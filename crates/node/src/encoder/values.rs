@@ -1,15 +1,31 @@
 //! Measured values into the image, parameters out of it.
 
-use core::num::{NonZeroU16, NonZeroU32};
-
+use super::Sensors;
 use canopen::dictionary::{Dictionary, Field};
 use profiles::encoder::{
-    Area, Cam, Cams, ChannelParameters, ChannelValues, Coding, Command, Format, Limits, Module, Parameters,
-    Parity, SensorType, Snapshot,
+    Area, Cam, Cams, ChannelParameters, ChannelValues, Command, Module, Parameters, Snapshot,
 };
 
+/// 6004h and 6020h:1 as they are mapped.
+pub(super) const POSITION: u32 = 0x6004_0020;
+const FIRST_POSITION: u32 = 0x6020_0120;
+
+/// Type of an encoder with several sensors.
+const MULTI_SENSOR: u8 = 10;
+
+/// CiA 406.
+const PROFILE_NUMBER: u32 = 0x196;
+
+/// The device type: the type of the encoder and the number of the profile.
+pub(crate) const fn device_type(encoder_type: u8) -> u32 {
+    (encoder_type as u32) << 16 | PROFILE_NUMBER
+}
+
 /// Where the encoder's values are in the image of a dictionary that has its objects.
-pub struct Fields {
+pub(crate) struct Fields {
+    device_type: Field,
+    mappings: [Field; 2],
+    pub(super) sensors: Sensors,
     pub(super) channels: [Channel; 2],
     /// The preset, the position and the offset of the first channel, where there is no sub-index.
     pub(super) preset: Field,
@@ -23,10 +39,6 @@ pub struct Fields {
     range: Field,
     step: Field,
     speed_step: Field,
-    format: [Field; 5],
-    index: Field,
-    limits: [Field; 4],
-    operating_time_limit: Field,
     module: [Field; 3],
     identification: [Field; 3],
     operating_status: Field,
@@ -40,14 +52,10 @@ pub struct Fields {
 
 /// Where the values of one channel are.
 pub(super) struct Channel {
-    pub(super) kind: Field,
     pub(super) preset: Field,
     pub(super) presets: Field,
     pub(super) position: Field,
     pub(super) sensor_state: Field,
-    resolution: Field,
-    counted: Field,
-    fastest: Field,
     speed: Field,
     cam_state: Field,
     cam_enable: Field,
@@ -81,14 +89,10 @@ impl CamFields {
 impl Channel {
     const fn new(d: &Dictionary, sub: u8) -> Channel {
         Channel {
-            kind: d.field(0x2100, sub),
             preset: d.field(0x6010, sub),
             presets: d.field(0x210A, sub),
             position: d.field(0x6020, sub),
             sensor_state: d.field(0x210B, sub),
-            resolution: d.field(0x2101, sub),
-            counted: d.field(0x2102, sub),
-            fastest: d.field(0x2104, sub),
             speed: d.field(0x6030, sub),
             cam_state: d.field(0x6300, sub),
             cam_enable: d.field(0x6301, sub),
@@ -123,13 +127,9 @@ impl Channel {
         }
     }
 
-    fn parameters(&self, image: &[u8]) -> ChannelParameters {
+    fn parameters(&self, sensor: ChannelParameters, image: &[u8]) -> ChannelParameters {
         let [low, high] = self.area.map(|at| i32::from_le_bytes(at.load(image)));
         ChannelParameters {
-            kind: SensorType::from_code(self.kind.u8(image)),
-            resolution: NonZeroU32::new(self.resolution.u32(image)).unwrap_or(NonZeroU32::MIN),
-            counted: NonZeroU16::new(self.counted.u16(image)).unwrap_or(NonZeroU16::MIN),
-            fastest: self.fastest.u32(image),
             preset: Command { value: self.preset.u32(image), count: self.presets.u8(image) },
             cams: Cams {
                 cams: self.cams.each_ref().map(|cam| cam.cam(image)),
@@ -137,18 +137,18 @@ impl Channel {
                 polarity: self.cam_polarity.u8(image),
             },
             area: Area { low, high },
+            ..sensor
         }
     }
 }
 
 impl Fields {
-    /// Looks them up.
-    ///
-    /// # Panics
-    /// During compilation, when the dictionary does not have them all.
-    #[must_use]
-    pub const fn new(d: &Dictionary) -> Fields {
+    /// Looks them up, during compilation; the index of the device type is 1000h or 67FFh.
+    pub(crate) const fn new(d: &Dictionary, device_type: u16) -> Fields {
         Fields {
+            device_type: d.field(device_type, 0),
+            mappings: [d.field(0x1A00, 1), d.field(0x1A01, 1)],
+            sensors: Sensors::new(d),
             channels: [Channel::new(d, 1), Channel::new(d, 2)],
             preset: d.field(0x6003, 0),
             position: d.field(0x6004, 0),
@@ -161,16 +161,6 @@ impl Fields {
             range: d.field(0x6002, 0),
             step: d.field(0x6005, 1),
             speed_step: d.field(0x6005, 2),
-            format: [
-                d.field(0x2103, 1),
-                d.field(0x2103, 2),
-                d.field(0x2103, 3),
-                d.field(0x2103, 4),
-                d.field(0x2103, 5),
-            ],
-            index: d.field(0x2105, 0),
-            limits: [d.field(0x2106, 1), d.field(0x2106, 2), d.field(0x2106, 3), d.field(0x2106, 4)],
-            operating_time_limit: d.field(0x2106, 5),
             module: [d.field(0x2107, 1), d.field(0x2107, 2), d.field(0x2107, 3)],
             identification: [d.field(0x650A, 1), d.field(0x650A, 2), d.field(0x650A, 3)],
             operating_status: d.field(0x6500, 0),
@@ -183,13 +173,28 @@ impl Fields {
         }
     }
 
-    /// Fills in the serial number (650Bh, hard-wired to 1018h:4), which no table can know.
-    pub fn set_serial_number(&self, serial_number: u32, image: &mut [u8]) {
+    /// Fills in what no table can know: the serial number (650Bh, hard-wired to 1018h:4), and what follows from the
+    /// sensors that there are.
+    pub(crate) fn initialise(&self, serial_number: u32, image: &mut [u8]) {
         self.serial_number.store(image, serial_number.to_le_bytes());
+        let encoder_type = self.parameters(image).encoder_type();
+        self.device_type.store(image, device_type(encoder_type).to_le_bytes());
+        if encoder_type == MULTI_SENSOR {
+            self.map_first_channel(image);
+        }
+    }
+
+    /// An encoder with several sensors has 6020h:1 where another one has 6004h (CiA 406, 1A00h): the same bits.
+    fn map_first_channel(&self, image: &mut [u8]) {
+        for mapping in &self.mappings {
+            if mapping.u32(image) == POSITION {
+                mapping.store(image, FIRST_POSITION.to_le_bytes());
+            }
+        }
     }
 
     /// Takes a snapshot into the image.
-    pub fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+    pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
         for (channel, values) in self.channels.iter().zip(&snapshot.channels) {
             channel.publish(values, image);
         }
@@ -208,41 +213,21 @@ impl Fields {
     }
 
     /// The parameters in the image. A value that no write could have put there acts as the default one.
-    #[must_use]
-    pub fn parameters(&self, image: &[u8]) -> Parameters {
+    pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         let [offset, low, high] = self.module.map(|at| i32::from_le_bytes(at.load(image)));
         let mask = self.acknowledgement.u16(image).into();
+        let sensors = self.sensors.parameters(image);
+        let ([first, second], [a, b]) = (&self.channels, sensors.channels);
         Parameters {
             operating: self.operating.u16(image),
             per_revolution: self.per_revolution.u32(image),
             range: self.range.u32(image),
             step: self.step.u32(image),
             speed_step: self.speed_step.u32(image),
-            channels: self.channels.each_ref().map(|channel| channel.parameters(image)),
-            format: self.format(image).unwrap_or(Format::COMMON),
-            index: self.index.u8(image) != 0,
+            channels: [first.parameters(a, image), second.parameters(b, image)],
             module: Module { offset, low, high },
-            limits: self.limits(image),
             acknowledge: Command { value: mask, count: self.acknowledgements.u8(image) },
+            ..sensors
         }
-    }
-
-    fn limits(&self, image: &[u8]) -> Limits {
-        let [lowest_supply, highest_supply, highest_current, lowest_battery] =
-            self.limits.map(|at| at.u16(image));
-        let operating_time = self.operating_time_limit.u32(image);
-        Limits { lowest_supply, highest_supply, highest_current, lowest_battery, operating_time }
-    }
-
-    /// The frame that 2103h describes; `None` for one that cannot be.
-    pub(super) fn format(&self, image: &[u8]) -> Option<Format> {
-        let [revolutions, steps, coding, alarm, parity] = self.format.map(|at| at.u8(image));
-        let coding = if coding == 0 { Coding::Binary } else { Coding::Gray };
-        let parity = match parity {
-            0 => Parity::None,
-            1 => Parity::Even,
-            _ => Parity::Odd,
-        };
-        Format::new(revolutions, steps, coding, alarm != 0, parity)
     }
 }

@@ -1,6 +1,6 @@
-//! Manufacturer-specific objects, 2000h to 5FFFh.
+//! Manufacturer-specific objects of a pressure transmitter, 3000h and 4000h.
 
-use canopen::dictionary::{Access, Group, Mapping, Object, Rule, Type};
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
 const fn flags(sub: u8, name: &'static str) -> Object {
     Object::new(0x3000, sub, name, Type::Unsigned32, Access::ReadOnly).mappable(Mapping::Tpdo)
@@ -10,12 +10,7 @@ const fn user(sub: u8) -> Object {
     Object::new(0x4000, sub, "User word", Type::Unsigned32, Access::ReadWrite).saved(Group::Application)
 }
 
-/// The one domain there is: `Application::read_domain` has no other number to tell apart.
-const TRANSFER_BUFFER: u8 = 0;
-
-pub(super) const OBJECTS: &[Object] = &[
-    Object::new(0x2F00, 0, "Transfer buffer", Type::Domain, Access::ReadWrite)
-        .rule(Rule::Application(TRANSFER_BUFFER)),
+pub(crate) const STATUS_AND_USER: &[Object] = &[
     Object::highest(0x3000, 3, "Status flags"),
     flags(1, "Sensor status flags"),
     flags(2, "Internal protocol status flags"),

@@ -1,29 +1,53 @@
 //! The pressure transmitter: its dictionary, and how measured values and parameters come in and out of it.
 
-mod communication;
+mod calibration;
 mod manufacturer;
 mod pdos;
 mod profile;
 mod rules;
 mod values;
 
-pub(crate) use rules::write;
-pub(crate) use values::{parameters, publish};
+pub(crate) use calibration::CALIBRATION;
+pub(crate) use manufacturer::STATUS_AND_USER;
+pub(crate) use profile::{INTEGER, REAL};
+pub(crate) use values::Fields;
 
+use crate::manufacturer::{TRANSFER_BUFFER, personality};
+use crate::personality::Definition;
+use crate::{Personality, communication, flags};
 use canopen::dictionary::{self, Dictionary, Entry, Object};
+
+/// CiA 404, two analogue input blocks.
+pub(crate) const DEVICE_TYPE: i64 = 0x0002_0194;
 
 /// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 
 static PDOS: [Object; dictionary::count(pdos::PARTS)] = dictionary::gather(pdos::PARTS);
-const PARTS: &[&[Object]] =
-    &[communication::OBJECTS, &PDOS, communication::START_UP, manufacturer::OBJECTS, profile::OBJECTS];
-const ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
-const DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
+const PARTS: &[&[Object]] = &[
+    &[communication::device_type(DEVICE_TYPE), communication::ERROR_REGISTER, communication::STATUS_REGISTER],
+    communication::ERRORS_AND_SYNC,
+    &[communication::device_name("STM32F4 pressure transmitter")],
+    communication::SERVICES,
+    &PDOS,
+    communication::START_UP,
+    &[personality(Personality::Pressure)],
+    CALIBRATION,
+    &[TRANSFER_BUFFER],
+    STATUS_AND_USER,
+    REAL,
+    INTEGER,
+];
+static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
+static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
 const _: () = dictionary::check(&OBJECTS);
 
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-/// The dictionary as the node runs it.
-pub(crate) const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static FLAGS: flags::Fields = flags::Fields::new(&DICTIONARY);
+static FIELDS: Fields = Fields::new(&DICTIONARY, 0);
+
+pub(crate) static DEFINITION: Definition =
+    Definition { dictionary: &DICTIONARY, flags: Some(&FLAGS), pressure: Some(&FIELDS), encoder: None };

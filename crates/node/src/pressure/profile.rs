@@ -40,7 +40,8 @@ const fn filter_constant(sub: u8, name: &'static str) -> Object {
 /// Unit of a process value: what 6131h selects.
 const PV: &str = "6131h";
 
-pub(super) const OBJECTS: &[Object] = &[
+/// In REAL32, and what is common to all formats: 6000h to 6FFFh.
+pub(crate) const REAL: &[Object] = &[
     both(0x6100, "AI input field value"),
     measured(0x6100, 1, "Pressure field value", Type::Real32).unit("Pa"),
     measured(0x6100, 2, "Temperature field value", Type::Real32).unit("K"),
@@ -83,6 +84,10 @@ pub(super) const OBJECTS: &[Object] = &[
     both(0x61A1, "AI filter constant"),
     filter_constant(1, "Pressure filter constant"),
     filter_constant(2, "Temperature filter constant"),
+];
+
+/// In integers: 7000h to 9FFFh.
+pub(crate) const INTEGER: &[Object] = &[
     both(0x7130, "AI input process value INTEGER16"),
     measured(0x7130, 1, "Pressure process value INTEGER16", Type::Integer16).unit(PV),
     measured(0x7130, 2, "Temperature process value INTEGER16", Type::Integer16).unit(PV),

@@ -1,8 +1,8 @@
 //! Measured values into the image, parameters out of it.
 
-use super::DICTIONARY;
-use canopen::dictionary::Field;
-use profiles::pressure::{Calibration, ChannelParameters, ChannelValues, Parameters, Snapshot, Span, Unit};
+use super::calibration::Places;
+use canopen::dictionary::{Dictionary, Field};
+use profiles::pressure::{ChannelParameters, ChannelValues, Parameters, Snapshot, Span, Unit};
 
 /// Where the values of one channel are.
 pub(super) struct Channel {
@@ -23,28 +23,31 @@ pub(super) struct Channel {
     filter_constant: Field,
 }
 
-pub(super) const PRESSURE: Channel = Channel::new(1);
-pub(super) const TEMPERATURE: Channel = Channel::new(2);
+/// Where the transmitter's values are in the image of a dictionary that has its objects.
+pub(crate) struct Fields {
+    pub(super) pressure: Channel,
+    pub(super) temperature: Channel,
+    pub(super) calibration: Places,
+}
 
 impl Channel {
-    const fn new(sub: u8) -> Channel {
-        let d = DICTIONARY;
+    const fn new(d: &Dictionary, shift: u16, sub: u8) -> Channel {
         Channel {
-            field_value: d.field(0x6100, sub),
-            process_value: d.field(0x6130, sub),
-            process_value16: d.field(0x7130, sub),
-            process_value32: d.field(0x9130, sub),
-            status: d.field(0x6150, sub),
-            offset: d.field(0x6124, sub),
-            scaling_factor: d.field(0x6126, sub),
-            scaling_offset: d.field(0x6127, sub),
-            unit: d.field(0x6131, sub),
-            digits: d.field(0x6132, sub),
-            span: Span { start: d.field(0x6148, sub), end: d.field(0x6149, sub) },
-            span16: Span { start: d.field(0x7148, sub), end: d.field(0x7149, sub) },
-            span32: Span { start: d.field(0x9148, sub), end: d.field(0x9149, sub) },
-            filter_type: d.field(0x61A0, sub),
-            filter_constant: d.field(0x61A1, sub),
+            field_value: d.field(0x6100 + shift, sub),
+            process_value: d.field(0x6130 + shift, sub),
+            process_value16: d.field(0x7130 + shift, sub),
+            process_value32: d.field(0x9130 + shift, sub),
+            status: d.field(0x6150 + shift, sub),
+            offset: d.field(0x6124 + shift, sub),
+            scaling_factor: d.field(0x6126 + shift, sub),
+            scaling_offset: d.field(0x6127 + shift, sub),
+            unit: d.field(0x6131 + shift, sub),
+            digits: d.field(0x6132 + shift, sub),
+            span: Span { start: d.field(0x6148 + shift, sub), end: d.field(0x6149 + shift, sub) },
+            span16: Span { start: d.field(0x7148 + shift, sub), end: d.field(0x7149 + shift, sub) },
+            span32: Span { start: d.field(0x9148 + shift, sub), end: d.field(0x9149 + shift, sub) },
+            filter_type: d.field(0x61A0 + shift, sub),
+            filter_constant: d.field(0x61A1 + shift, sub),
         }
     }
 
@@ -76,19 +79,30 @@ impl Channel {
     }
 }
 
-/// Takes a snapshot into the image.
-pub(crate) fn publish(snapshot: &Snapshot, image: &mut [u8]) {
-    PRESSURE.publish(&snapshot.pressure, image);
-    TEMPERATURE.publish(&snapshot.temperature, image);
-}
+impl Fields {
+    /// Looks them up, during compilation; every object of the profile has its index plus `shift`.
+    pub(crate) const fn new(d: &Dictionary, shift: u16) -> Fields {
+        Fields {
+            pressure: Channel::new(d, shift, 1),
+            temperature: Channel::new(d, shift, 2),
+            calibration: Places::new(d),
+        }
+    }
 
-/// The parameters in the image. A unit that no write could have put there acts as the default one.
-pub(crate) fn parameters(image: &[u8]) -> Parameters {
-    let pressure = Unit::pressure(PRESSURE.unit.u32(image)).unwrap_or(Unit::BAR);
-    let temperature = Unit::temperature(TEMPERATURE.unit.u32(image)).unwrap_or(Unit::CELSIUS);
-    Parameters {
-        pressure: PRESSURE.parameters(pressure, image),
-        temperature: TEMPERATURE.parameters(temperature, image),
-        calibration: Calibration::default(),
+    /// Takes a snapshot into the image.
+    pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+        self.pressure.publish(&snapshot.pressure, image);
+        self.temperature.publish(&snapshot.temperature, image);
+    }
+
+    /// The parameters in the image. A unit that no write could have put there acts as the default one.
+    pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
+        let pressure = Unit::pressure(self.pressure.unit.u32(image)).unwrap_or(Unit::BAR);
+        let temperature = Unit::temperature(self.temperature.unit.u32(image)).unwrap_or(Unit::CELSIUS);
+        Parameters {
+            pressure: self.pressure.parameters(pressure, image),
+            temperature: self.temperature.parameters(temperature, image),
+            calibration: self.calibration.calibration(image),
+        }
     }
 }

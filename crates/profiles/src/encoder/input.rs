@@ -1,5 +1,7 @@
 //! From what the hardware has read to the movement of one sensor.
 
+use core::num::NonZeroU32;
+
 use super::{Fault, Frame, Scale, Sensor, Tracker};
 
 /// Sensor state: the encoder does not answer.
@@ -189,7 +191,7 @@ impl Input {
         let error = if self.sensor.kind.is_linear() {
             index.total()
         } else {
-            nearest(&index, self.sensor.resolution.get())
+            nearest(&index, self.sensor.resolution)
         };
         let is_first = !core::mem::replace(&mut self.referenced, true);
         let is_wrong = error.unsigned_abs() > INDEX_TOLERANCE;
@@ -200,10 +202,11 @@ impl Input {
     }
 }
 
-/// Steps to the nearest zero of a turn.
-fn nearest(tracker: &Tracker, turn: u32) -> i64 {
-    let step = i64::from(tracker.shaft().step);
-    if step > i64::from(turn / 2) { step - i64::from(turn) } else { step }
+/// Steps to the nearest zero of a revolution.
+fn nearest(tracker: &Tracker, revolution: NonZeroU32) -> i64 {
+    let revolution = i64::from(revolution.get());
+    let step = tracker.total().checked_rem_euclid(revolution).unwrap_or(0);
+    if step > revolution / 2 { step - revolution } else { step }
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

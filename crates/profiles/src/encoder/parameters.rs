@@ -54,6 +54,9 @@ pub struct Parameters {
     pub step: u32,
     /// Speed measuring step of a linear encoder in 0.01 mm/s (6005h:2).
     pub speed_step: u32,
+    /// What a revolution of a shaft is in um of a way that is measured: then every sensor counts in `step` and
+    /// `speed_step` as a linear one does, over all that it tells apart. `None` outside of lifts.
+    pub travel: Option<NonZeroU32>,
     /// Sub-indexes 1 and 2 of the objects with channels.
     pub channels: [ChannelParameters; 2],
     /// Frame of the SSI input.
@@ -94,6 +97,7 @@ impl Default for Parameters {
             range: 4096 * 4096,
             step: 10_000,
             speed_step: 100,
+            travel: None,
             channels: [first, ChannelParameters::default()],
             format: Format::COMMON,
             index: true,
@@ -163,12 +167,21 @@ impl Parameters {
     #[must_use]
     #[allow(clippy::cast_precision_loss)] // 24 bits are more than the 15 of the result.
     pub fn speed_factor(&self, sensor: &Sensor) -> f32 {
-        if sensor.kind.is_linear() {
+        if let Some(nanometres) = self.way(sensor) {
             // A step of 6005h:2 is 0.01 mm/s: 10 000 nm/s.
-            return sensor.resolution.get() as f32 / (10_000.0 * self.speed_step.max(1) as f32);
+            return nanometres / (10_000.0 * self.speed_step.max(1) as f32);
         }
         let scale = self.scale(sensor);
         scale.units() as f32 / scale.turn().get() as f32
+    }
+
+    /// The way of a native step in nm; `None` for the angle of a shaft.
+    #[allow(clippy::cast_precision_loss)]
+    fn way(&self, sensor: &Sensor) -> Option<f32> {
+        if sensor.kind.is_linear() {
+            return Some(sensor.resolution.get() as f32);
+        }
+        self.travel.map(|travel| travel.get() as f32 * 1000.0 / sensor.resolution() as f32)
     }
 
     /// Object 6500h: the parameters as they are active. Bit 1 says that there is a commissioning diagnostic.
@@ -189,6 +202,9 @@ impl Parameters {
     }
 
     fn asked_scale(&self, sensor: &Sensor) -> Option<Scale> {
+        if let Some(travel) = self.travel {
+            return Scale::along(&sensor.native(), travel, NonZeroU32::new(self.step)?);
+        }
         let settings = Settings {
             reversed: self.is_reversed(sensor),
             scaling: self.operating & SCALING != 0,

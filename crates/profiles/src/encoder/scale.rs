@@ -107,9 +107,27 @@ impl Scale {
         let range = NonZeroU64::new(settings.range.into()).filter(|_| gives)?;
         let (units, turn) = match *native {
             Native::Rotary { per_revolution, .. } => (settings.per_revolution, per_revolution),
-            Native::Linear { step, .. } => rod(step, NonZeroU32::new(settings.step)?),
+            Native::Linear { step, .. } => way(step.into(), NonZeroU32::new(settings.step)?.into())?,
         };
         Some(Scale::build(units, turn, range, settings.reversed))
+    }
+
+    /// The scale of a way in units of `step` nm, as long as the sensor tells it apart. A shaft goes `travel` um in a
+    /// revolution, for which nothing is rounded however long the way gets. `None` where the sensor does not resolve the
+    /// step, or where the ratio of both needs more than 32 bits.
+    #[must_use]
+    pub fn along(native: &Native, travel: NonZeroU32, step: NonZeroU32) -> Option<Scale> {
+        let (nanometres, steps) = match *native {
+            Native::Rotary { per_revolution, .. } => (u64::from(travel.get()) * 1000, per_revolution),
+            Native::Linear { step, .. } => (step.get().into(), NonZeroU32::MIN),
+        };
+        // Both factors are below 2^32.
+        let unit = NonZeroU64::from(steps).saturating_mul(step.into());
+        let (units, turn) =
+            way(NonZeroU64::new(nanometres)?, unit).filter(|(units, turn)| *units <= turn.get())?;
+        // A product that saturates is longer than any range: a turn has less than 2^32 steps.
+        let range = native.steps().get().saturating_mul(units.into()) / NonZeroU64::from(turn);
+        Some(Scale::build(units, turn, NonZeroU64::new(range)?.min(MOST), false))
     }
 
     /// The sensor's own steps.
@@ -227,17 +245,19 @@ impl Scale {
     }
 }
 
-/// Units and steps in the turn of a rod: their ratio in lowest terms, times as much as fits.
-fn rod(native: NonZeroU32, step: NonZeroU32) -> (u32, NonZeroU32) {
-    let common = common_divisor(native, step);
-    let (units, turn) = (native.get() / common, step.get() / common);
-    let times = (LONG_TURN.get().checked_div(turn)).unwrap_or(1).max(1);
-    (units.saturating_mul(times), NonZeroU32::new(turn.saturating_mul(times)).unwrap_or(NonZeroU32::MIN))
+/// Units and steps in the turn of a way: the ratio of a step to a unit in lowest terms, times as much as fits. `None`
+/// where even the lowest terms do not.
+fn way(step: NonZeroU64, unit: NonZeroU64) -> Option<(u32, NonZeroU32)> {
+    let common = common_divisor(step, unit);
+    let units = u32::try_from(step.get() / common).ok()?;
+    let turn = NonZeroU32::new(u32::try_from(unit.get() / common).ok()?)?;
+    let times = (LONG_TURN.get() / turn).max(1);
+    Some((units.saturating_mul(times), turn.saturating_mul(NonZeroU32::new(times)?)))
 }
 
-fn common_divisor(a: NonZeroU32, b: NonZeroU32) -> NonZeroU32 {
+fn common_divisor(a: NonZeroU64, b: NonZeroU64) -> NonZeroU64 {
     let (mut a, mut b) = (a, b.get());
-    while let Some(divisor) = NonZeroU32::new(b) {
+    while let Some(divisor) = NonZeroU64::new(b) {
         (a, b) = (divisor, a.get() % divisor);
     }
     a

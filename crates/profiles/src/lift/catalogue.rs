@@ -1,7 +1,21 @@
 //! The PDOs that CiA 417-3-1 pre-defines for lift 1, as data.
 //!
 //! A TPDO of one device is an RPDO of the same number in another, so one entry describes both sides. Where the
-//! printed tables contradict each other the entry follows the reading given in a comment beside it.
+//! printed tables contradict each other the entry follows the reading given in a comment beside it. These hold for all:
+//!
+//! * TPDOs have sub-indexes up to 6 (up to 5 for number 2), RPDOs up to 5, though sub-index 0 of most RPDOs is printed
+//!   as up to 6: an RPDO has no SYNC start value and no row for it.
+//! * The number of mapped objects of many RPDOs is printed as 0 to n: it is n, as a default is one value.
+//! * The mapping of many RPDOs is printed as mandatory: it exists where the communication parameter does, as with the
+//!   others.
+//! * The CAN-IDs lie inside the pre-defined connection set of CiA 301: 181h to 18Fh are TPDO 1 of the nodes 1 to 15, 200h
+//!   to 207h RPDO 1 of the nodes up to 7, 400h RPDO 3, 480h and 500h and up TPDO 4 and RPDO 4 of any node. A lift device
+//!   has no PDOs of that set (`docs/lift.md`).
+//! * Misprints of single characters (an ordinal, a missing h, an event timer of two digits) are not repeated.
+//! * COB-IDs of TPDOs are printed with bit 30 set or clear. Either may be; producers here set it, for remote frames are
+//!   not to be used.
+//! * Type 255: sent on entering Operational and on each change, and with an event timer when that elapses, only. CiA 301
+//!   leaves the event to the profile, so this is what `canopen` does for that type.
 
 /// One pre-defined PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +57,8 @@ pub struct Object {
     pub sub: u8,
     /// Length in bits.
     pub bits: u8,
+    /// What it is.
+    pub name: &'static str,
 }
 
 impl Object {
@@ -92,72 +108,188 @@ impl Pdo {
     }
 }
 
-/// The PDO that travels with a CAN-ID, and its producer where the identifier tells it.
+/// What a frame with a pre-defined identifier is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Definition {
+    /// The PDO.
+    pub pdo: &'static Pdo,
+    /// Node-ID of its producer, where the identifier tells it.
+    pub producer: Option<u8>,
+}
+
+/// A field of a PDO: where an object is in the frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// The object, as the producer maps it.
+    pub object: Object,
+    /// Its first bit; bit 0 is the lowest of the first byte.
+    pub start: u8,
+}
+
+impl Definition {
+    /// The fields in order; none for a multiplexed PDO, which names its object itself ([`name_of`]).
+    pub fn fields(&self) -> impl Iterator<Item = Field> {
+        let objects = match self.pdo.content {
+            Content::Objects(objects) => objects,
+            Content::Multiplexed => &[],
+        };
+        objects.iter().scan(0_u8, |next, &object| {
+            let start = *next;
+            *next = start.saturating_add(object.bits);
+            Some(Field { object, start })
+        })
+    }
+}
+
+impl Field {
+    /// The value in the data of a frame; `None` for a frame that is too short for it.
+    #[must_use]
+    pub fn value(&self, data: &[u8]) -> Option<u64> {
+        let first = usize::from(self.start / 8);
+        let bytes = data.get(first..first + usize::from(self.object.bits / 8))?;
+        Some(bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte)))
+    }
+}
+
+/// What the frames with a COB-ID are; its flags do not matter. `None` for one that is not pre-defined.
 #[must_use]
-pub fn by_can_id(id: u16) -> Option<(&'static Pdo, Option<u8>)> {
-    PDOS.iter().find_map(|pdo| match pdo.cob_id {
-        CobId::Fixed(own) => (own == id).then_some((pdo, None)),
-        CobId::PlusNode(base) => {
-            let producer = u8::try_from(id.checked_sub(base)?).ok()?;
-            (1..=127).contains(&producer).then_some((pdo, Some(producer)))
-        }
+pub fn by_cob_id(cob_id: u32) -> Option<Definition> {
+    let id = u16::try_from(cob_id & 0x3FFF_FFFF).ok()?;
+    PDOS.iter().find_map(|pdo| {
+        let producer = match pdo.cob_id {
+            CobId::Fixed(own) => (own == id).then_some(None)?,
+            CobId::PlusNode(base) => Some(producer(id.checked_sub(base)?)?),
+        };
+        Some(Definition { pdo, producer })
     })
+}
+
+fn producer(node_id: u16) -> Option<u8> {
+    u8::try_from(node_id).ok().filter(|node_id| (1..=127).contains(node_id))
+}
+
+/// The PDO of this number.
+#[must_use]
+pub const fn by_number(number: u16) -> Option<&'static Pdo> {
+    let mut rest: &[Pdo] = PDOS;
+    while let [pdo, others @ ..] = rest {
+        if pdo.number == number {
+            return Some(pdo);
+        }
+        rest = others;
+    }
+    None
+}
+
+/// What an object is that one of the PDOs carries.
+#[must_use]
+pub fn name_of(index: u16, sub: u8) -> Option<&'static str> {
+    let mapped = PDOS.iter().filter_map(|pdo| match pdo.content {
+        Content::Objects(objects) => Some(objects),
+        Content::Multiplexed => None,
+    });
+    let found = mapped.flatten().find(|object| (object.index, object.sub) == (index, sub));
+    found.map(|object| object.name)
 }
 
 const fn fixed(number: u16, name: &'static str, id: u16, objects: &'static [Object]) -> Pdo {
     Pdo { number, name, cob_id: CobId::Fixed(id), content: Content::Objects(objects) }
 }
 
-const fn object(index: u16, sub: u8, bits: u8) -> Object {
-    Object { index, sub, bits }
+const fn object(index: u16, sub: u8, bits: u8, name: &'static str) -> Object {
+    Object { index, sub, bits, name }
 }
 
+const RESERVED: Object = object(Object::RESERVED, 0, 8, "reserved");
+
 /// All of them, by number. Number 266 is left out of the profile: a gap between door control and the first door.
-pub const PDOS: [Pdo; 19] = [
-    // The index ranges are printed one too long (1480h, 1680h): 127 producers need 1401h to 147Fh.
+pub const PDOS: &[Pdo; 19] = &[
+    // The index ranges are printed one too long (to 1480h and 1680h): 127 producers need 1401h to 147Fh, and 1480h
+    // belongs to RPDO 129. There is no SYNC start value in 1801h: as printed, unlike in the other TPDOs.
     Pdo { number: 2, name: "multiplexed PDO", cob_id: CobId::PlusNode(0x500), content: Content::Multiplexed },
     // The consumer's table maps 6011h, which is the virtual output; the producer maps the input, 6010h.
     Pdo {
         number: 130,
         name: "virtual input",
         cob_id: CobId::PlusNode(0x480),
-        content: Content::Objects(&[object(0x6010, 0, 48)]),
+        content: Content::Objects(&[object(0x6010, 0, 48, "virtual input")]),
     },
-    fixed(257, "virtual output", 0x400, &[object(0x6011, 0, 48)]),
-    // The consumer's mapping is printed at 1501h, which is its own communication parameter: 1701h.
-    fixed(258, "load measuring unit", 0x188, &[object(0x6482, 1, 8), object(0x6480, 1, 16)]),
+    fixed(257, "virtual output", 0x400, &[object(0x6011, 0, 48, "virtual output")]),
+    // The consumer's mapping is printed at 1501h, which is its own communication parameter: it is at 1701h, and each of
+    // the two exists where the other does. The second entry is printed as sub-index 1 again; two are mapped, so it is 2.
+    fixed(
+        258,
+        "load measuring unit",
+        0x188,
+        &[object(0x6482, 1, 8, "load signals"), object(0x6480, 1, 16, "load")],
+    ),
     fixed(
         259,
         "car drive, velocity command",
         0x182,
-        &[object(0x6400, 0, 16), object(0x6403, 0, 8), object(Object::RESERVED, 0, 8), object(0x6430, 0, 32)],
+        &[
+            object(0x6400, 0, 16, "controlword"),
+            object(0x6403, 0, 8, "mode of operation"),
+            RESERVED,
+            object(0x6430, 0, 32, "target velocity"),
+        ],
     ),
     fixed(
         260,
         "car drive, velocity status",
         0x183,
-        &[object(0x6401, 0, 16), object(0x6404, 0, 8), object(Object::RESERVED, 0, 8), object(0x6433, 0, 32)],
+        &[
+            object(0x6401, 0, 16, "statusword"),
+            object(0x6404, 0, 8, "mode of operation display"),
+            RESERVED,
+            object(0x6433, 0, 32, "actual velocity"),
+        ],
     ),
     // 180h is a restricted identifier of CiA 301 that this profile uses all the same. The consumer's table prints
-    // 6432h where the producer has the profile velocity, 6423h.
-    fixed(261, "car drive, position command", 0x180, &[object(0x6420, 0, 32), object(0x6423, 0, 32)]),
-    fixed(262, "car drive, control effort", 0x181, &[object(0x6406, 0, 32)]),
-    fixed(263, "car position 1", 0x18C, &[object(0x6383, 1, 32)]),
-    fixed(264, "car position 2", 0x18D, &[object(0x6383, 2, 32)]),
+    // 6432h where the producer has 6423h; both call it the profile velocity.
+    fixed(
+        261,
+        "car drive, position command",
+        0x180,
+        &[object(0x6420, 0, 32, "target position"), object(0x6423, 0, 32, "profile velocity")],
+    ),
+    fixed(262, "car drive, control effort", 0x181, &[object(0x6406, 0, 32, "control effort")]),
+    fixed(263, "car position 1", 0x18C, &[object(0x6383, 1, 32, "position 1")]),
+    fixed(264, "car position 2", 0x18D, &[object(0x6383, 2, 32, "position 2")]),
     // Four doors are controlled, three report: the profile has no status PDO for the fourth. A consumer maps the
     // dummy object 0006h (UNSIGNED16) for a door it does not have.
     fixed(
         265,
         "car door control",
         0x200,
-        &[object(0x6300, 1, 16), object(0x6300, 2, 16), object(0x6300, 3, 16), object(0x6300, 4, 16)],
+        &[
+            object(0x6300, 1, 16, "door 1 controlword"),
+            object(0x6300, 2, 16, "door 2 controlword"),
+            object(0x6300, 3, 16, "door 3 controlword"),
+            object(0x6300, 4, 16, "door 4 controlword"),
+        ],
     ),
-    fixed(267, "car door 1", 0x201, &[object(0x6301, 1, 16), object(0x6302, 1, 16)]),
-    fixed(268, "light barrier 1", 0x205, &[object(0x6310, 1, 8)]),
-    fixed(269, "car door 2", 0x202, &[object(0x6301, 2, 16), object(0x6302, 2, 16)]),
-    fixed(270, "light barrier 2", 0x206, &[object(0x6310, 2, 8)]),
-    fixed(271, "car door 3", 0x203, &[object(0x6301, 3, 16), object(0x6302, 3, 16)]),
-    fixed(272, "light barrier 3", 0x207, &[object(0x6310, 3, 8)]),
-    fixed(385, "car position 3", 0x18E, &[object(0x6383, 3, 32)]),
-    fixed(386, "car position 4", 0x18F, &[object(0x6383, 4, 32)]),
+    fixed(
+        267,
+        "car door 1",
+        0x201,
+        &[object(0x6301, 1, 16, "door 1 statusword"), object(0x6302, 1, 16, "door 1 position")],
+    ),
+    fixed(268, "light barrier 1", 0x205, &[object(0x6310, 1, 8, "light barrier 1 status")]),
+    fixed(
+        269,
+        "car door 2",
+        0x202,
+        &[object(0x6301, 2, 16, "door 2 statusword"), object(0x6302, 2, 16, "door 2 position")],
+    ),
+    fixed(270, "light barrier 2", 0x206, &[object(0x6310, 2, 8, "light barrier 2 status")]),
+    fixed(
+        271,
+        "car door 3",
+        0x203,
+        &[object(0x6301, 3, 16, "door 3 statusword"), object(0x6302, 3, 16, "door 3 position")],
+    ),
+    fixed(272, "light barrier 3", 0x207, &[object(0x6310, 3, 8, "light barrier 3 status")]),
+    fixed(385, "car position 3", 0x18E, &[object(0x6383, 3, 32, "position 3")]),
+    fixed(386, "car position 4", 0x18F, &[object(0x6383, 4, 32, "position 4")]),
 ];

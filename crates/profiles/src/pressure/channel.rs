@@ -112,8 +112,12 @@ impl Channel {
     /// Processes one field value in Pa or K. `valid` is false when it does not come from an intact sensor.
     pub fn sample(&mut self, field_value: f32, valid: bool) -> ChannelValues {
         let p = &self.parameters;
+        let valid = valid && field_value.is_finite();
+        let field_value = finite(field_value);
         let scaled = self.filter.next(field_value) * p.scaling_factor + p.scaling_offset;
-        let process_value = p.unit.of(scaled) + p.offset;
+        let exact = p.unit.of(scaled) + p.offset;
+        let valid = valid && exact.is_finite();
+        let process_value = finite(exact);
         // In single precision on purpose: the nearest single to 0.29 times 100 is 29, while the same product in double
         // precision is 28.999999 and would be cut to 28.
         let shifted = process_value * self.shift;
@@ -124,6 +128,11 @@ impl Channel {
         let status = spans | if valid && fits16(shifted) { 0 } else { STATUS_INVALID };
         ChannelValues { field_value, process_value, process_value16, process_value32, status }
     }
+}
+
+/// The nearest finite number, and 0 for what is none: nothing else ever leaves the channel.
+fn finite(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(f32::MIN, f32::MAX) }
 }
 
 /// Towards zero, to the nearest limit when out of range, 0 for what is not a number: what `as` is defined to do.

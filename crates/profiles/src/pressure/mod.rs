@@ -1,21 +1,24 @@
 //! The pressure and temperature channels: CiA 404, analogue input function block.
 //!
-//! Converter readings become field values in Pa and K (6100h); a channel filters them (61A0h, 61A1h), scales them
+//! Converter readings become field values in Pa and K (6100h) by the calibration of the device; a channel filters them (61A0h, 61A1h), scales them
 //! (6126h, 6127h), converts them to the unit and prefix of 6131h, adds the offset 6124h, and gives the process value
 //! in three number formats (6130h, 7130h, 9130h) with a status (6150h).
 
+mod calibration;
 mod channel;
 mod filter;
 mod raw;
 mod sensor;
+mod thermometer;
 mod transmitter;
 mod unit;
 
+pub use calibration::{Polynomial, PressureCalibration};
 pub use channel::{
     Channel, ChannelParameters, ChannelValues, STATUS_ABOVE, STATUS_BELOW, STATUS_INVALID, Span,
 };
 pub use filter::Filter;
 pub use raw::{FactoryCalibration, RawSample};
-pub use sensor::Calibration;
-pub use transmitter::{Conditions, Parameters, Snapshot, Transmitter};
+pub use thermometer::{TemperatureCalibration, Thermistor, Thermometer};
+pub use transmitter::{Calibration, Conditions, Parameters, Snapshot, Transmitter};
 pub use unit::Unit;

@@ -11,6 +11,8 @@ pub struct RawSample {
     pub temperature: u32,
     /// Internal voltage reference.
     pub vrefint: u32,
+    /// Thermistor, with its resistor to VDDA; 0 where there is none.
+    pub thermistor: u32,
     /// Conversions in each sum, at least 1.
     pub count: u16,
     /// Words the chip's maker measured.

@@ -1,9 +1,29 @@
 //! The transmitter: sensor, pressure channel, temperature channel.
 
-use super::{Calibration, Channel, ChannelParameters, ChannelValues, RawSample, Span, Unit};
+use super::{
+    Channel, ChannelParameters, ChannelValues, PressureCalibration, RawSample, Span, TemperatureCalibration,
+    Unit,
+};
 
 /// Samples in a second: how often a sensor break is looked for (CiA 404 leaves it to the device).
 const SAMPLES_PER_SECOND: u16 = 1000;
+
+/// What is found out in production: from converter readings to Pa and K.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Calibration {
+    /// Of the transducer.
+    pub pressure: PressureCalibration,
+    /// Of the thermometer.
+    pub temperature: TemperatureCalibration,
+}
+
+impl Calibration {
+    /// Whether readings and field values belong together one to one, and rise together.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        self.pressure.is_valid() && self.temperature.is_valid()
+    }
+}
 
 /// All parameters of the transmitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +32,7 @@ pub struct Parameters {
     pub pressure: ChannelParameters,
     /// Sub-index 2 of the profile's objects.
     pub temperature: ChannelParameters,
-    /// Characteristic of the transducer.
+    /// From converter readings to field values.
     pub calibration: Calibration,
 }
 
@@ -33,7 +53,7 @@ pub struct Conditions {
     pub sensor_break: bool,
     /// The pressure input is at a rail of the converter.
     pub pressure_rail: bool,
-    /// The temperature is not measured: input at a rail, or no factory calibration.
+    /// The temperature is not measured: input at a rail, or no factory calibration for the chip's own sensor.
     pub temperature_rail: bool,
 }
 
@@ -89,17 +109,17 @@ impl Transmitter {
     pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
         let ratio = raw.ratio();
         self.check_break(ratio);
-        // A temperature that is not measured is 0 K, as for a transmitter without a temperature sensor.
-        let kelvin = raw.temperature().unwrap_or(0.0);
+        let kelvin = self.calibration.temperature.temperature(raw);
         let conditions = Conditions {
             sensor_break: self.sensor_break,
             pressure_rail: raw.is_rail(raw.pressure),
-            temperature_rail: raw.temperature().is_none() || raw.is_rail(raw.temperature),
+            temperature_rail: kelvin.is_none(),
         };
         let pressure_valid = !conditions.sensor_break && !conditions.pressure_rail;
         Snapshot {
-            pressure: self.pressure.sample(self.calibration.pressure(ratio), pressure_valid),
-            temperature: self.temperature.sample(kelvin, !conditions.temperature_rail),
+            pressure: self.pressure.sample(self.calibration.pressure.pressure(ratio, kelvin), pressure_valid),
+            // A temperature that is not measured is 0 K, as for a transmitter without a temperature sensor.
+            temperature: self.temperature.sample(kelvin.unwrap_or(0.0), !conditions.temperature_rail),
             conditions,
         }
     }
@@ -107,7 +127,7 @@ impl Transmitter {
     fn check_break(&mut self, ratio: f32) {
         if self.until_check == 0 {
             self.until_check = SAMPLES_PER_SECOND;
-            self.sensor_break = self.calibration.is_break(ratio);
+            self.sensor_break = self.calibration.pressure.is_break(ratio);
         }
         self.until_check -= 1;
     }

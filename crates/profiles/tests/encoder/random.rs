@@ -39,7 +39,7 @@ fn any_format() -> impl Strategy<Value = Format> {
 
 fn any_parameters() -> impl Strategy<Value = Parameters> {
     let units = (0..16_u16, any::<(u32, u32, u32, u32)>());
-    let rest = (any_format(), any::<(bool, i32, i32, i32)>(), any::<[u16; 4]>(), any::<(u32, u32)>());
+    let rest = (any_format(), any::<(bool, i32, i32, i32)>(), any::<[u16; 4]>(), any::<(u32, u32, u32)>());
     (units, prop::array::uniform2(any_channel()), rest).prop_map(
         |(
             (operating, (per_revolution, range, step, speed_step)),
@@ -48,13 +48,14 @@ fn any_parameters() -> impl Strategy<Value = Parameters> {
         )| {
             let (index, offset, low, high) = module;
             let [lowest_supply, highest_supply, highest_current, lowest_battery] = limits;
-            let (operating_time, value) = last;
+            let (operating_time, value, travel) = last;
             Parameters {
                 operating,
                 per_revolution,
                 range,
                 step,
                 speed_step,
+                travel: NonZeroU32::new(travel).filter(|_| index),
                 channels,
                 format,
                 index,

@@ -1,4 +1,4 @@
-//! Faults of the sensors, from an instant of virtual time on.
+//! Faults of the sensors and of the board, from an instant of virtual time on.
 
 use std::str::FromStr;
 
@@ -14,15 +14,24 @@ pub enum FaultKind {
     RailHigh,
     /// The transducer's output is shorted to ground.
     RailLow,
-    /// The encoder gives no index pulse.
+    /// The incremental encoder gives no index pulse.
     MissingIndex,
+    /// The data line of the absolute encoder is broken.
+    OpenSsi,
+    /// The absolute encoder tells a position that is half a revolution off.
+    WrongCode,
+    /// No battery behind VBAT, or an empty one: a loss of the main supply is one of the backup domain too.
+    BatteryEmpty,
 }
 
-const NAMES: [(&str, FaultKind); 4] = [
+const NAMES: [(&str, FaultKind); 7] = [
     ("open-sensor", FaultKind::OpenSensor),
     ("rail-high", FaultKind::RailHigh),
     ("rail-low", FaultKind::RailLow),
     ("missing-index", FaultKind::MissingIndex),
+    ("open-ssi", FaultKind::OpenSsi),
+    ("wrong-code", FaultKind::WrongCode),
+    ("battery-empty", FaultKind::BatteryEmpty),
 ];
 
 /// A fault and when it is there.
@@ -49,7 +58,7 @@ pub enum FaultError {
     #[error("`{0}` is not of the form NAME@SECONDS or NAME@SECONDS..SECONDS, for example open-sensor@2.5")]
     Form(String),
     /// No fault has this name.
-    #[error("unknown fault `{0}`; known are open-sensor, rail-high, rail-low and missing-index")]
+    #[error("unknown fault `{0}`; known are {known}", known = NAMES.map(|known| known.0).join(", "))]
     Name(String),
     /// Not a time from 0 on.
     #[error("`{0}` is not a time in seconds")]

@@ -1,5 +1,6 @@
-//! The physical world around the chip: pressure, temperature and shaft, and what the board makes of them.
+//! The physical world around the chip: pressure, temperature, shaft and buttons, and what the board makes of them.
 
+mod button;
 mod fault;
 pub(crate) mod front_end;
 mod shaft;
@@ -9,6 +10,8 @@ mod table;
 
 use canbus::Time;
 
+use button::Button;
+pub use button::{BUTTONS, Push, PushError};
 pub use fault::{Fault, FaultError, FaultKind};
 pub use front_end::{FULL_SCALE, Rails};
 pub use shaft::Motion;
@@ -25,19 +28,21 @@ pub struct Plant {
     pressure: Stimulus,
     temperature: Stimulus,
     shaft: Shaft,
+    buttons: [Button; BUTTONS],
     faults: Vec<Fault>,
     /// Supplies of the board.
     pub rails: Rails,
 }
 
 impl Plant {
-    /// No pressure, 25 degrees Celsius, the shaft at rest at 0, and an encoder with so many lines.
+    /// No pressure, 25 degrees Celsius, the shaft at rest at 0, an encoder with so many lines, and no button pressed.
     pub(crate) fn new(encoder_lines: u32) -> Self {
         let still = |value| Stimulus::new(Signal::Constant(value), Time::ZERO);
         Self {
             pressure: still(0.0),
             temperature: still(298.15),
             shaft: Shaft::new(encoder_lines),
+            buttons: [Button::default(); BUTTONS],
             faults: Vec::new(),
             rails: Rails::default(),
         }
@@ -56,6 +61,13 @@ impl Plant {
     /// Sets the motion of the shaft from `now` on; even motion starts where the shaft is.
     pub fn set_shaft(&mut self, motion: Motion, now: Time) {
         self.shaft.set(motion, now);
+    }
+
+    /// Presses or releases a button at `now`; one that the board does not have is ignored.
+    pub fn push(&mut self, push: Push, now: Time) {
+        if let Some(button) = self.buttons.get_mut(push.button) {
+            button.set(push.down, now);
+        }
     }
 
     /// Adds a fault; its times are absolute.
@@ -110,7 +122,7 @@ impl Plant {
         self.rails.reference_ratio()
     }
 
-    /// The encoder's position in quarter periods.
+    /// The incremental encoder's position in quarter periods.
     pub(crate) fn quarter(&self, now: Time) -> i64 {
         self.shaft.quarter(now)
     }
@@ -124,6 +136,22 @@ impl Plant {
     pub(crate) fn index(&self, now: Time) -> bool {
         let (started, ended) = self.shaft.index_edges(now);
         started != ended && !self.has(FaultKind::MissingIndex, now)
+    }
+
+    /// What the absolute encoder reads, in revolutions; `None` when its line is open.
+    pub(crate) fn absolute(&self, now: Time) -> Option<f64> {
+        let half_off = if self.has(FaultKind::WrongCode, now) { 0.5 } else { 0.0 };
+        (!self.has(FaultKind::OpenSsi, now)).then(|| self.revolutions(now) + half_off)
+    }
+
+    /// Whether there is something behind VBAT.
+    pub(crate) fn has_battery(&self, now: Time) -> bool {
+        !self.has(FaultKind::BatteryEmpty, now)
+    }
+
+    /// Which contacts are closed.
+    pub(crate) fn closed(&self, now: Time) -> [bool; BUTTONS] {
+        self.buttons.map(|button| button.is_closed(now))
     }
 
     /// The next edge of the index up to `until`.

@@ -1,4 +1,4 @@
-//! The shaft and the incremental encoder on it.
+//! The shaft and the incremental encoder on it. The absolute one on the same shaft is a device of the SPI.
 
 use canbus::Time;
 

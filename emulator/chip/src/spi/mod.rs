@@ -46,6 +46,15 @@ struct Shift {
     end: Time,
 }
 
+/// What is at the other end of the wires.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Far {
+    /// The encoder, at so many revolutions.
+    Position(f64),
+    /// Nothing that drives the line: it has this level.
+    Nothing(bool),
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Spi {
     /// One cycle of its PCLK.
@@ -167,10 +176,15 @@ impl Spi {
         }
     }
 
-    /// Ends the frames whose time has come. `position` gives the device's reading at an instant.
-    pub(crate) fn run(&mut self, now: Time, position: impl Fn(Time) -> f64) {
+    /// Ends the frames whose time has come. `encoder` tells what is on the wires at an instant.
+    pub(crate) fn run(&mut self, now: Time, encoder: impl Fn(Time) -> Far) {
         while let Some(shift) = self.shift.take_if(|shift| shift.end <= now) {
-            let word = self.device.clock_out(self.bits(), shift.start, self.bit_time(), &position);
+            let word = match encoder(shift.start) {
+                Far::Position(position) => {
+                    self.device.clock_out(self.bits(), shift.start, self.bit_time(), position)
+                }
+                Far::Nothing(level) => u32::from(level) * ((1 << self.bits()) - 1),
+            };
             self.receive(word);
             self.load(shift.end);
         }

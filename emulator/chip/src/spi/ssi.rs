@@ -42,17 +42,11 @@ impl Ssi {
         Self { format, word: 0, sent: 0, last_clock: None }
     }
 
-    /// Clocks `bits` bits from `start` on; `position` gives revolutions.
-    pub(crate) fn clock_out(
-        &mut self,
-        bits: u32,
-        start: Time,
-        bit: Time,
-        position: impl Fn(Time) -> f64,
-    ) -> u32 {
+    /// Clocks `bits` bits from `start` on, when the encoder is at `position`, in revolutions.
+    pub(crate) fn clock_out(&mut self, bits: u32, start: Time, bit: Time, position: f64) -> u32 {
         let rested = self.last_clock.is_none_or(|last| start.since(last) >= MONOFLOP);
         if rested {
-            self.word = self.encode(position(start));
+            self.word = self.encode(position);
             self.sent = 0;
         }
         self.last_clock = Some(start + Time(bit.0 * u64::from(bits)));
@@ -88,9 +82,8 @@ mod tests {
     fn a_word_goes_over_several_frames() {
         let format = SsiFormat { single_turn: 13, multi_turn: 12, gray: false };
         let mut ssi = Ssi::new(format);
-        let position = |_| 5.25;
-        let first = ssi.clock_out(16, Time::from_millis(1), BIT, position);
-        let second = ssi.clock_out(16, Time::from_micros(1016), BIT, position);
+        let first = ssi.clock_out(16, Time::from_millis(1), BIT, 5.25);
+        let second = ssi.clock_out(16, Time::from_micros(1016), BIT, 5.25);
         let word = first << 16 | second;
         assert_eq!(word >> 31, 1, "the rest level");
         assert_eq!(word >> 6 & 0x1FF_FFFF, 5 << 13 | 2048);
@@ -100,9 +93,10 @@ mod tests {
     #[test]
     fn the_position_is_latched_until_the_clock_rests() {
         let mut ssi = Ssi::new(SsiFormat { single_turn: 8, multi_turn: 0, gray: false });
-        let position = |at: Time| at.as_secs_f64();
-        let read =
-            |ssi: &mut Ssi, micros| ssi.clock_out(16, Time::from_micros(micros), BIT, position) >> 7 & 0xFF;
+        let read = |ssi: &mut Ssi, micros| {
+            let start = Time::from_micros(micros);
+            ssi.clock_out(16, start, BIT, start.as_secs_f64()) >> 7 & 0xFF
+        };
         assert_eq!(read(&mut ssi, 500_000), 128);
         assert_eq!(read(&mut ssi, 500_020), 0, "still the old word, all sent");
         assert_eq!(read(&mut ssi, 750_000), 192);

@@ -1,7 +1,8 @@
 //! Timers TIM2 to TIM7 and TIM9 to TIM14 (RM0390 sections 17 to 19, RM0090 sections 18 to 20).
 //!
-//! Up-counting, update and compare events, preloads, TRGO, encoder mode and input capture. Output pins, DMA requests
-//! of the timer, counting down and the other slave modes are not modelled: a write that asks for them is on record.
+//! Up-counting, update and compare events, preloads, TRGO, encoder mode, input capture, and the DMA requests of TIM3's
+//! update and channel 2. Output pins, other DMA requests, counting down and the other slave modes are not modelled: a
+//! write that asks for them is on record.
 //!
 //! A compare value is reached when the counter comes to it. One that is written when the counter already has it waits for
 //! the next round: a program must not count on more.
@@ -40,6 +41,8 @@ const CR1_DOWN: u32 = 0x0070;
 const SR_UIF: u32 = 0;
 /// UIE, CC1IE to CC4IE, TIE; what lies above asks for DMA.
 const DIER_INTERRUPTS: u32 = 0x005F;
+/// UDE; CC1DE to CC4DE follow.
+const DIER_UDE: u32 = 8;
 
 /// What a timer has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +51,8 @@ pub(crate) struct Kind {
     pub(crate) wide: bool,
     /// Capture and compare channels.
     pub(crate) channels: u32,
+    /// Bits of DIER: the DMA requests that are modelled.
+    pub(crate) requests: u32,
 }
 
 /// One timer.
@@ -160,7 +165,7 @@ impl Timer {
 
     fn write_interrupts(&mut self, value: u32) -> Option<()> {
         self.dier = value & 0x5F5F;
-        (value & !DIER_INTERRUPTS == 0).then_some(())
+        (value & !(DIER_INTERRUPTS | self.kind.requests) == 0).then_some(())
     }
 
     fn write_compare(&mut self, offset: u32, value: u32) -> Option<()> {
@@ -272,6 +277,11 @@ impl Timer {
             })
         };
         self.awaited_channels().map(compare).fold(update, Time::min)
+    }
+
+    /// Whether an update event asks for DMA.
+    pub(crate) fn requests_on_update(&self) -> bool {
+        bit(self.dier, DIER_UDE)
     }
 
     /// When TRGO next rises, and how soon after that again at the earliest.

@@ -155,6 +155,65 @@ fn each_index_pulse_is_an_interrupt() {
     assert_eq!(rig.run_to_irq(EXTI9_5_IRQ, Time::from_millis(50)), None);
 }
 
+const DMA1: u32 = 0x4002_6000;
+const BUFFER: u32 = 0x2000_4000;
+
+/// A stream of DMA1 on channel 5 that copies the count to memory, item by item and round again.
+fn copy_count(rig: &mut Rig, stream: u32, items: u32) {
+    rig.set(AHB1ENR, 1 << 21);
+    let base = DMA1 + 0x10 + 0x18 * stream;
+    rig.write(base + 4, items);
+    rig.write(base + 8, TIM4 + CNT);
+    rig.write(base + 0x0C, BUFFER);
+    rig.write(base, 5 << 25 | 1 << 13 | 1 << 11 | 1 << 10 | 1 << 8 | 1);
+}
+
+#[test]
+fn dma_copies_the_count_at_the_index() {
+    for rpm in [6000.0, -6000.0] {
+        let mut rig = counting();
+        rig.set(GPIOB, 0b10 << 10);
+        rig.set(GPIOB + 0x20, 2 << 20);
+        copy_count(&mut rig, 5, 1);
+        rig.write(TIM3 + CCMR1, 1 << 8);
+        rig.write(TIM3 + CCER, 1 << 4);
+        rig.write(TIM3 + DIER, 1 << 10);
+        turn(&mut rig, Motion::Rpm(rpm));
+        rig.wait(Time::from_millis(1));
+        rig.write(DMA1 + 0x0C, 0x3D << 6);
+        for turns in 1..=20_i32 {
+            rig.wait(Time::from_millis(10));
+            assert_eq!(rig.read(DMA1 + 4) >> 6 & 0x20, 0x20, "TCIF5");
+            let zero = (turns * 4096 * rpm.signum() as i32) as u16;
+            // Backwards the index rises at the other end of its quarter period.
+            assert_eq!(rig.half_word(BUFFER), zero, "{rpm} rpm, turn {turns}");
+            rig.write(DMA1 + 0x0C, 0x3D << 6);
+        }
+        assert!(rig.chip.unmodelled().is_empty());
+    }
+}
+
+#[test]
+fn dma_copies_the_count_whenever_the_adc_is_triggered() {
+    let mut rig = counting();
+    rig.set(APB2ENR, 1 << 8);
+    // Updates of TIM3 every 100 us start the ADC, whose results nobody fetches.
+    rig.write(0x4001_2000 + 8, 1 << 28 | 8 << 24 | 1);
+    copy_count(&mut rig, 2, 8);
+    rig.write(TIM3 + 4, 2 << 4);
+    rig.write(TIM3 + ARR, 1599);
+    rig.write(TIM3 + DIER, 1 << 8);
+    turn(&mut rig, Motion::Rpm(6000.0));
+    rig.write(TIM3 + CR1, 1);
+    rig.wait(Time::from_millis(1));
+    rig.read(TIM3 + CNT);
+    // 40.96 counts in 100 us; the ninth and tenth go over the first two.
+    let expected = [9, 10, 3, 4, 5, 6, 7, 8].map(|n| n * 4096 / 100);
+    let copied: Vec<u16> = (0..8).map(|n| rig.half_word(BUFFER + 2 * n)).collect();
+    assert_eq!(copied, expected);
+    assert!(rig.chip.unmodelled().is_empty());
+}
+
 #[test]
 fn the_index_can_be_captured() {
     let mut rig = counting();

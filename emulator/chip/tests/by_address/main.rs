@@ -1,5 +1,6 @@
 //! The chip as a program sees it: loads and stores by address, interrupt lines, effects.
 
+mod backup;
 mod clocks;
 mod conversions;
 mod encoder;

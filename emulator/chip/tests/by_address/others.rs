@@ -7,6 +7,7 @@ use chip::{Board, Peripherals, SsiFormat, Stm32f4, Variant};
 use crate::support::{AHB1ENR, APB1ENR, APB2ENR, Rig};
 
 const GPIOA: u32 = 0x4002_0000;
+const GPIOB: u32 = 0x4002_0400;
 const GPIOC: u32 = 0x4002_0800;
 const EXTI: u32 = 0x4001_3C00;
 const SYSCFG: u32 = 0x4001_3800;
@@ -45,6 +46,22 @@ fn an_input_is_driven_from_outside_or_pulled() {
 }
 
 #[test]
+fn a_button_pulls_its_pin_to_ground() {
+    let mut rig = Rig::new();
+    rig.set(AHB1ENR, 1 << 2);
+    let pins = |rig: &mut Rig| (rig.read(GPIOC + 0x10) >> 13 & 1, rig.read(GPIOC + 0x10) >> 10 & 1);
+    assert_eq!(pins(&mut rig), (1, 0), "the first one has a resistor, the second one floats");
+    rig.write(GPIOC + 0x0C, 1 << 20);
+    assert_eq!(pins(&mut rig), (1, 1));
+    for (push, expected) in [("1:down", (0, 1)), ("2:down", (0, 0)), ("1:up", (1, 0))] {
+        let now = rig.now;
+        rig.chip.plant_mut(now).push(push.parse().expect("a push"), now);
+        rig.wait(Time::from_millis(5));
+        assert_eq!(pins(&mut rig), expected, "{push}");
+    }
+}
+
+#[test]
 fn an_edge_on_the_selected_port_is_an_interrupt() {
     let mut rig = Rig::new();
     rig.set(AHB1ENR, 0b111);
@@ -68,8 +85,12 @@ fn with_ssi() -> Rig {
     let mut rig = Rig::new();
     let ssi = SsiFormat { single_turn: 13, multi_turn: 12, gray: false };
     rig.chip = Stm32f4::new(Variant::F446, Board { ssi, ..Board::default() });
-    rig.set(AHB1ENR, 1 << 21);
+    rig.set(AHB1ENR, 1 << 21 | 1 << 1);
     rig.set(APB1ENR, 1 << 14);
+    // PB13 and PB14 to SPI2, a pull-up at the data.
+    rig.set(GPIOB, 0b10 << 26 | 0b10 << 28);
+    rig.set(GPIOB + 0x0C, 1 << 28);
+    rig.write(GPIOB + 0x24, 5 << 20 | 5 << 24);
     let motion = Motion::Angle(Signal::Constant(3.5));
     rig.chip.plant_mut(rig.now).set_shaft(motion, rig.now);
     rig
@@ -98,6 +119,45 @@ fn an_absolute_encoder_is_read_in_frames_of_16_bits() {
         assert!(!rig.irq(SPI2_IRQ));
     }
     assert_eq!(word, WORD);
+}
+
+/// A whole word, as two frames of 16 bits.
+fn exchange(rig: &mut Rig) -> u32 {
+    let halves = [(); 2].map(|()| {
+        rig.write(SPI2 + 0x0C, 0);
+        rig.wait(Time::from_micros(16));
+        rig.read(SPI2 + 0x0C)
+    });
+    rig.wait(Time::from_micros(50));
+    halves[0] << 16 | halves[1]
+}
+
+#[test]
+fn faults_of_the_absolute_encoder() {
+    let mut rig = with_ssi();
+    rig.write(SPI2, MASTER | SPE | FRAMES_OF_16);
+    let fault = |rig: &mut Rig, name: &str| {
+        let now = rig.now;
+        rig.chip.plant_mut(now).clear_faults();
+        rig.chip.plant_mut(now).add_fault(format!("{name}@0").parse().expect("a fault"));
+    };
+    assert_eq!(exchange(&mut rig), WORD);
+    fault(&mut rig, "wrong-code");
+    assert_eq!(exchange(&mut rig), 1 << 31 | (4 << 13) << 6, "half a revolution off");
+    fault(&mut rig, "open-ssi");
+    assert_eq!(exchange(&mut rig), u32::MAX, "pulled up");
+    rig.write(GPIOB + 0x0C, 0);
+    assert_eq!(exchange(&mut rig), 0);
+    rig.chip.plant_mut(rig.now).clear_faults();
+    assert_eq!(exchange(&mut rig), WORD);
+}
+
+#[test]
+fn without_its_pins_the_spi_reads_no_encoder() {
+    let mut rig = with_ssi();
+    rig.write(SPI2, MASTER | SPE | FRAMES_OF_16);
+    rig.write(GPIOB + 0x24, 5 << 24);
+    assert_eq!(exchange(&mut rig), u32::MAX, "no clock");
 }
 
 #[test]

@@ -134,3 +134,45 @@ fn a_rod_counts_in_its_measuring_step() {
         assert_eq!(scale.value(shaft_at(-1, &scale), 0), 999);
     }
 }
+
+proptest! {
+    /// However far it goes: floor(P * way of a step / unit), modulo all that the sensor tells apart.
+    #[test]
+    fn a_way_is_never_rounded(
+        exponent in 0..20_u32, revolutions in 1..=65_536_u32, travel in 1..=10_000_000_u32, step in 1..=u32::MAX,
+        rod: bool, total in -(1_i64 << 50)..1 << 50,
+    ) {
+        let native = if rod { linear(travel) } else { rotary(1 << exponent, revolutions) };
+        let along = Scale::along(&native, NonZeroU32::new(travel).unwrap(), NonZeroU32::new(step).unwrap());
+        let (way, unit) = match native {
+            Native::Rotary { .. } => (i128::from(travel) * 1000, i128::from(step) << exponent),
+            Native::Linear { .. } => (i128::from(travel), i128::from(step)),
+        };
+        let Some(scale) = along else {
+            let is_nothing = i128::from(native.steps().get()) * way < unit;
+            let is_long = unit >> exponent.min(unit.trailing_zeros()) > 1 && unit > 1 << 32;
+            prop_assert!(way > unit || is_nothing || is_long, "{} / {}", way, unit);
+            return Ok(());
+        };
+        let range = i128::from(scale.range().get());
+        prop_assert_eq!(range, (i128::from(native.steps().get()) * way / unit).min(1 << 32));
+        let expected = (i128::from(total) * way).div_euclid(unit).rem_euclid(range);
+        prop_assert_eq!(i128::from(scale.value(shaft_at(total, &scale), 0)), expected);
+    }
+}
+
+#[test]
+fn a_way_needs_a_step_that_the_sensor_resolves() {
+    let along = |native, travel, step| {
+        Scale::along(&native, NonZeroU32::new(travel).unwrap(), NonZeroU32::new(step).unwrap())
+    };
+    // A pulley of 314.159 mm, 4096 steps a revolution, 1 mm: 314 159 units in 4 096 000 steps.
+    let scale = along(rotary(4096, 4096), 314_159, 1_000_000).unwrap();
+    assert_eq!(u64::from(scale.units()) * 4_096_000, u64::from(scale.turn().get()) * 314_159);
+    assert_eq!(scale.range().get(), 4096 * 314_159 / 1000);
+    assert_eq!(along(rotary(4096, 1), 4_096, 1000).unwrap().range().get(), 4096);
+    assert_eq!(along(rotary(4096, 1), 4_096, 999), None);
+    assert_eq!(along(linear(100_000), 1, 500_000).unwrap().range().get(), (1 << 32) / 5);
+    assert_eq!(along(linear(100_000), 1, 50_000), None);
+    assert_eq!(along(rotary(1, 1), 1, u32::MAX), None, "not even one unit");
+}

@@ -109,6 +109,8 @@ impl BxCan {
         // Software has set and cleared INRQ: that too begins the recovery.
         if self.status.is_bus_off() {
             self.monitor.wait(Monitor::BUS_OFF_SEQUENCES, now);
+            // Only now is it known when a frame that waits can begin.
+            self.poke = true;
         }
         self.begin_loop(now);
     }

@@ -1,4 +1,4 @@
-//! Communication profile objects, 1000h to 1FFFh (CiA 301, CiA 302-2), but for the PDOs.
+//! Communication profile objects, 1000h to 1029h (CiA 301).
 
 use canopen::dictionary::{Access, DefaultValue, Group, Mapping, Object, Rule, Type};
 
@@ -31,10 +31,20 @@ const fn watch(sub: u8) -> Object {
     parameter(0x1016, sub, "Watched node and time", Type::Unsigned32).rule(Rule::HeartbeatWatch)
 }
 
-pub(super) const OBJECTS: &[Object] = &[
-    fixed(0x1000, 0, "Device type", Type::Unsigned32).value(0x0002_0194),
-    fixed(0x1001, 0, "Error register", Type::Unsigned8),
-    fixed(0x1002, 0, "Manufacturer status register", Type::Unsigned32).mappable(Mapping::Tpdo),
+/// 1000h.
+pub(crate) const fn device_type(code: i64) -> Object {
+    fixed(0x1000, 0, "Device type", Type::Unsigned32).value(code)
+}
+
+/// 1001h.
+pub(crate) const ERROR_REGISTER: Object = fixed(0x1001, 0, "Error register", Type::Unsigned8);
+
+/// 1002h, for a personality with the flags of 3000h.
+pub(crate) const STATUS_REGISTER: Object =
+    fixed(0x1002, 0, "Manufacturer status register", Type::Unsigned32).mappable(Mapping::Tpdo);
+
+/// 1003h to 1007h.
+pub(crate) const ERRORS_AND_SYNC: &[Object] = &[
     Object::new(0x1003, 0, "Pre-defined error field", Type::Unsigned8, Access::ReadWrite)
         .rule(Rule::ErrorCount),
     error(1),
@@ -50,7 +60,15 @@ pub(super) const OBJECTS: &[Object] = &[
     parameter(0x1005, 0, "COB-ID SYNC", Type::Unsigned32).value(0x80).rule(Rule::SyncCobId),
     parameter(0x1006, 0, "Communication cycle period", Type::Unsigned32).unit("us").rule(Rule::SyncPeriod),
     parameter(0x1007, 0, "Synchronous window length", Type::Unsigned32).unit("us").rule(Rule::SyncWindow),
-    text(0x1008, "Manufacturer device name", 32).default(DefaultValue::Text("STM32F4 pressure transmitter")),
+];
+
+/// 1008h, at most 32 characters.
+pub(crate) const fn device_name(name: &'static str) -> Object {
+    text(0x1008, "Manufacturer device name", 32).default(DefaultValue::Text(name))
+}
+
+/// 1009h to 1029h.
+pub(crate) const SERVICES: &[Object] = &[
     text(0x1009, "Manufacturer hardware version", 32),
     text(0x100A, "Manufacturer software version", 50),
     constant(0x1010, "Store parameters", 3),
@@ -87,42 +105,3 @@ pub(super) const OBJECTS: &[Object] = &[
     parameter(0x1029, 1, "Communication error", Type::Unsigned8).limits(0, 254),
     parameter(0x1029, 2, "Device error", Type::Unsigned8).limits(0, 2),
 ];
-
-/// What comes after the PDOs (CiA 302-2, CiA 302-3).
-pub(super) const START_UP: &[Object] = &[
-    Object::highest(0x1F51, 1, "Program control"),
-    Object::new(0x1F51, 1, "Program 1 control", Type::Unsigned8, Access::ReadWrite)
-        .value(1)
-        .rule(Rule::ProgramControl),
-    Object::highest(0x1F56, 1, "Program identification"),
-    fixed(0x1F56, 1, "Program 1 identification", Type::Unsigned32),
-    Object::highest(0x1F57, 1, "Flash status"),
-    fixed(0x1F57, 1, "Program 1 flash status", Type::Unsigned32),
-    parameter(0x1F80, 0, "NMT start-up", Type::Unsigned32).rule(Rule::StartUp),
-    parameter(0x1FA0, 0, "Object scanner list", Type::Unsigned8).limits(0, 8),
-    scanner_line(1),
-    scanner_line(2),
-    scanner_line(3),
-    scanner_line(4),
-    scanner_line(5),
-    scanner_line(6),
-    scanner_line(7),
-    scanner_line(8),
-    parameter(0x1FD0, 0, "Object dispatching list", Type::Unsigned8).limits(0, 8),
-    dispatching_line(1),
-    dispatching_line(2),
-    dispatching_line(3),
-    dispatching_line(4),
-    dispatching_line(5),
-    dispatching_line(6),
-    dispatching_line(7),
-    dispatching_line(8),
-];
-
-const fn scanner_line(sub: u8) -> Object {
-    parameter(0x1FA0, sub, "Scanned objects", Type::Unsigned32).rule(Rule::ScannerLine)
-}
-
-const fn dispatching_line(sub: u8) -> Object {
-    parameter(0x1FD0, sub, "Dispatched objects", Type::Unsigned64)
-}

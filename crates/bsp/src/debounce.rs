@@ -1,0 +1,57 @@
+//! Contacts that bounce.
+
+/// Samples for which an input must be the same before that is believed. At 1 kHz these are 10 ms: contacts bounce for
+/// less than that, and nobody presses a button for less.
+const SAMPLES: u8 = 10;
+
+/// One input, sampled at an even pace.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Debounce {
+    is_on: bool,
+    /// Samples in a row that say the opposite.
+    other: u8,
+}
+
+impl Debounce {
+    /// Off until it has been on for long enough.
+    #[must_use]
+    pub const fn new() -> Debounce {
+        Debounce { is_on: false, other: 0 }
+    }
+
+    /// Takes a sample and tells what the input is believed to be.
+    pub fn sample(&mut self, level: bool) -> bool {
+        self.other = if level == self.is_on { 0 } else { self.other.saturating_add(1) };
+        if self.other >= SAMPLES {
+            *self = Debounce { is_on: level, other: 0 };
+        }
+        self.is_on
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(debounce: &mut Debounce, levels: impl IntoIterator<Item = bool>) -> Option<bool> {
+        levels.into_iter().map(|level| debounce.sample(level)).last()
+    }
+
+    #[test]
+    fn a_level_that_lasts_is_believed() {
+        let mut input = Debounce::new();
+        assert_eq!(after(&mut input, [true; 9]), Some(false));
+        assert_eq!(after(&mut input, [true]), Some(true));
+        assert_eq!(after(&mut input, [false; 9]), Some(true));
+        assert_eq!(after(&mut input, [false]), Some(false));
+    }
+
+    #[test]
+    fn bounces_are_not() {
+        let mut input = Debounce::new();
+        let bouncing = (0..1000).map(|n| n % 10 != 9);
+        assert!(bouncing.clone().all(|level| !input.sample(level)));
+        assert_eq!(after(&mut input, [true; 10]), Some(true));
+        assert!(bouncing.map(|level| !level).all(|level| input.sample(level)));
+    }
+}

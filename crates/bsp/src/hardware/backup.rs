@@ -1,0 +1,47 @@
+//! The backup SRAM: what is written there outlives a loss of power, as long as there is a battery behind VBAT.
+
+use stm32f4xx_hal::pac::PWR;
+use stm32f4xx_hal::rcc::{Enable, Rcc};
+
+use crate::kept::{Found, Keeper, Slots};
+
+/// 4 KiB (RM0390, table 1; RM0090, table 1).
+const BASE: *const Slots = 0x4002_4000 as *const Slots;
+
+const _: () = assert!(size_of::<Slots>() <= 4096);
+
+/// The memory, written through the copies of [`Keeper`].
+pub struct BackupMemory {
+    power: PWR,
+    keeper: Keeper<'static>,
+}
+
+impl BackupMemory {
+    /// Switches it on, and finds what was kept. The backup regulator need not be ready: it takes over when the main supply
+    /// goes (RM0390, 5.1.2).
+    pub(crate) fn open(power: PWR, rcc: &mut Rcc) -> (BackupMemory, Found) {
+        PWR::enable(rcc);
+        rcc.ahb1enr().modify(|_, w| w.bkpsramen().set_bit());
+        protect(&power, false);
+        power.csr().modify(|_, w| w.bre().set_bit());
+        protect(&power, true);
+        // SAFETY: the memory is there, on and aligned, and any bits of it are numbers. `power` is given to this function
+        // only, once, so nothing else refers to it.
+        let slots = unsafe { &*BASE };
+        let (keeper, found) = Keeper::open(slots);
+        (BackupMemory { power, keeper }, found)
+    }
+
+    /// Keeps these bytes. Nothing else can write to the memory: it is protected but for the time of this call.
+    pub fn write(&mut self, bytes: &[u8]) {
+        protect(&self.power, false);
+        self.keeper.write(bytes);
+        protect(&self.power, true);
+    }
+}
+
+/// DBP. The bus of PWR is slower than that of the memory: to read it back is to wait for it.
+fn protect(power: &PWR, on: bool) {
+    power.cr().modify(|_, w| w.dbp().bit(!on));
+    let _ = power.cr().read();
+}

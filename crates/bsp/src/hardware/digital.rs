@@ -1,0 +1,43 @@
+//! Digital inputs and outputs: two buttons and two lamps.
+
+use stm32f4xx_hal::gpio::{Input, Output, PC0, PC1, PC10, PC13};
+
+use crate::debounce::Debounce;
+
+/// Two buttons to ground.
+pub struct Buttons {
+    pins: (PC13<Input>, PC10<Input>),
+    debounced: [Debounce; 2],
+}
+
+impl Buttons {
+    /// PC13 is the blue button of the NUCLEO, which has a pull-up resistor of its own.
+    pub(crate) fn new(first: PC13, second: PC10) -> Buttons {
+        let pins = (first.into_floating_input(), second.into_pull_up_input());
+        Buttons { pins, debounced: [Debounce::new(); 2] }
+    }
+
+    /// Which of them are pressed. To be called once a millisecond: contacts bounce.
+    pub fn sample(&mut self) -> [bool; 2] {
+        let [first, second] = &mut self.debounced;
+        [first.sample(self.pins.0.is_low()), second.sample(self.pins.1.is_low())]
+    }
+}
+
+/// Two lamps, or what switches them: a high level is on.
+pub struct Lamps {
+    pins: (PC0<Output>, PC1<Output>),
+}
+
+impl Lamps {
+    /// Both are off.
+    pub(crate) fn new(first: PC0, second: PC1) -> Lamps {
+        Lamps { pins: (first.into_push_pull_output(), second.into_push_pull_output()) }
+    }
+
+    /// Switches them.
+    pub fn set(&mut self, [first, second]: [bool; 2]) {
+        self.pins.0.set_state(first.into());
+        self.pins.1.set_state(second.into());
+    }
+}

@@ -1,0 +1,125 @@
+//! The incremental encoder: TIM4 counts every edge of A and B, and DMA1 copies the count at two events of TIM3.
+//!
+//! | event of TIM3 | stream | what the copy is |
+//! |---|---|---|
+//! | update, which starts a scan of the ADC | 2 | the count at the start of each scan, in step with the buffer of the ADC |
+//! | capture on channel 2, the index at PB5 | 5 | the count at the last index |
+//!
+//! So hardware alone decides at which instant the count is taken, as it does for the ADC, and no interrupt is spent on it.
+//!
+//! A copy is late by what DMA1 needs: some ten cycles, and some more when it has to wait for a byte of the SSI, which is
+//! less than half a microsecond. At 6000 rpm and 1024 lines a count lasts 2.4 us, so the count at the index is right or one
+//! too far. An interrupt would be late by the longest task above it, some 10 us: four counts. (PB5 has no channel of TIM4,
+//! whose free channels 3 and 4 are at the pins of CAN.)
+
+use core::sync::atomic::{AtomicU16, Ordering};
+
+use stm32f4xx_hal::ClearFlags;
+use stm32f4xx_hal::dma::config::Priority;
+use stm32f4xx_hal::dma::traits::{Stream, StreamISR};
+use stm32f4xx_hal::dma::{DmaChannel, DmaDataSize, DmaDirection, DmaFlag, Stream2, Stream5};
+use stm32f4xx_hal::gpio::{Alternate, PB5, PB6, PB7};
+use stm32f4xx_hal::pac::{DMA1, TIM3, TIM4};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+use super::sampling::{SCANS, Sums};
+
+/// ICxF of all three inputs: eight equal samples at a quarter of 72 MHz, so pulses of less than 444 ns are noise (RM0390,
+/// 17.4.7). That leaves 10,000 lines at 6000 rpm. Index and phases are late by the same time.
+const FILTER: u8 = 0b0111;
+
+/// What DMA1 writes and the core reads. Atomic, because two bus masters share it.
+static COUNTS: [AtomicU16; 2 * SCANS] = [const { AtomicU16::new(0) }; 2 * SCANS];
+static AT_INDEX: AtomicU16 = AtomicU16::new(0);
+
+/// The encoder in one millisecond.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counted {
+    /// Quarter periods, modulo 2^16, at the start of the last scan: 59 us before the interrupt.
+    pub counter: u16,
+    /// The same at the last index; `None` when none came since the last call.
+    pub index: Option<u16>,
+}
+
+/// The input.
+pub struct Encoder {
+    at_index: Stream5<DMA1>,
+    _parts: (TIM4, Stream2<DMA1>, PB5<Alternate<2>>, PB6<Alternate<2>>, PB7<Alternate<2>>),
+}
+
+/// What it is made of.
+pub(crate) struct Parts {
+    pub(crate) timer: TIM4,
+    pub(crate) at_scan: Stream2<DMA1>,
+    pub(crate) at_index: Stream5<DMA1>,
+    pub(crate) index: PB5,
+    pub(crate) a: PB6,
+    pub(crate) b: PB7,
+}
+
+impl Encoder {
+    /// Configures everything, while TIM3 (`scans`) is ready and does not run yet: the first count is that of the first scan.
+    ///
+    /// The pins have no pull-up resistors: they would not stand 5 V (STM32F446 datasheet, general operating conditions).
+    pub(crate) fn new(parts: Parts, scans: &TIM3, rcc: &mut Rcc) -> Encoder {
+        let Parts { timer, mut at_scan, mut at_index, index, a, b } = parts;
+        prepare_counter(&timer, rcc);
+        copy(&mut at_scan, &timer, &COUNTS);
+        copy(&mut at_index, &timer, core::slice::from_ref(&AT_INDEX));
+        prepare_events(scans);
+        let (index, a, b) = (index.into_alternate(), a.into_alternate(), b.into_alternate());
+        Encoder { at_index, _parts: (timer, at_scan, index, a, b) }
+    }
+
+    /// What belongs to the millisecond of these sums.
+    pub fn take(&mut self, sums: &Sums) -> Counted {
+        let count = COUNTS.as_chunks::<SCANS>().0.get(sums.half).and_then(|half| half.last());
+        let counter = count.map_or(0, |count| count.load(Ordering::Relaxed));
+        Counted { counter, index: self.index() }
+    }
+
+    fn index(&mut self) -> Option<u16> {
+        if !self.at_index.is_transfer_complete() {
+            return None;
+        }
+        // In this order, one that comes in between is seen now and once more: that does no harm.
+        self.at_index.clear_flags(DmaFlag::TransferComplete);
+        Some(AT_INDEX.load(Ordering::Relaxed))
+    }
+}
+
+/// TIM4 in encoder mode 3: every edge of both inputs counts (RM0390, 17.3.12).
+fn prepare_counter(timer: &TIM4, rcc: &mut Rcc) {
+    TIM4::enable(rcc);
+    TIM4::reset(rcc);
+    timer.ccmr1_input().write(|w| w.cc1s().ti1().ic1f().set(FILTER).cc2s().ti2().ic2f().set(FILTER));
+    timer.smcr().write(|w| w.sms().encoder_mode_3());
+    timer.arr().write(|w| w.arr().set(u16::MAX));
+    timer.cr1().write(|w| w.cen().set_bit());
+}
+
+/// TIM3 asks for DMA at each update and at each rising edge on channel 2.
+fn prepare_events(scans: &TIM3) {
+    scans.ccmr1_input().write(|w| w.cc2s().ti2().ic2f().set(FILTER));
+    scans.ccer().write(|w| w.cc2e().set_bit());
+    scans.dier().write(|w| w.ude().set_bit().cc2de().set_bit());
+}
+
+/// A stream that copies the count to `target`, round and round. Both requests of TIM3 are on channel 5 (RM0390, table 28).
+fn copy(stream: &mut impl Stream, timer: &TIM4, target: &'static [AtomicU16]) {
+    stream.set_channel(DmaChannel::Channel5);
+    stream.set_priority(Priority::VeryHigh);
+    stream.set_direction(DmaDirection::PeripheralToMemory);
+    stream.set_peripheral_address(timer.cnt().as_ptr() as u32);
+    stream.set_memory_address(target.as_ptr() as u32);
+    stream.set_number_of_transfers(target.len() as u16);
+    stream.set_memory_increment(true);
+    stream.set_circular_mode(true);
+    // SAFETY: half-words from a register that has 16 bits of content to half-words of `target`, which exists for ever and
+    // has as many of them as there are transfers in a round.
+    unsafe {
+        stream.set_peripheral_size(DmaDataSize::HalfWord);
+        stream.set_memory_size(DmaDataSize::HalfWord);
+        stream.enable();
+    }
+}

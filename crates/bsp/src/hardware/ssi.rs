@@ -1,0 +1,113 @@
+//! The absolute encoder: SPI2 clocks its word in and DMA1 moves the bytes, so a word costs no time of the core but that to
+//! start it and to fetch it a millisecond later.
+//!
+//! The clock rests high, and its first edge latches the position. The encoder puts the next bit out at each rising edge,
+//! and the SPI takes one at the same edges, that is the bit of the clock before: a bit has a whole period for its way
+//! through the cable. The first one is the rest level.
+
+use core::sync::atomic::{AtomicU8, Ordering};
+
+use stm32f4xx_hal::ClearFlags;
+use stm32f4xx_hal::dma::traits::{Stream, StreamISR};
+use stm32f4xx_hal::dma::{DmaChannel, DmaDataSize, DmaDirection, Stream3, Stream4};
+use stm32f4xx_hal::gpio::{Alternate, PB13, PB14};
+use stm32f4xx_hal::pac::{DMA1, SPI2};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+use crate::bit_timing::APB1_HZ;
+use crate::ssi_word::{LONGEST, SsiWord, bytes, pack};
+
+/// BR: APB1 divided by 64. Half of it would be more than the 1 MHz that encoders stand at most.
+const DIVIDER: u8 = 5;
+const CLOCK_HZ: u32 = APB1_HZ >> (DIVIDER + 1);
+/// Microseconds for which the clock must rest before the next word, at most, of the encoders on the market.
+const MONOFLOP: u32 = 100;
+
+const _: () = {
+    assert!(CLOCK_HZ <= 1_000_000, "encoders stand 1 MHz");
+    assert!(LONGEST * 1_000_000 / CLOCK_HZ + MONOFLOP < 1000, "a word and its rest fit into a millisecond");
+};
+
+/// What DMA1 writes and the core reads. Atomic, because two bus masters share it.
+static RECEIVED: [AtomicU8; LONGEST as usize / 8] = [const { AtomicU8::new(0) }; LONGEST as usize / 8];
+/// What is sent for each byte, to no pin.
+static SENT: AtomicU8 = AtomicU8::new(0);
+
+/// The input.
+pub struct Ssi {
+    receive: Stream3<DMA1>,
+    send: Stream4<DMA1>,
+    /// Bytes of the word that was started; 0 without one.
+    started: usize,
+    _parts: (SPI2, PB13<Alternate<5>>, PB14<Alternate<5>>),
+}
+
+/// What it is made of.
+pub(crate) struct Parts {
+    pub(crate) spi: SPI2,
+    pub(crate) receive: Stream3<DMA1>,
+    pub(crate) send: Stream4<DMA1>,
+    pub(crate) clock: PB13,
+    pub(crate) data: PB14,
+}
+
+impl Ssi {
+    pub(crate) fn new(parts: Parts, rcc: &mut Rcc) -> Ssi {
+        let Parts { spi, mut receive, mut send, clock, data } = parts;
+        prepare_spi(&spi, rcc);
+        prepare(&mut receive, &spi, DmaDirection::PeripheralToMemory, &RECEIVED);
+        prepare(&mut send, &spi, DmaDirection::MemoryToPeripheral, core::slice::from_ref(&SENT));
+        let (clock, data) = (clock.into_alternate(), data.into_alternate());
+        Ssi { receive, send, started: 0, _parts: (spi, clock, data) }
+    }
+
+    /// Starts to clock in a word of `length` bits, 62 at most. It is there a millisecond later; before that nothing else is
+    /// started.
+    pub fn start(&mut self, length: u32) {
+        if self.receive.is_enabled() || self.send.is_enabled() {
+            return;
+        }
+        self.started = bytes(length);
+        self.receive.clear_all_flags();
+        self.send.clear_all_flags();
+        self.receive.set_number_of_transfers(self.started as u16);
+        self.send.set_number_of_transfers(self.started as u16);
+        // SAFETY: RECEIVED has as many bytes as the longest word, and SENT is read again and again.
+        unsafe {
+            self.receive.enable();
+            self.send.enable();
+        }
+    }
+
+    /// The word that was started before; `None` when there is none, or not all of it.
+    pub fn take(&mut self) -> Option<SsiWord> {
+        let started = core::mem::take(&mut self.started);
+        let is_there = started > 0 && self.receive.is_transfer_complete();
+        is_there.then(|| pack(RECEIVED.iter().take(started).map(|byte| byte.load(Ordering::Relaxed))))
+    }
+}
+
+/// SPI2 as a master with a clock that rests high, bytes with their highest bit first (RM0390, 26.3.5).
+fn prepare_spi(spi: &SPI2, rcc: &mut Rcc) {
+    SPI2::enable(rcc);
+    SPI2::reset(rcc);
+    spi.cr2().write(|w| w.rxdmaen().set_bit().txdmaen().set_bit());
+    spi.cr1().write(|w| {
+        w.mstr().set_bit().ssm().set_bit().ssi().set_bit();
+        w.br().set(DIVIDER).cpol().set_bit().cpha().set_bit().spe().set_bit()
+    });
+}
+
+/// A stream between SPI2 and memory; both are on channel 0 (RM0390, table 28).
+fn prepare(stream: &mut impl Stream, spi: &SPI2, direction: DmaDirection, memory: &'static [AtomicU8]) {
+    stream.set_channel(DmaChannel::Channel0);
+    stream.set_direction(direction);
+    stream.set_peripheral_address(spi.dr().as_ptr() as u32);
+    stream.set_memory_address(memory.as_ptr() as u32);
+    stream.set_memory_increment(memory.len() > 1);
+    // SAFETY: bytes on both sides; the SPI has frames of 8 bits.
+    unsafe {
+        stream.set_peripheral_size(DmaDataSize::Byte);
+        stream.set_memory_size(DmaDataSize::Byte);
+    }
+}

@@ -1,0 +1,191 @@
+//! PDOs at numbers of the dictionary's choice, and PDOs to which a profile has given their CAN-IDs.
+
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Rule, Type};
+use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response};
+use canopen::{Application, Device, Frame, Instant, NodeId, QueueFull, Transmit};
+
+const ID: u8 = 5;
+const NOW: Instant = Instant(1_000_000);
+
+const fn cob_id(index: u16, default: DefaultValue, rule: Rule) -> [Object; 3] {
+    [
+        Object::highest(index, 2, ""),
+        Object::new(index, 1, "", Type::Unsigned32, Access::ReadWrite).default(default).rule(rule),
+        Object::new(index, 2, "", Type::Unsigned8, Access::ReadWrite).value(255).rule(Rule::PdoType),
+    ]
+}
+
+/// A mapping that never changes.
+const fn mapping(index: u16, mapped: i64) -> [Object; 2] {
+    [
+        Object::new(index, 0, "", Type::Unsigned8, Access::Const).value(1),
+        Object::new(index, 1, "", Type::Unsigned32, Access::Const).value(mapped),
+    ]
+}
+
+const fn value(index: u16, access: Access, mapping: Mapping) -> Object {
+    Object::new(index, 0, "", Type::Unsigned16, access).mappable(mapping)
+}
+
+/// RPDOs 7 and 512, TPDOs 2 (multiplexed), 130, 261 and 512, all but the last with a CAN-ID of their own.
+const PARTS: &[&[Object]] = &[
+    &cob_id(0x1406, DefaultValue::Integer(0x206), Rule::PdoPredefined),
+    &cob_id(0x15FF, DefaultValue::Integer(0x180), Rule::PdoPredefined),
+    &mapping(0x1606, 0x2004_0010),
+    &mapping(0x17FF, 0x2005_0010),
+    &cob_id(0x1801, DefaultValue::NodeId(0x500), Rule::PdoPredefined),
+    &cob_id(0x1881, DefaultValue::NodeId(0x4000_0480), Rule::PdoPredefined),
+    &cob_id(0x1904, DefaultValue::Integer(0x4000_0180), Rule::PdoPredefined),
+    &cob_id(0x19FF, DefaultValue::Integer(0x8000_0000), Rule::PdoCobId),
+    &[Object::new(0x1A01, 0, "", Type::Unsigned8, Access::Const).value(0xFF)],
+    &mapping(0x1A81, 0x2001_0010),
+    &mapping(0x1B04, 0x2002_0010),
+    &mapping(0x1BFF, 0x2003_0010),
+    &[
+        value(0x2001, Access::ReadOnly, Mapping::Tpdo),
+        value(0x2002, Access::ReadOnly, Mapping::Tpdo),
+        value(0x2003, Access::ReadOnly, Mapping::Tpdo),
+        value(0x2004, Access::ReadWrite, Mapping::Rpdo),
+        value(0x2005, Access::ReadWrite, Mapping::Rpdo),
+        value(0x2006, Access::ReadOnly, Mapping::Tpdo),
+    ],
+];
+static TABLE: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
+const SIZE: usize = dictionary::image_size(&TABLE);
+const ENTRIES: [Entry; TABLE.len()] = dictionary::compile(&TABLE);
+const DEFAULTS: [u8; SIZE] = dictionary::default_image(&TABLE);
+const _: () = dictionary::check(&TABLE);
+const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+
+struct Nothing;
+
+impl Application for Nothing {
+    fn initialise(&mut self, _: &mut [u8]) {}
+
+    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        Ok(())
+    }
+}
+
+#[derive(Default)]
+struct Sent(Vec<Frame>);
+
+impl Transmit for Sent {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.0.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+}
+
+struct Bench {
+    device: Device<Nothing, SIZE>,
+    sent: Sent,
+}
+
+impl Bench {
+    fn operational() -> Bench {
+        let device = Device::new(&DICTIONARY, NodeId::new(ID), Nothing);
+        let mut bench = Bench { device, sent: Sent::default() };
+        bench.device.start(NOW, &mut bench.sent);
+        bench.sent.0.clear();
+        bench.receive(&Frame::new(0, &[1, ID]).unwrap());
+        bench
+    }
+
+    fn receive(&mut self, frame: &Frame) {
+        self.device.on_process_frame(frame, NOW, &mut self.sent);
+        self.device.on_service_frame(frame, NOW, &mut self.sent);
+        self.device.poll_process(NOW, &mut self.sent);
+    }
+
+    fn ids(&mut self) -> Vec<u16> {
+        self.sent.0.drain(..).map(|frame| frame.id()).collect()
+    }
+
+    /// Changes one of the values and gives what is sent.
+    fn change(&mut self, index: u16) -> Vec<u16> {
+        self.ids();
+        let field = DICTIONARY.field(index, 0);
+        let changed = field.u16(self.device.image()).wrapping_add(1);
+        field.store(self.device.image_mut(), changed.to_le_bytes());
+        self.device.changed(NOW, &mut self.sent);
+        self.ids()
+    }
+
+    fn write_cob_id(&mut self, index: u16, value: u32) -> Result<(), u32> {
+        let at = Multiplexer { index, sub: 1 };
+        let request = Request::Download(at, Initiate::Expedited(Bytes::from_slice(&value.to_le_bytes())));
+        self.sent.0.clear();
+        self.receive(&Frame::new(0x600 + u16::from(ID), &request.encode()).unwrap());
+        let response = self.sent.0.iter().find(|frame| frame.id() == 0x580 + u16::from(ID)).unwrap();
+        match Response::parse(response.data().try_into().unwrap()) {
+            Some(Response::Downloaded(_)) => Ok(()),
+            Some(Response::Abort(_, code)) => Err(code),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+const INVALID_VALUE: u32 = 0x0609_0030;
+
+#[test]
+fn every_number_is_a_pdo_of_its_own() {
+    let mut bench = Bench::operational();
+    assert_eq!(bench.ids(), [0x485, 0x180, 0x505], "those that are valid, on entering Operational");
+    assert_eq!(bench.change(0x2001), [0x485]);
+    assert_eq!(bench.change(0x2002), [0x180]);
+    assert_eq!(bench.change(0x2003), []);
+    bench.write_cob_id(0x19FF, 0x385).unwrap();
+    assert_eq!(bench.change(0x2003), [0x385]);
+    bench.write_cob_id(0x1904, 0xC000_0180).unwrap();
+    assert_eq!((bench.change(0x2002), bench.change(0x2001)), (vec![], vec![0x485]));
+}
+
+#[test]
+fn the_multiplexed_one_has_what_is_mapped_nowhere() {
+    let mut bench = Bench::operational();
+    assert_eq!((bench.change(0x2006), bench.change(0x2003)), (vec![0x505], vec![]));
+    bench.write_cob_id(0x1904, 0xC000_0180).unwrap();
+    assert_eq!(bench.change(0x2002), [], "though its own PDO is off");
+}
+
+#[test]
+fn receive_pdos_go_where_their_mapping_says() {
+    let mut bench = Bench::operational();
+    let values =
+        |bench: &Bench| [0x2004, 0x2005].map(|index| DICTIONARY.field(index, 0).u16(bench.device.image()));
+    assert!([0x206, 0x180].iter().all(|&id| bench.device.process_ids().any(|other| other.get() == id)));
+    bench.receive(&Frame::new(0x180, &[7, 0]).unwrap());
+    assert_eq!(values(&bench), [0, 7]);
+    bench.receive(&Frame::new(0x206, &[9, 0]).unwrap());
+    assert_eq!(values(&bench), [9, 7]);
+    bench.write_cob_id(0x1406, 0x8000_0206).unwrap();
+    bench.receive(&Frame::new(0x206, &[1, 0]).unwrap());
+    bench.receive(&Frame::new(0x180, &[2, 0]).unwrap());
+    assert_eq!(values(&bench), [9, 2]);
+}
+
+#[test]
+fn a_pre_defined_pdo_changes_its_flags_and_nothing_else() {
+    let mut bench = Bench::operational();
+    for (index, value, result) in [
+        (0x1904, 0x4000_0181, Err(INVALID_VALUE)),
+        (0x1904, 0x8000_0181, Err(INVALID_VALUE)),
+        (0x1904, 0x8000_0180, Ok(())),
+        (0x1904, 0x8000_0181, Err(INVALID_VALUE)),
+        (0x1904, 0x0000_0180, Ok(())),
+        // Its default counts from the node-ID.
+        (0x1881, 0xC000_0480, Err(INVALID_VALUE)),
+        (0x1881, 0xC000_0485, Ok(())),
+        (0x1881, 0x0000_0485, Ok(())),
+        // The others may not have what CiA 301 restricts.
+        (0x19FF, 0x0000_0180, Err(INVALID_VALUE)),
+        (0x19FF, 0x0000_0181, Ok(())),
+    ] {
+        assert_eq!(bench.write_cob_id(index, value), result, "{index:X}h = {value:X}h");
+    }
+}

@@ -1,0 +1,21 @@
+//! The rows of the second device, made from those of the device alone.
+
+use super::SHIFT;
+use canopen::dictionary::Object;
+
+/// The rows with their indexes shifted. `N` is the number of rows.
+pub(super) const fn shifted<const N: usize>(rows: &[Object]) -> [Object; N] {
+    let mut out = [row(&rows[0]); N];
+    let mut i = 0;
+    while i < N {
+        out[i] = row(&rows[i]);
+        i += 1;
+    }
+    out
+}
+
+/// A unit that is an index is that of the object which selects it.
+const fn row(row: &Object) -> Object {
+    let unit = if matches!(row.unit.as_bytes(), b"6131h") { "6931h" } else { row.unit };
+    Object { index: row.index + SHIFT, unit, ..*row }
+}

@@ -1,0 +1,40 @@
+//! What the parameter store has of the device itself: what it is to be after the next reset.
+
+use crate::{Personality, Setup};
+use canopen::lss::Configuration;
+use canopen::{Job, NodeId};
+use storage::DeviceRecord;
+
+/// The content of the device record.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Configured {
+    lss: Configuration,
+    pub(crate) personality: Personality,
+}
+
+impl Configured {
+    /// As it was when the node was set up.
+    pub(crate) fn of(setup: &Setup) -> Configured {
+        let lss = Configuration { node_id: setup.node_id, bit_rate: setup.bit_rate };
+        Configured { lss, personality: setup.personality }
+    }
+
+    /// As it is when the job is done.
+    pub(crate) fn after(self, job: Job) -> Configured {
+        match job {
+            Job::Configure(lss) => Configured { lss, ..self },
+            Job::Set(number) => {
+                let personality = Personality::numbered(number).unwrap_or(self.personality);
+                Configured { personality, ..self }
+            }
+            Job::Save(_) | Job::Restore(_) => self,
+        }
+    }
+
+    /// The record to be stored.
+    pub(crate) fn encode(self) -> [u8; DeviceRecord::LEN] {
+        let node_id = self.lss.node_id.map_or(DeviceRecord::UNCONFIGURED, NodeId::get);
+        let record = DeviceRecord::new(node_id, self.lss.bit_rate.kbit(), self.personality.number());
+        record.map_or([0; DeviceRecord::LEN], |record| record.encode())
+    }
+}

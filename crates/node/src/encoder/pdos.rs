@@ -1,0 +1,36 @@
+//! TPDO 1 sends the position by event and timer, TPDO 2 with every SYNC (CiA 406, 6.4); the others wait for a use.
+
+use super::values::POSITION;
+use crate::communication::Tpdo;
+use canopen::dictionary::DefaultValue;
+
+const POSITION_VALUE: &[i64] = &[POSITION as i64];
+
+/// Sent on entering Operational and when the event timer elapses, which is 6200h. With the timer at 0 a change is the
+/// event, as in the other personalities (CiA 301, 7.2.2.4.1).
+pub(crate) const BY_EVENT: Tpdo = Tpdo {
+    number: 0,
+    cob_id: DefaultValue::NodeId(0x180),
+    transmission: 254,
+    event_timer: 0,
+    mapped: POSITION_VALUE,
+};
+
+pub(crate) const BY_SYNC: Tpdo = Tpdo {
+    number: 1,
+    cob_id: DefaultValue::NodeId(0x280),
+    transmission: 1,
+    event_timer: 0,
+    mapped: POSITION_VALUE,
+};
+
+pub(super) const TPDOS: [Tpdo; 8] = [
+    BY_EVENT,
+    BY_SYNC,
+    Tpdo::spare(2),
+    Tpdo::spare(3),
+    Tpdo::spare(4),
+    Tpdo::spare(5),
+    Tpdo::spare(6),
+    Tpdo::spare(7),
+];

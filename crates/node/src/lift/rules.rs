@@ -1,0 +1,129 @@
+//! Rules of the lift's own objects.
+
+use super::values::{Fields, UnitFields};
+use canopen::dictionary::{Entry, Field};
+use canopen::sdo::Abort;
+use profiles::lift::position::{INVERTED, UNKNOWN};
+
+/// 6380h.
+pub(super) const OPERATING: u8 = 0x40;
+/// 6382h.
+pub(super) const PRESET: u8 = 0x41;
+/// 6384h:1.
+pub(super) const STEP: u8 = 0x42;
+/// 6486h.
+pub(super) const REFERENCE: u8 = 0x43;
+/// 2200h.
+pub(super) const TRAVEL: u8 = 0x44;
+/// 2201h.
+pub(super) const SOURCE: u8 = 0x45;
+/// 2100h to 2103h.
+pub(super) const SENSOR: u8 = 0x46;
+
+impl Fields {
+    /// Decides on a write to an object with one of the rules above.
+    ///
+    /// # Errors
+    /// The reason to refuse it.
+    pub fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let unit = usize::from(entry.sub()).wrapping_sub(1);
+        let value = word(bytes);
+        match rule {
+            OPERATING => self.operate(unit, value, image),
+            PRESET => self.preset(unit, value, image),
+            STEP | TRAVEL | SENSOR => self.measure_anew(entry.field(), bytes, image),
+            SOURCE => self.take_source(unit, entry.field(), bytes, image),
+            REFERENCE => self.weigh(value, image),
+            _ => Ok(()),
+        }
+    }
+
+    /// A unit that is turned round stays where it is: the offset follows.
+    fn operate(&self, number: usize, value: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let operating = u16::try_from(value).ok().filter(|bits| bits & !INVERTED == 0);
+        let operating = operating.ok_or(Abort::InvalidValue)?;
+        let unit = self.unit(number)?;
+        if operating != unit.operating.u16(image) {
+            let position = unit.position.u32(image);
+            let turned = self.position_parameters(image).turned(number, position);
+            unit.offset.store(image, turned.unwrap_or(0).to_le_bytes());
+        }
+        Ok(())
+    }
+
+    /// Finds the offset, and shows the position that it leads to: whoever reads it next reads the preset.
+    fn preset(&self, number: usize, preset: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let unit = self.unit(number)?;
+        if unit.source.u8(image) == 0 || unit.state.u8(image) & UNKNOWN != 0 {
+            return Err(Abort::DeviceState);
+        }
+        let position = unit.position.u32(image);
+        let offset = self.position_parameters(image).preset(number, position, preset);
+        unit.offset.store(image, offset.ok_or(Abort::InvalidValue)?.to_le_bytes());
+        unit.position.store(image, preset.to_le_bytes());
+        Ok(())
+    }
+
+    /// Tries another measuring step, way or sensor; what no sensor can give is refused. In other units the offsets have
+    /// lost their meaning and are 0 again, as that of CiA 406 is.
+    fn measure_anew(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let before = Value::of(field, image);
+        field.set(image, bytes);
+        let is_possible = self.sensors.has_format(image) && self.position_parameters(image).is_consistent();
+        field.set(image, before.bytes());
+        if !is_possible {
+            return Err(Abort::InvalidValue);
+        }
+        if bytes != before.bytes() {
+            self.units.iter().for_each(|unit| unit.offset.store(image, [0; 4]));
+        }
+        Ok(())
+    }
+
+    fn take_source(&self, number: usize, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if bytes != field.get(image) {
+            self.unit(number)?.offset.store(image, [0; 4]);
+        }
+        Ok(())
+    }
+
+    /// Says what is in the car now. A load that is not measured is no reference.
+    fn weigh(&self, kilograms: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let is_measured = self.load_parameters(image).is_calibrated() && self.load_state.u8(image) == 0;
+        let reference = u16::try_from(kilograms).map_err(|_| Abort::InvalidValue)?;
+        if !is_measured {
+            return Err(Abort::DeviceState);
+        }
+        let offset = self.load_offset.f32(image) + f32::from(reference) - self.measured_load.f32(image);
+        self.load_offset.store(image, offset.to_le_bytes());
+        self.measured_load.store(image, f32::from(reference).to_le_bytes());
+        self.load.store(image, reference.to_le_bytes());
+        Ok(())
+    }
+
+    fn unit(&self, number: usize) -> Result<&UnitFields, Abort> {
+        self.units.get(number).ok_or(Abort::General)
+    }
+}
+
+/// The number in at most four bytes.
+fn word(bytes: &[u8]) -> u32 {
+    bytes.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
+}
+
+/// A value of at most four bytes.
+struct Value {
+    bytes: [u8; 4],
+    len: usize,
+}
+
+impl Value {
+    fn of(field: Field, image: &[u8]) -> Value {
+        let value = field.get(image);
+        Value { bytes: word(value).to_le_bytes(), len: value.len() }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&self.bytes)
+    }
+}

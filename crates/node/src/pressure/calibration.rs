@@ -1,0 +1,152 @@
+//! Calibration, 2200h to 2204h: manufacturer objects that are written in production and locked after it.
+//!
+//! The formulas are those of [`PressureCalibration`] and [`Thermistor`]. A write needs the key in 2203h, else it is
+//! refused with 0601 0000h; a value that would leave a calibration which is not valid is refused with 0604 0043h. What is
+//! written acts from the next sample on, and is kept when 2204h gets "save". 1010h and 1011h do not touch it.
+
+use super::values::Fields;
+use canopen::dictionary::{Access, Dictionary, Entry, Field, Group, Object, Rule, Type};
+use canopen::sdo::Abort;
+use profiles::pressure::{
+    Calibration, Polynomial, PressureCalibration, TemperatureCalibration, Thermistor, Thermometer,
+};
+
+/// 2200h and 2201h.
+pub(super) const VALUE: u8 = 3;
+/// 2202h.
+pub(super) const RECORD: u8 = 4;
+/// 2203h.
+pub(super) const LOCK: u8 = 5;
+
+/// What 2203h takes to open the lock until the node is reset: "cali". 0 closes it.
+const KEY: [u8; 4] = *b"cali";
+
+const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type, rule: u8) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadWrite)
+        .saved(Group::Calibration)
+        .rule(Rule::Application(rule))
+}
+
+const fn real(index: u16, sub: u8, name: &'static str, default: f32) -> Object {
+    parameter(index, sub, name, Type::Real32, VALUE).real(default)
+}
+
+const fn command(index: u16, name: &'static str, rule: Rule) -> Object {
+    Object::new(index, 0, name, Type::Unsigned32, Access::ReadWrite).rule(rule)
+}
+
+pub(crate) const CALIBRATION: &[Object] = &[
+    Object::highest(0x2200, 11, "Pressure calibration"),
+    real(0x2200, 1, "Pressure at start of range", 0.0).unit("Pa"),
+    real(0x2200, 2, "Pressure at end of range", 1_000_000.0).unit("Pa"),
+    real(0x2200, 3, "Zero ratio", 0.1),
+    real(0x2200, 4, "Zero linear coefficient", 0.0).unit("1/K"),
+    real(0x2200, 5, "Zero quadratic coefficient", 0.0).unit("1/K2"),
+    real(0x2200, 6, "Span ratio", 0.8),
+    real(0x2200, 7, "Span linear coefficient", 0.0).unit("1/K"),
+    real(0x2200, 8, "Span quadratic coefficient", 0.0).unit("1/K2"),
+    real(0x2200, 9, "Reference temperature", 298.15).unit("K"),
+    real(0x2200, 10, "Lowest ratio of an intact sensor", 0.025),
+    real(0x2200, 11, "Highest ratio of an intact sensor", 0.975),
+    Object::highest(0x2201, 7, "Temperature calibration"),
+    // 0: the sensor of the chip, 1: the thermistor.
+    parameter(0x2201, 1, "Thermometer", Type::Unsigned8, VALUE).limits(0, 1),
+    real(0x2201, 2, "Temperature factor", 1.0),
+    real(0x2201, 3, "Temperature offset", 0.0).unit("K"),
+    // 10 kohm at 25 degC, beta 3950 K.
+    real(0x2201, 4, "Thermistor coefficient A", 0.001_022_29).unit("1/K"),
+    real(0x2201, 5, "Thermistor coefficient B", 0.000_253_164_55).unit("1/K"),
+    real(0x2201, 6, "Thermistor coefficient C", 0.0).unit("1/K"),
+    real(0x2201, 7, "Resistor of the thermistor", 10_000.0).unit("ohm"),
+    Object::highest(0x2202, 2, "Calibration record"),
+    parameter(0x2202, 1, "Number of calibrations", Type::Unsigned32, RECORD),
+    // As decimal digits, year, month and day: 20251231. 0 for a device that was not calibrated.
+    parameter(0x2202, 2, "Date of calibration", Type::Unsigned32, RECORD).limits(0, 99_991_231),
+    command(0x2203, "Calibration lock", Rule::Application(LOCK)),
+    command(0x2204, "Save calibration", Rule::StoreCalibration).value(1),
+];
+
+/// Where the values are.
+pub(super) struct Places {
+    pressure: [Field; 11],
+    thermometer: Field,
+    temperature: [Field; 6],
+    lock: Field,
+}
+
+impl Places {
+    pub(super) const fn new(d: &Dictionary) -> Places {
+        Places {
+            pressure: fields(d, 0x2200, 1),
+            thermometer: d.field(0x2201, 1),
+            temperature: fields(d, 0x2201, 2),
+            lock: d.field(0x2203, 0),
+        }
+    }
+
+    /// The calibration in the image. One that no write could have put there acts as the default one.
+    pub(super) fn calibration(&self, image: &[u8]) -> Calibration {
+        Some(self.load(image)).filter(Calibration::is_valid).unwrap_or_default()
+    }
+
+    fn load(&self, image: &[u8]) -> Calibration {
+        let [start, end, z0, z1, z2, s0, s1, s2, reference, break_low, break_high] =
+            self.pressure.map(|field| field.f32(image));
+        let [factor, offset, a, b, c, series] = self.temperature.map(|field| field.f32(image));
+        let [zero, span] = [(z0, z1, z2), (s0, s1, s2)].map(|(constant, linear, quadratic)| Polynomial {
+            constant,
+            linear,
+            quadratic,
+        });
+        let thermometer = match self.thermometer.u8(image) {
+            0 => Thermometer::Internal,
+            _ => Thermometer::Thermistor,
+        };
+        let thermistor = Thermistor { a, b, c, series };
+        Calibration {
+            pressure: PressureCalibration { start, end, zero, span, reference, break_low, break_high },
+            temperature: TemperatureCalibration { thermometer, factor, offset, thermistor },
+        }
+    }
+
+    /// Tries the value, and leaves the image as it was: the device stores what is admitted.
+    fn admits(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> bool {
+        // A shorter value has others behind it, which are put back as they were.
+        let before: [u8; 4] = field.load(image);
+        field.set(image, bytes);
+        let is_valid = self.load(image).is_valid();
+        field.store(image, before);
+        is_valid
+    }
+}
+
+impl Fields {
+    /// Decides on a write to an object with one of the rules above.
+    pub(super) fn write_calibration(
+        &self,
+        rule: u8,
+        entry: &Entry,
+        bytes: &[u8],
+        image: &mut [u8],
+    ) -> Result<(), Abort> {
+        let places = &self.calibration;
+        match rule {
+            LOCK if bytes == KEY || bytes == [0; 4] => Ok(()),
+            LOCK => Err(Abort::NotStored),
+            _ if places.lock.load(image) != KEY => Err(Abort::Access),
+            VALUE if !places.admits(entry.field(), bytes, image) => Err(Abort::Parameter),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The places of `N` values from a sub-index on.
+const fn fields<const N: usize>(d: &Dictionary, index: u16, first: u8) -> [Field; N] {
+    let mut fields = [d.field(index, first); N];
+    let mut i: u8 = 0;
+    while (i as usize) < N {
+        fields[i as usize] = d.field(index, first + i);
+        i += 1;
+    }
+    fields
+}

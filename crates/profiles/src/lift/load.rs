@@ -1,0 +1,269 @@
+//! The load measuring unit: from the pressure input to the load of the car and its signals.
+//!
+//! ```text
+//! RawSample ─ ratio ─ Pa (transducer) ─ filter ─ kg (two points) ─ + zero offset ─ 6480h ─ limits (6483h) ─ 6482h
+//! ```
+//!
+//! Two pressures and the loads that they stand for make the calibration: of the cylinder of a hydraulic lift, or, for a
+//! load cell whose amplifier is on the same input, of the signal that the input takes for a pressure.
+//!
+//! # Where CiA 417 is not public
+//!
+//! The layout of PDO 258 is; what its objects mean is known from products only. These readings are made here and nowhere
+//! else:
+//!
+//! * The load (6480h) is in kg, from 0 to 65535.
+//! * The signals (6482h) are zero, half, full and overload, in bits 0 to 3, with the limits 6483h:1 to 4 in the same
+//!   order. A limit of 0 switches its bit off.
+//! * Zero is signalled below its limit, the others above theirs; where the first limit that is on is the highest,
+//!   everything is the other way round.
+//! * The reference weight (6486h) is the load in the car at the moment when it is written.
+//! * A sensor that is broken gives the highest load there is: a car that cannot be weighed does not leave.
+
+use crate::pressure::{Calibration, Filter, RawSample};
+
+/// Load signal (6482h): the car is empty.
+pub const ZERO_LOAD: u8 = 1 << 0;
+/// Load signal (6482h): half load.
+pub const HALF_LOAD: u8 = 1 << 1;
+/// Load signal (6482h): full load.
+pub const FULL_LOAD: u8 = 1 << 2;
+/// Load signal (6482h): overload.
+pub const OVERLOAD: u8 = 1 << 3;
+
+/// A pressure and the load that it stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// In Pa.
+    pub pressure: f32,
+    /// In kg.
+    pub load: f32,
+}
+
+/// The parameters of the load measuring unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    /// Characteristic of the transducer.
+    pub transducer: Calibration,
+    /// As 61A0h of CiA 404.
+    pub filter_type: u8,
+    /// As 61A1h of CiA 404.
+    pub filter_constant: u8,
+    /// Two different pressures; with two equal ones there is no load measuring unit.
+    pub points: [Point; 2],
+    /// Added to the load in kg.
+    pub offset: f32,
+    /// Load signalling limits (6483h) in kg: zero, half, full, overload.
+    pub limits: [u16; 4],
+}
+
+impl Default for Parameters {
+    /// 10 bar are 1000 kg; the mean of 100 samples; no limits.
+    fn default() -> Parameters {
+        Parameters {
+            transducer: Calibration::default(),
+            filter_type: 2,
+            filter_constant: 100,
+            points: [Point { pressure: 0.0, load: 0.0 }, Point { pressure: 1.0e6, load: 1000.0 }],
+            offset: 0.0,
+            limits: [0; 4],
+        }
+    }
+}
+
+impl Parameters {
+    /// Whether there is a load measuring unit.
+    #[must_use]
+    pub fn is_calibrated(&self) -> bool {
+        self.line().is_some()
+    }
+
+    /// The load in kg at a pressure is `factor * pressure + constant`.
+    fn line(&self) -> Option<(f32, f32)> {
+        let [a, b] = self.points;
+        let factor = (b.load - a.load) / (b.pressure - a.pressure);
+        factor.is_finite().then_some((factor, a.load - factor * a.pressure + self.offset))
+    }
+}
+
+/// What the load measuring unit gives for one sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Snapshot {
+    /// Load (6480h) in kg.
+    pub load: u16,
+    /// Signals (6482h).
+    pub signals: u8,
+    /// The load in kg as it is measured, below 0 too.
+    pub measured: f32,
+    /// The offset that is in it.
+    pub offset: f32,
+    /// The sensor or its wiring is broken.
+    pub is_broken: bool,
+}
+
+/// The load measuring unit and its state.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadUnit {
+    parameters: Parameters,
+    line: Option<(f32, f32)>,
+    filter: Filter,
+}
+
+impl Default for LoadUnit {
+    fn default() -> LoadUnit {
+        LoadUnit::new(&Parameters::default())
+    }
+}
+
+impl LoadUnit {
+    /// A unit that has not measured yet.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> LoadUnit {
+        let filter = Filter::new(parameters.filter_type, parameters.filter_constant);
+        LoadUnit { parameters: *parameters, line: parameters.line(), filter }
+    }
+
+    /// Takes over parameters, from the next sample on. The filter only starts afresh when it is another one.
+    pub fn apply(&mut self, parameters: &Parameters) {
+        let fresh = LoadUnit::new(parameters);
+        let filter = if fresh.filter.is_like(&self.filter) { self.filter } else { fresh.filter };
+        *self = LoadUnit { filter, ..fresh };
+    }
+
+    /// Processes the sums of one millisecond.
+    pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
+        let Some((factor, constant)) = self.line else { return Snapshot::default() };
+        let p = &self.parameters;
+        let is_broken = p.transducer.pressure.is_break(raw.ratio()) || raw.is_rail(raw.pressure);
+        if is_broken {
+            // What comes after it shall not be mixed with what was before.
+            self.filter = Filter::new(p.filter_type, p.filter_constant);
+            let (load, measured) = (u16::MAX, f32::from(u16::MAX));
+            return Snapshot {
+                load,
+                measured,
+                signals: signals(load, &p.limits),
+                offset: p.offset,
+                is_broken,
+            };
+        }
+        let kelvin = p.transducer.temperature.temperature(raw);
+        let pascal = p.transducer.pressure.pressure(raw.ratio(), kelvin);
+        let measured = self.filter.next(pascal) * factor + constant;
+        let load = rounded(measured);
+        Snapshot { load, measured, signals: signals(load, &p.limits), offset: p.offset, is_broken }
+    }
+}
+
+/// To the nearest kg, 0 below 0.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `as` saturates.
+fn rounded(load: f32) -> u16 {
+    (load + 0.5) as u16
+}
+
+/// Object 6482h at a load.
+#[must_use]
+pub fn signals(load: u16, limits: &[u16; 4]) -> u8 {
+    let mut used = limits.iter().filter(|limit| **limit != 0);
+    let is_inverted = match (used.next(), used.next_back()) {
+        (Some(first), Some(last)) => first > last,
+        _ => false,
+    };
+    let bits = [ZERO_LOAD, HALF_LOAD, FULL_LOAD, OVERLOAD];
+    limits.iter().zip(bits).filter(|(limit, _)| **limit != 0).fold(0, |signals, (limit, bit)| {
+        let is_above = (bit == ZERO_LOAD) == is_inverted;
+        let is_set = if is_above { load > *limit } else { load < *limit };
+        if is_set { signals | bit } else { signals }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pressure::FactoryCalibration;
+
+    /// Readings of an intact transducer, 10 % to 90 % of its supply for 0 to 10 bar.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn raw(pascal: f64) -> RawSample {
+        let factory = FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
+        let pressure = (64_000.0 * (0.1 + 0.8 * pascal / 1.0e6)).round() as u32;
+        RawSample { pressure, supply: 64_000, temperature: 0, thermistor: 0, vrefint: 0, count: 16, factory }
+    }
+
+    fn hydraulic() -> Parameters {
+        // An empty car at 20 bar would be beyond the range: 2 bar empty, 6 bar with 800 kg.
+        let points = [Point { pressure: 2.0e5, load: 0.0 }, Point { pressure: 6.0e5, load: 800.0 }];
+        Parameters { filter_type: 0, points, limits: [50, 300, 600, 660], ..Parameters::default() }
+    }
+
+    #[test]
+    fn two_points_make_a_line_that_goes_on() {
+        let mut unit = LoadUnit::new(&hydraulic());
+        for (pascal, load) in [(2.0e5, 0), (3.0e5, 200), (6.0e5, 800), (8.0e5, 1200), (1.0e5, 0)] {
+            let snapshot = unit.sample(&raw(pascal));
+            assert_eq!((snapshot.load, snapshot.is_broken), (load, false), "{pascal}");
+        }
+        assert!((unit.sample(&raw(1.0e5)).measured + 200.0).abs() < 0.1, "below zero");
+    }
+
+    #[test]
+    fn every_signal_has_its_limit() {
+        for (load, expected) in [
+            (0, ZERO_LOAD),
+            (49, ZERO_LOAD),
+            (50, 0),
+            (300, 0),
+            (301, HALF_LOAD),
+            (601, HALF_LOAD | FULL_LOAD),
+            (660, HALF_LOAD | FULL_LOAD),
+            (661, HALF_LOAD | FULL_LOAD | OVERLOAD),
+            (u16::MAX, HALF_LOAD | FULL_LOAD | OVERLOAD),
+        ] {
+            assert_eq!(signals(load, &[50, 300, 600, 660]), expected, "{load}");
+        }
+    }
+
+    #[test]
+    fn a_limit_of_zero_switches_its_bit_off() {
+        assert_eq!(signals(0, &[0; 4]), 0);
+        assert_eq!(signals(u16::MAX, &[0; 4]), 0);
+        assert_eq!(signals(1000, &[50, 0, 0, 660]), OVERLOAD);
+        assert_eq!(signals(10, &[50, 0, 0, 0]), ZERO_LOAD, "one limit is in no order");
+        assert_eq!(signals(700, &[0, 0, 0, 660]), OVERLOAD);
+    }
+
+    #[test]
+    fn limits_that_fall_are_those_of_a_value_that_falls() {
+        for (load, expected) in [(1000, ZERO_LOAD), (900, 0), (500, 0), (399, HALF_LOAD), (99, 14)] {
+            assert_eq!(signals(load, &[900, 400, 200, 100]), expected, "{load}");
+        }
+    }
+
+    #[test]
+    fn a_broken_sensor_is_an_overload() {
+        let mut unit = LoadUnit::new(&hydraulic());
+        for pressure in [0, 65_520] {
+            let snapshot = unit.sample(&RawSample { pressure, ..raw(0.0) });
+            assert_eq!((snapshot.load, snapshot.signals & OVERLOAD), (u16::MAX, OVERLOAD));
+            assert!(snapshot.is_broken);
+        }
+        assert_eq!(unit.sample(&raw(2.0e5)).load, 0);
+    }
+
+    #[test]
+    fn equal_points_are_no_unit() {
+        let points = [Point { pressure: 1.0, load: 0.0 }, Point { pressure: 1.0, load: 100.0 }];
+        let parameters = Parameters { points, ..hydraulic() };
+        assert!(!parameters.is_calibrated());
+        assert_eq!(LoadUnit::new(&parameters).sample(&raw(5.0e5)), Snapshot::default());
+    }
+
+    #[test]
+    fn the_mean_of_many_samples_stays_until_the_next() {
+        let mut unit = LoadUnit::new(&Parameters { filter_type: 2, filter_constant: 4, ..hydraulic() });
+        let loads = [2.0e5, 4.0e5, 4.0e5, 4.0e5, 6.0e5].map(|pascal| unit.sample(&raw(pascal)).load);
+        assert_eq!(loads, [0, 0, 0, 300, 300]);
+        unit.apply(&Parameters { filter_type: 2, filter_constant: 4, offset: 5.0, ..hydraulic() });
+        assert_eq!(unit.sample(&raw(6.0e5)).load, 305, "the filter goes on");
+    }
+}

@@ -1,0 +1,299 @@
+//! The car position unit: up to four positions along the shaft, from the two channels of the encoder.
+//!
+//! The encoder counts the way that its sensor has gone in measuring steps (6384h:1); a position unit adds its offset and
+//! its direction. A preset only finds the offset, so it is a parameter like any other:
+//!
+//! ```text
+//! position (6383h) = ± way + offset, modulo all that the sensor tells apart
+//! ```
+//!
+//! Positions are unsigned as those of CiA 406 are, and go round at the ends: a preset puts the whole way of the car above 0.
+
+use core::num::{NonZeroU16, NonZeroU32};
+
+use crate::encoder::{
+    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Kept, Module, RawEncoder, SENSOR_HELD,
+    Sensor, Start, area_state,
+};
+
+/// Position units that a device can be.
+pub const UNITS: usize = 4;
+
+/// Operating parameter (6380h): the position falls when the sensor counts up.
+pub const INVERTED: u16 = 1 << 3;
+
+/// State of a position unit: the sensor does not give a position.
+pub const UNKNOWN: u8 = 1 << 3;
+
+/// Which channel of the encoder a position unit measures with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The first.
+    First,
+    /// The second.
+    Second,
+}
+
+impl Source {
+    /// By the number of the channel.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Source> {
+        match code {
+            1 => Some(Source::First),
+            2 => Some(Source::Second),
+            _ => None,
+        }
+    }
+
+    fn of<T>(self, [first, second]: &[T; 2]) -> &T {
+        match self {
+            Source::First => first,
+            Source::Second => second,
+        }
+    }
+}
+
+/// The parameters of one position unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnitParameters {
+    /// `None` for a unit that is not there.
+    pub source: Option<Source>,
+    /// Operating parameters (6380h): [`INVERTED`].
+    pub operating: u16,
+    /// From the way to the position, in measuring steps.
+    pub offset: i32,
+    /// Limits of the position (63B4h, 63B8h), compared as those of the work area of CiA 406 are.
+    pub limits: Area,
+}
+
+/// The parameters of the position units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parameters {
+    /// The sensors and the limits of what the board measures. What else is there belongs to CiA 406 and is not used.
+    pub sensors: encoder::Parameters,
+    /// Way of the car in a revolution of a rotary sensor, in um.
+    pub travel: NonZeroU32,
+    /// Position measuring step (6384h:1) in 10 um.
+    pub position_step: NonZeroU16,
+    /// Speed measuring step (6384h:2) in 0.1 mm/s.
+    pub speed_step: NonZeroU16,
+    /// The units.
+    pub units: [UnitParameters; UNITS],
+}
+
+impl Default for UnitParameters {
+    /// Not there.
+    fn default() -> UnitParameters {
+        UnitParameters { source: None, operating: 0, offset: 0, limits: Area { low: 0, high: i32::MAX } }
+    }
+}
+
+impl Default for Parameters {
+    /// Unit 1 with the first channel; 1 mm, 1 mm/s and 200 mm in a revolution.
+    fn default() -> Parameters {
+        let mut units = [UnitParameters::default(); UNITS];
+        let [first, ..] = &mut units;
+        first.source = Some(Source::First);
+        Parameters {
+            sensors: encoder::Parameters::default(),
+            travel: const { NonZeroU32::new(200_000).unwrap() },
+            position_step: const { NonZeroU16::new(100).unwrap() },
+            speed_step: const { NonZeroU16::new(10).unwrap() },
+            units,
+        }
+    }
+}
+
+impl Parameters {
+    /// Whether every sensor resolves the measuring step.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        self.encoder().is_consistent()
+    }
+
+    /// The offset that makes the position of a unit `preset` where it is `position` now; `None` for a unit without a
+    /// sensor and for a preset beyond what the sensor tells apart.
+    #[must_use]
+    pub fn preset(&self, unit: usize, position: u32, preset: u32) -> Option<i32> {
+        let range = self.range(unit)?;
+        let own = self.units.get(unit)?;
+        let moved = i64::from(preset) - i64::from(position);
+        (i64::from(preset) < range).then(|| folded(i64::from(own.offset) + moved, range))
+    }
+
+    /// The offset that leaves the position of a unit as it is when it counts the other way from now on.
+    #[must_use]
+    pub fn turned(&self, unit: usize, position: u32) -> Option<i32> {
+        let (range, own) = (self.range(unit)?, self.units.get(unit)?);
+        // position = ± way + old offset = ∓ way + new offset.
+        Some(folded(2 * i64::from(position) - i64::from(own.offset), range))
+    }
+
+    /// The number of different positions of a unit.
+    fn range(&self, unit: usize) -> Option<i64> {
+        let parameters = self.encoder();
+        let source = self.units.get(unit)?.source?;
+        let sensor = parameters.sensor(source.of(&parameters.channels))?;
+        i64::try_from(parameters.scale(&sensor).range().get()).ok()
+    }
+
+    /// What the encoder gets: both channels count the way.
+    fn encoder(&self) -> encoder::Parameters {
+        let channel = |own: ChannelParameters| ChannelParameters {
+            kind: own.kind,
+            resolution: own.resolution,
+            counted: own.counted,
+            fastest: own.fastest,
+            ..ChannelParameters::default()
+        };
+        encoder::Parameters {
+            operating: 0,
+            travel: Some(self.travel),
+            // In nm and in 0.01 mm/s.
+            step: u32::from(self.position_step.get()) * 10_000,
+            speed_step: u32::from(self.speed_step.get()) * 10,
+            channels: self.sensors.channels.map(channel),
+            module: Module::default(),
+            ..self.sensors
+        }
+    }
+}
+
+/// What a position unit gives for one sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct UnitValues {
+    /// Position (6383h) in measuring steps.
+    pub position: u32,
+    /// The offset that is in it.
+    pub offset: i32,
+    /// Speed (6390h) in speed measuring steps.
+    pub speed: i16,
+    /// [`UNKNOWN`], and whether the position is beyond a limit: bits of the area state of CiA 406.
+    pub state: u8,
+    /// Operating status (63C0h).
+    pub operating_status: u16,
+    /// Resolution (63C1h) of the sensor: steps per revolution, or nm a step.
+    pub resolution: u32,
+    /// Revolutions (63C2h) that the sensor tells apart.
+    pub revolutions: u32,
+    /// Warnings (63C5h): those of CiA 406. What they say holds for both sensors.
+    pub warnings: u16,
+}
+
+/// What the position units give for one sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Snapshot {
+    /// The units.
+    pub units: [UnitValues; UNITS],
+    /// What is reported as an emergency.
+    pub conditions: Conditions,
+}
+
+/// A unit at work.
+#[derive(Clone, Copy, Debug)]
+struct Unit {
+    source: Source,
+    is_inverted: bool,
+    offset: i32,
+    range: i64,
+    limits: Area,
+    /// What depends on parameters alone.
+    fixed: UnitValues,
+}
+
+impl Unit {
+    fn new(all: &Parameters, number: usize, sensor: &Sensor) -> Option<Unit> {
+        let own = all.units.get(number)?;
+        let is_inverted = own.operating & INVERTED != 0;
+        let fixed = UnitValues {
+            offset: own.offset,
+            operating_status: operating_status(is_inverted),
+            resolution: sensor.resolution(),
+            revolutions: sensor.revolutions().into(),
+            ..UnitValues::default()
+        };
+        let (source, range) = (own.source?, all.range(number)?);
+        Some(Unit { source, is_inverted, offset: own.offset, range, limits: own.limits, fixed })
+    }
+
+    fn values(&self, channels: &[ChannelValues; 2], warnings: u16) -> UnitValues {
+        let channel = self.source.of(channels);
+        let way = i64::from(channel.position);
+        let counted = if self.is_inverted { -way } else { way };
+        let position = wrapped(counted + i64::from(self.offset), self.range);
+        UnitValues {
+            position,
+            speed: if self.is_inverted { channel.speed.saturating_neg() } else { channel.speed },
+            state: area_state(&self.limits, &Module::default(), position, 0) | known(channel),
+            warnings,
+            ..self.fixed
+        }
+    }
+}
+
+fn known(channel: &ChannelValues) -> u8 {
+    if channel.sensor_state & SENSOR_HELD == 0 { 0 } else { UNKNOWN }
+}
+
+/// 63C0h: scaling (bit 2) is always on. What is public shows the direction in bit 0, 6380h has it in bit 3: both.
+fn operating_status(is_inverted: bool) -> u16 {
+    encoder::SCALING | if is_inverted { INVERTED | encoder::CODE_SEQUENCE } else { 0 }
+}
+
+/// A position modulo the range, which is 2^32 at most.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn wrapped(position: i64, range: i64) -> u32 {
+    position.checked_rem_euclid(range).unwrap_or(0) as u32
+}
+
+/// The offset nearest to zero that is the same modulo the range.
+#[allow(clippy::cast_possible_truncation)]
+fn folded(offset: i64, range: i64) -> i32 {
+    let offset = i64::from(wrapped(offset, range));
+    (if offset >= range - range / 2 { offset - range } else { offset }) as i32
+}
+
+/// The position units and their sensors.
+#[derive(Clone, Debug)]
+pub struct PositionUnits {
+    encoder: Encoder,
+    units: [Option<Unit>; UNITS],
+}
+
+impl Default for PositionUnits {
+    fn default() -> PositionUnits {
+        PositionUnits::new(Start::First)
+    }
+}
+
+impl PositionUnits {
+    /// The units after power-on. They measure from the first parameters on.
+    #[must_use]
+    pub fn new(start: Start) -> PositionUnits {
+        PositionUnits { encoder: Encoder::new(start), units: [None; UNITS] }
+    }
+
+    /// Takes over parameters, from the next sample on.
+    pub fn apply(&mut self, parameters: &Parameters) {
+        let encoder = parameters.encoder();
+        self.encoder.apply(&encoder);
+        for ((number, unit), own) in (0..).zip(&mut self.units).zip(&parameters.units) {
+            let sensor = own.source.and_then(|source| encoder.sensor(source.of(&encoder.channels)));
+            *unit = sensor.and_then(|sensor| Unit::new(parameters, number, &sensor));
+        }
+    }
+
+    /// Processes what was read in one millisecond.
+    pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
+        let encoder::Snapshot { channels, warnings, conditions, .. } = self.encoder.sample(raw);
+        let values =
+            |unit: Option<Unit>| unit.map(|unit| unit.values(&channels, warnings)).unwrap_or_default();
+        Snapshot { units: self.units.map(values), conditions }
+    }
+
+    /// What is to outlive a loss of power.
+    #[must_use]
+    pub fn kept(&self) -> Kept {
+        self.encoder.kept()
+    }
+}

@@ -1,0 +1,212 @@
+//! The temperature in K, by the chip's sensor or by a thermistor.
+
+use super::RawSample;
+
+/// Temperatures at which the chip's maker took `TS_CAL1` and `TS_CAL2`, in K.
+const TS_CAL1_KELVIN: f32 = 303.15;
+const TS_CAL2_KELVIN: f32 = 383.15;
+/// Codes of a 12-bit conversion.
+const CODES: u32 = 4096;
+
+/// What measures the temperature.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Thermometer {
+    /// The sensor inside the chip.
+    #[default]
+    Internal,
+    /// A thermistor on an input of the converter.
+    Thermistor,
+}
+
+/// A thermistor (NTC) to ground with a resistor to VDDA, and its characteristic by Steinhart and Hart:
+///
+/// ```text
+/// 1 / T = a + b ln R + c (ln R)³,    R = series * n / (4096 - n)
+/// ```
+///
+/// A thermistor that is known by its resistance R0 at T0 and its beta has a = 1/T0 - ln R0 / beta, b = 1/beta, c = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thermistor {
+    /// In 1/K.
+    pub a: f32,
+    /// In 1/K, for R in ohm.
+    pub b: f32,
+    /// In 1/K.
+    pub c: f32,
+    /// The resistor to VDDA in ohm.
+    pub series: f32,
+}
+
+/// The calibration of the temperature: what is measured, times the factor, plus the offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TemperatureCalibration {
+    /// What measures it.
+    pub thermometer: Thermometer,
+    /// Factor on the measured temperature in K.
+    pub factor: f32,
+    /// Added after it, in K.
+    pub offset: f32,
+    /// Used when it measures.
+    pub thermistor: Thermistor,
+}
+
+impl Default for Thermistor {
+    /// 10 kohm at 25 degC, beta 3950 K, with 10 kohm.
+    fn default() -> Thermistor {
+        Thermistor { a: 0.001_022_29, b: 0.000_253_164_55, c: 0.0, series: 10_000.0 }
+    }
+}
+
+impl Default for TemperatureCalibration {
+    fn default() -> TemperatureCalibration {
+        let (thermometer, thermistor) = (Thermometer::default(), Thermistor::default());
+        TemperatureCalibration { thermometer, factor: 1.0, offset: 0.0, thermistor }
+    }
+}
+
+impl TemperatureCalibration {
+    /// The temperature in K; `None` when it is not measured: an input at a rail, no factory calibration, or no number.
+    #[must_use]
+    pub fn temperature(&self, raw: &RawSample) -> Option<f32> {
+        let measured = match self.thermometer {
+            Thermometer::Internal => internal(raw),
+            Thermometer::Thermistor => self.thermistor.temperature(raw),
+        };
+        measured.map(|kelvin| kelvin * self.factor + self.offset).filter(|kelvin| kelvin.is_finite())
+    }
+
+    /// Whether a warmer sensor always gives a higher finite temperature.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let is_rising = self.factor > 0.0 && self.factor.is_finite() && self.offset.is_finite();
+        is_rising && self.thermistor.is_valid()
+    }
+}
+
+impl Thermistor {
+    fn temperature(&self, raw: &RawSample) -> Option<f32> {
+        let full = CODES * u32::from(raw.count);
+        if raw.is_rail(raw.thermistor) {
+            return None;
+        }
+        let resistance = self.series * (real(raw.thermistor) / real(full.saturating_sub(raw.thermistor)));
+        Some(1.0 / self.reciprocal(libm::logf(resistance))).filter(|kelvin| *kelvin > 0.0)
+    }
+
+    fn reciprocal(&self, log: f32) -> f32 {
+        self.a + log * (self.b + self.c * log * log)
+    }
+
+    /// A higher resistance must be a lower temperature wherever the converter can tell. The slope `b + 3c (ln R)²` is
+    /// monotonic in the square of the logarithm, so it has its extremes at an end or at 1 ohm.
+    fn is_valid(&self) -> bool {
+        let ends = [self.series / real(CODES), 1.0, self.series * real(CODES)];
+        let falls = |log: f32| self.b + 3.0 * self.c * log * log > 0.0 && self.reciprocal(log).is_finite();
+        self.series > 0.0 && ends.map(libm::logf).into_iter().all(falls)
+    }
+}
+
+/// Sensor and reference are read against the same VDDA, so their quotient times the reference's reading at 3.3 V is the
+/// sensor's reading at 3.3 V (RM0390, 13.10), for which the factory's two points hold. `None` without them.
+fn internal(raw: &RawSample) -> Option<f32> {
+    let points = raw.factory;
+    if raw.vrefint == 0 || points.ts_cal1 == points.ts_cal2 || raw.is_rail(raw.temperature) {
+        return None;
+    }
+    let at_3300_mv = real(raw.temperature) / real(raw.vrefint) * f32::from(points.vrefint_cal);
+    let (low, high) = (f32::from(points.ts_cal1), f32::from(points.ts_cal2));
+    Some(TS_CAL1_KELVIN + (at_3300_mv - low) * (TS_CAL2_KELVIN - TS_CAL1_KELVIN) / (high - low))
+}
+
+/// Exact up to 2^24: sums of 4096 conversions.
+#[allow(clippy::cast_precision_loss)]
+fn real(sum: u32) -> f32 {
+    sum as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pressure::FactoryCalibration;
+
+    const RAW: RawSample = RawSample {
+        pressure: 0,
+        supply: 0,
+        temperature: 16 * 1000,
+        vrefint: 16 * 1500,
+        thermistor: 16 * 2048,
+        count: 16,
+        factory: FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 },
+    };
+
+    fn thermistor(thermistor: u32) -> Option<f32> {
+        let own = TemperatureCalibration { thermometer: Thermometer::Thermistor, ..Default::default() };
+        own.temperature(&RawSample { thermistor, ..RAW })
+    }
+
+    #[test]
+    fn half_of_the_supply_is_the_resistance_at_25_degrees() {
+        let kelvin = thermistor(16 * 2048).unwrap();
+        assert!((kelvin - 298.15).abs() < 0.001, "{kelvin}");
+        // beta 3950: 32.65 kohm at 0 degC and 0.974 kohm at 85 degC, computed in double precision.
+        for kelvin in [273.15, 358.15_f64] {
+            let resistance = 10_000.0 * (3950.0 * (1.0 / kelvin - 1.0 / 298.15)).exp();
+            let sum = 65_536.0 * resistance / (resistance + 10_000.0);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let measured = thermistor(sum.round() as u32).unwrap();
+            assert!((f64::from(measured) - kelvin).abs() < 0.01, "{measured} for {kelvin}");
+        }
+    }
+
+    #[test]
+    fn steinhart_and_hart_of_a_data_sheet() {
+        // 10 kohm, beta(25/85) 3435 K: coefficients of a fit, R at 0 degC 27.28 kohm (1/T by the formula in double).
+        let own = Thermistor { a: 1.129_148e-3, b: 2.341_25e-4, c: 8.767_41e-8, series: 10_000.0 };
+        assert!(own.is_valid());
+        let resistance: f64 = 10_000.0;
+        let log = resistance.ln();
+        let expected = 1.0 / (1.129_148e-3 + 2.341_25e-4 * log + 8.767_41e-8 * log.powi(3));
+        let kelvin = own.temperature(&RAW).unwrap();
+        assert!((f64::from(kelvin) - expected).abs() < 0.001, "{kelvin} for {expected}");
+        assert!((expected - 298.15).abs() < 0.01);
+    }
+
+    #[test]
+    fn an_input_at_a_rail_is_no_temperature() {
+        for sum in [0, 16 * 4095, 16 * 4096, u32::MAX] {
+            assert_eq!(thermistor(sum), None);
+            let own = TemperatureCalibration::default();
+            assert_eq!(own.temperature(&RawSample { temperature: sum, ..RAW }), None);
+        }
+        assert!(thermistor(1).is_some() && thermistor(16 * 4095 - 1).is_some());
+    }
+
+    #[test]
+    fn the_trim_comes_last() {
+        let own = TemperatureCalibration { factor: 1.01, offset: -2.0, ..Default::default() };
+        let plain = TemperatureCalibration::default().temperature(&RAW).unwrap();
+        assert!((own.temperature(&RAW).unwrap() - (plain * 1.01 - 2.0)).abs() < 1e-3);
+        assert!((plain - (303.15 + 60.0 * 80.0 / 270.0)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn what_gives_no_single_rising_temperature_is_not_valid() {
+        let good = TemperatureCalibration::default();
+        assert!(good.is_valid());
+        for factor in [0.0, -1.0, f32::INFINITY, f32::NAN] {
+            assert!(!TemperatureCalibration { factor, ..good }.is_valid());
+        }
+        assert!(!TemperatureCalibration { offset: f32::NAN, ..good }.is_valid());
+        let thermistor = good.thermistor;
+        for bad in [
+            Thermistor { b: 0.0, ..thermistor },
+            Thermistor { b: -1e-4, ..thermistor },
+            Thermistor { c: -1e-6, ..thermistor },
+            Thermistor { a: f32::INFINITY, ..thermistor },
+            Thermistor { series: 0.0, ..thermistor },
+            Thermistor { series: -1.0, ..thermistor },
+        ] {
+            assert!(!TemperatureCalibration { thermistor: bad, ..good }.is_valid());
+        }
+    }
+}

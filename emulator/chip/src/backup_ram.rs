@@ -1,0 +1,40 @@
+//! Backup SRAM: 4 KiB in the backup domain (RM0390 section 5.1.2, RM0090 section 5.1.2). PWR decides who may write and
+//! whether it outlives a loss of the main supply.
+
+/// Bytes.
+pub(crate) const SIZE: u32 = 4096;
+
+/// What every byte is once its supply was gone: like RAM it then holds nothing that a program may count on.
+const LOST: u8 = 0xA5;
+
+#[derive(Clone)]
+pub(crate) struct BackupRam {
+    words: Vec<u32>,
+}
+
+impl Default for BackupRam {
+    fn default() -> Self {
+        Self { words: vec![u32::from_le_bytes([LOST; 4]); SIZE as usize / 4] }
+    }
+}
+
+impl BackupRam {
+    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+        self.words.get(offset as usize / 4).copied()
+    }
+
+    pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
+        *self.words.get_mut(offset as usize / 4)? = value;
+        Some(())
+    }
+
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    }
+
+    /// Takes over what was there, from the start; what is too much is left out.
+    pub(crate) fn set_bytes(&mut self, bytes: &[u8]) {
+        let (words, _) = bytes.as_chunks();
+        self.words.iter_mut().zip(words).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
+    }
+}

@@ -1,0 +1,155 @@
+//! The tables of tables/: what the documents say of every object, in rows. The node's own tables are others.
+
+use std::collections::BTreeMap;
+
+use node::{Personality, REVISION, Setup, VENDOR_ID};
+
+use crate::bench::{ID, setup};
+
+/// The CMP 8271: its communication segment, its own objects and CiA 404.
+const TRANSMITTER: &str = include_str!("../tables/cia404.csv");
+/// How a transmitter is calibrated.
+const CALIBRATION: &str = include_str!("../tables/calibration.csv");
+/// What every node has of CiA 301 beyond that, and objects of its own.
+const COMMUNICATION: &str = include_str!("../tables/cia301.csv");
+/// CiA 406, classes C1 and C2.
+const ENCODER: &str = include_str!("../tables/cia406.csv");
+/// Which sensors an encoder has.
+const SENSORS: &str = include_str!("../tables/encoder_sensors.csv");
+/// What is different in the communication segment of an encoder.
+const ENCODER_ALONE: &str = include_str!("../tables/encoder.csv");
+/// What is different in that of both in one, and the types of the two devices.
+const COMBINED: &str = include_str!("../tables/combined.csv");
+
+/// What a table says of an entry.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Index.
+    pub index: u16,
+    /// Sub-index.
+    pub sub: u8,
+    /// Name.
+    pub name: &'static str,
+    /// Data type, by its name in CiA 301.
+    pub kind: &'static str,
+    /// const, ro, wo or rw.
+    pub access: &'static str,
+    /// A value, or a word in capitals for one that is not in the table.
+    pub default: &'static str,
+    /// no, tpdo or rpdo.
+    pub mapping: &'static str,
+}
+
+impl Row {
+    fn parse(line: &'static str) -> Row {
+        let cells: Vec<&str> = line.split(',').collect();
+        // The table of CiA 406 has one column more: what is mandatory.
+        let [index, sub, name, kind, access, default, mapping, ..] = cells[..] else { panic!("{line}") };
+        let index = u16::try_from(integer(index)).expect("an index");
+        Row { index, sub: sub.parse().expect("a sub-index"), name, kind, access, default, mapping }
+    }
+
+    /// Bytes of a value; `None` for what has any length.
+    ///
+    /// # Panics
+    /// When the table names a type that does not exist.
+    #[must_use]
+    pub fn size(&self) -> Option<usize> {
+        match self.kind {
+            "UNSIGNED8" => Some(1),
+            "UNSIGNED16" | "INTEGER16" => Some(2),
+            "UNSIGNED32" | "INTEGER32" | "REAL32" => Some(4),
+            "UNSIGNED64" => Some(8),
+            "VISIBLE_STRING" | "DOMAIN" => None,
+            other => panic!("{other}"),
+        }
+    }
+
+    /// Whether it takes a value.
+    #[must_use]
+    pub fn is_writable(&self) -> bool {
+        matches!(self.access, "rw" | "wo")
+    }
+
+    /// The default value as an upload gives it; `None` for what is measured or cannot be read.
+    ///
+    /// # Panics
+    /// When the table has no value of its type.
+    #[must_use]
+    pub fn default(&self, personality: Personality) -> Option<Vec<u8>> {
+        let number = |value: i64| value.to_le_bytes()[..self.size().expect("a number")].to_vec();
+        let Setup { serial_number, program_id, hardware_version, software_version, .. } = setup();
+        Some(match self.default {
+            "$MEASURED" | "$NONE" => return None,
+            "$VENDOR" => number(VENDOR_ID.into()),
+            "$PRODUCT" => number(personality.product_code().into()),
+            "$PERSONALITY" => number(personality.number().into()),
+            "$REVISION" => number(REVISION.into()),
+            "$SERIAL" => number(serial_number.into()),
+            "$PROGRAM" => number(program_id.into()),
+            "$HARDWARE" => hardware_version.into(),
+            "$SOFTWARE" => software_version.into(),
+            text if text.starts_with('"') => text.trim_matches('"').into(),
+            text if self.kind == "REAL32" => text.parse::<f32>().expect("a number").to_le_bytes().to_vec(),
+            text => match text.strip_prefix("$NODEID+") {
+                Some(base) => number(integer(base) + i64::from(ID)),
+                None => number(integer(text)),
+            },
+        })
+    }
+
+    /// The value of a mapping parameter that maps it.
+    ///
+    /// # Panics
+    /// When it has more than 31 bytes.
+    #[must_use]
+    pub fn mapping_entry(&self) -> [u8; 4] {
+        let bits = u8::try_from(self.size().unwrap_or(0) * 8).expect("bits");
+        let [low, high] = self.index.to_le_bytes();
+        [bits, self.sub, low, high]
+    }
+}
+
+fn integer(text: &str) -> i64 {
+    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));
+    sign * match digits.strip_prefix("0x") {
+        Some(digits) => i64::from_str_radix(digits, 16).expect("digits"),
+        None => digits.parse().expect("digits"),
+    }
+}
+
+fn rows(table: &'static str) -> impl Iterator<Item = Row> {
+    table.lines().skip(1).map(Row::parse)
+}
+
+/// Whether an object belongs to the transmitter itself, and not to every device.
+fn is_transmitter(row: &Row) -> bool {
+    row.index == 0x1002 || row.index >= 0x2000
+}
+
+/// In a module of two devices the second has its profile 800h higher (CiA 301, 7.5.2.1).
+fn as_second_device(row: Row) -> Row {
+    let shift = if row.index >= 0x6000 { 0x800 } else { 0 };
+    Row { index: row.index + shift, ..row }
+}
+
+/// Every entry that the documents give a node of this personality.
+#[must_use]
+pub fn table(personality: Personality) -> Vec<Row> {
+    let (transmitter, common) = (rows(TRANSMITTER).chain(rows(CALIBRATION)), rows(COMMUNICATION));
+    let encoder = || rows(ENCODER).chain(rows(SENSORS));
+    let all: Vec<Row> = match personality {
+        Personality::Pressure => common.chain(transmitter).collect(),
+        Personality::Encoder => {
+            let device = transmitter.filter(|row| !is_transmitter(row));
+            device.chain(common).chain(encoder()).chain(rows(ENCODER_ALONE)).collect()
+        }
+        Personality::Combined => {
+            let second = transmitter.map(as_second_device);
+            second.chain(common).chain(encoder()).chain(rows(COMBINED)).collect()
+        }
+    };
+    // What comes later is more special.
+    let entries: BTreeMap<_, _> = all.into_iter().map(|row| ((row.index, row.sub), row)).collect();
+    entries.into_values().collect()
+}

@@ -1,0 +1,229 @@
+//! The encoders on the emulated board: from the shaft to the bus.
+
+use canbus::Time;
+use sim::stimuli::Stimulus;
+use sim::world::World;
+
+use crate::support::{Master, SECOND, START_ALL, SYNC, run, world};
+
+/// TPDO 2, which carries the position with every SYNC.
+const TPDO2: u16 = 0x281;
+/// Steps in a revolution: of the incremental encoder, and of the absolute one.
+const COUNTS: f64 = 4096.0;
+const STEPS: f64 = 8192.0;
+
+const POSITION: (u16, u8) = (0x6004, 0);
+const OPERATING: (u16, u8) = (0x6000, 0);
+const PER_REVOLUTION: (u16, u8) = (0x6001, 0);
+const SPEED: (u16, u8) = (0x6030, 1);
+const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
+const FASTEST: (u16, u8) = (0x2104, 1);
+const SENSOR_STATE: (u16, u8) = (0x210B, 1);
+
+/// Codes of sensor types (object 1000h).
+const MULTI_TURN: u32 = 2;
+/// Operating parameters: the scaling works.
+const SCALING: u32 = 1 << 2;
+/// Sensor states.
+const NO_SIGNAL: u32 = 1 << 0;
+const IMPLAUSIBLE: u32 = 1 << 3;
+const UNREFERENCED: u32 = 1 << 5;
+const POSITION_ERROR: u32 = 1 << 7;
+
+/// A node with an encoder, a second after power-on.
+fn start(flags: &str) -> (World, Master) {
+    let mut world = world(&format!("--node 1:encoder --bitrate 1000 {flags}"));
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    (world, master)
+}
+
+fn stimulate(world: &mut World, kind: &str, spec: &str) {
+    world.apply(&Stimulus::parse(kind, spec).unwrap());
+}
+
+fn wait(world: &mut World, millis: u64) {
+    world.run_until(world.now() + Time::from_millis(millis));
+}
+
+fn request(command: u8, (index, sub): (u16, u8), value: u32) -> [u8; 8] {
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+    [command, low, high, sub, a, b, c, d]
+}
+
+fn read(world: &mut World, master: &Master, object: (u16, u8)) -> u32 {
+    let answer = master.ask(world, 1, &request(0x40, object, 0));
+    assert_eq!(answer[0] & 0xE3, 0x43, "{object:x?}: {answer:x?}");
+    let unused = usize::from(answer[0] >> 2 & 3);
+    answer[4..8 - unused].iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
+}
+
+/// Writes an object of `size` bytes.
+fn write(world: &mut World, master: &Master, object: (u16, u8), size: u8, value: u32) {
+    let answer = master.ask(world, 1, &request(0x23 | (4 - size) << 2, object, value));
+    assert_eq!(answer[0], 0x60, "{object:x?}: {answer:x?}");
+}
+
+/// Where the shaft is, in steps.
+fn shaft(world: &mut World, at: Time, steps: f64) -> i64 {
+    (world.machine(0).peripherals().plant().revolutions(at) * steps).floor() as i64
+}
+
+fn position(tpdo: &[u8]) -> i64 {
+    i64::from(u32::from_le_bytes(tpdo[..4].try_into().unwrap()))
+}
+
+/// The largest age of a position, at the SYNC that samples it, that explains what came, in microseconds; the range of
+/// positions has `range` steps, and the shaft makes `per_second` of them.
+fn age(shaft: i64, position: i64, range: i64, per_second: f64) -> f64 {
+    let behind = (shaft - position + range / 2).rem_euclid(range) - range / 2;
+    behind as f64 / per_second * 1e6
+}
+
+/// The ages of the positions that a thousand SYNCs get, the least and the most.
+fn ages(world: &mut World, master: &Master, steps: f64, range: i64, per_second: f64) -> (f64, f64) {
+    let (mut least, mut most) = (f64::MAX, f64::MIN);
+    for _ in 0..1000 {
+        // A SYNC lasts 44 to 56 us at 1 Mbit/s; what it samples is right when it has ended.
+        let end = world.now() + Time::from_micros(50);
+        let expected = shaft(world, end, steps);
+        master.send(world, SYNC, &[]);
+        world.run_until(world.now() + Time::from_micros(997));
+        let tpdos = master.heard(world, TPDO2);
+        assert_eq!(tpdos.len(), 1);
+        let age = age(expected, position(tpdos[0].bytes()), range, per_second);
+        (least, most) = (least.min(age), most.max(age));
+    }
+    (least, most)
+}
+
+/// The shaft turns at 6000 rpm, 410 counts a millisecond: the timer wraps every 160 ms. What a SYNC gets is at most one
+/// sample old, the speed is right, and each index comes where it is expected.
+#[test]
+fn a_fast_shaft_is_followed_both_ways_across_the_wrap() {
+    for rpm in [6000, -6000] {
+        let (mut world, master) = start("");
+        assert_eq!(read(&mut world, &master, SENSOR_STATE), UNREFERENCED);
+        stimulate(&mut world, "shaft", &format!("rpm:{rpm}"));
+        master.send(&mut world, START_ALL.0, &START_ALL.1);
+        wait(&mut world, 20);
+        master.heard(&mut world, TPDO2);
+        let per_second = COUNTS * f64::from(rpm) / 60.0;
+        let (least, most) = ages(&mut world, &master, COUNTS, 1 << 24, per_second);
+        println!("{rpm} rpm: positions are {least:.0} to {most:.0} us old");
+        assert!(least > 0.0 && most < 1200.0, "{rpm} rpm: {least} to {most} us");
+        assert_eq!(
+            read(&mut world, &master, SENSOR_STATE),
+            0,
+            "no step is lost and the index is in its place"
+        );
+        // In 64 units a revolution the speed fits 6030h.
+        write(&mut world, &master, PER_REVOLUTION, 4, 64);
+        write(&mut world, &master, OPERATING, 2, SCALING);
+        wait(&mut world, 10);
+        let speed = read(&mut world, &master, SPEED) as u16 as i16;
+        let expected = rpm / 60 * 64;
+        assert!((i32::from(speed) - expected).abs() <= expected.abs() / 100, "{speed} instead of {expected}");
+        let summary = run(&mut world, Time::from_millis(1));
+        assert!(summary.nodes[0].incidents.is_empty() && summary.nodes[0].unmodelled.is_empty(), "{summary}");
+        assert!((summary.nodes[0].sampling.rate - 1000.0).abs() < 1e-6, "{summary}");
+        println!("{summary}");
+    }
+}
+
+/// Without an index nothing tells where the zero of a turn is.
+#[test]
+fn an_index_that_does_not_come_is_missed() {
+    let (mut world, master) = start("--shaft rpm:600 --fault missing-index@0..2");
+    wait(&mut world, 900);
+    assert_eq!(read(&mut world, &master, SENSOR_STATE), UNREFERENCED);
+    wait(&mut world, 300);
+    assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
+}
+
+/// Tells the node that its sensor is absolute.
+fn start_absolute(flags: &str) -> (World, Master) {
+    let (mut world, master) = start(flags);
+    write(&mut world, &master, SENSOR_TYPE, 1, MULTI_TURN);
+    write(&mut world, &master, FASTEST, 4, 1000);
+    wait(&mut world, 10);
+    (world, master)
+}
+
+#[test]
+fn the_absolute_encoder_tells_where_the_shaft_is() {
+    let (mut world, master) = start_absolute("--shaft const:1234.5");
+    assert_eq!(f64::from(read(&mut world, &master, POSITION)), 1234.5 * STEPS);
+    assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
+}
+
+/// A word is started with one sample and taken with the next one: its position is up to two milliseconds old.
+#[test]
+fn the_absolute_encoder_follows_a_fast_shaft_both_ways_over_its_zero() {
+    for rpm in [6000, -6000] {
+        let (mut world, master) = start_absolute("");
+        stimulate(&mut world, "shaft", &format!("rpm:{rpm}"));
+        master.send(&mut world, START_ALL.0, &START_ALL.1);
+        wait(&mut world, 20);
+        master.heard(&mut world, TPDO2);
+        let per_second = STEPS * f64::from(rpm) / 60.0;
+        let (least, most) = ages(&mut world, &master, STEPS, 1 << 25, per_second);
+        println!("{rpm} rpm: positions are {least:.0} to {most:.0} us old");
+        assert!(least > 900.0 && most < 2200.0, "{rpm} rpm: {least} to {most} us");
+        assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
+        println!("{}", run(&mut world, Time::from_millis(1)));
+    }
+}
+
+#[test]
+fn faults_of_the_absolute_encoder_are_told() {
+    let (mut world, master) =
+        start_absolute("--shaft const:2.25 --fault open-ssi@2..3 --fault wrong-code@4..5");
+    // Half a revolution takes four seconds then, and is implausible for so long.
+    write(&mut world, &master, FASTEST, 4, 1);
+    let (open, wrong) = (NO_SIGNAL | POSITION_ERROR, IMPLAUSIBLE | POSITION_ERROR);
+    for (at, state) in [(1500, 0), (2500, open), (3500, 0), (4500, wrong), (5500, 0)] {
+        world.run_until(Time::from_millis(at));
+        assert_eq!(read(&mut world, &master, SENSOR_STATE), state, "at {at} ms");
+        let position = f64::from(read(&mut world, &master, POSITION));
+        assert_eq!(position, 2.25 * STEPS, "the last good one, at {at} ms");
+    }
+}
+
+/// Switches the board off for a second, and on again.
+fn cycle_power(world: &mut World) {
+    let now = world.now();
+    world.machine(0).power_off();
+    world.run_until(now + SECOND);
+    let now = world.now();
+    world.machine(0).power_on(now);
+    world.run_until(now + SECOND);
+}
+
+#[test]
+fn the_turns_are_kept_through_a_loss_of_power() {
+    let (mut world, master) = start("");
+    let mut before = 0.0;
+    for turns in [37.25, -3.5] {
+        stimulate(&mut world, "shaft", &format!("ramp:{before},{turns},0.5"));
+        before = turns;
+        wait(&mut world, 600);
+        let expected = (turns * COUNTS) as i64 as u32 & 0xFF_FFFF;
+        assert_eq!(read(&mut world, &master, POSITION), expected);
+        cycle_power(&mut world);
+        assert_eq!(read(&mut world, &master, POSITION), expected);
+    }
+}
+
+#[test]
+fn without_a_battery_the_count_begins_anew() {
+    let (mut world, master) = start("--fault battery-empty@0");
+    stimulate(&mut world, "shaft", "rpm:600");
+    wait(&mut world, 1000);
+    stimulate(&mut world, "shaft", "const:10");
+    wait(&mut world, 10);
+    assert_eq!(f64::from(read(&mut world, &master, POSITION)), 10.0 * COUNTS);
+    cycle_power(&mut world);
+    assert_eq!(read(&mut world, &master, POSITION), 0);
+    assert_eq!(read(&mut world, &master, SENSOR_STATE), UNREFERENCED);
+}

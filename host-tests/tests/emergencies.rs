@@ -1,0 +1,169 @@
+//! Every row of tables/emcy.csv on the running node: the fault, its EMCY message, 1003h, 1001h and its flag in 3000h. The
+//! node is the combined one, which has them all. Codes without a fault are never sent; the table says why.
+
+use std::collections::BTreeSet;
+
+use canopen::Frame;
+use host_tests::bench::{Bench, ID, raw};
+use node::{BusEvent, Fault, Personality, RawSample};
+use profiles::encoder::Board;
+
+const TABLE: &str = include_str!("../tables/emcy.csv");
+/// A number of mapped objects that makes it a multiplexed PDO with a destination.
+const MULTIPLEXED: u8 = 255;
+const EMCY: u16 = 0x080 + ID as u16;
+
+#[derive(Debug)]
+struct Row {
+    code: u16,
+    flag: Option<(u16, u8, u32)>,
+    fault: Option<Fault>,
+    remark: &'static str,
+}
+
+fn rows() -> impl Iterator<Item = Row> {
+    TABLE.lines().skip(1).map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let &[code, _meaning, index, sub, bit, fault, remark] = &cells[..] else { panic!("{line}") };
+        let hex = |text: &str| u16::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
+        let flag = (!index.is_empty()).then(|| (hex(index), sub.parse().unwrap(), bit.parse().unwrap()));
+        let fault = (!fault.is_empty()).then(|| named(fault));
+        Row { code: hex(code), flag, fault, remark }
+    })
+}
+
+fn named(name: &str) -> Fault {
+    Fault::all().find(|fault| format!("{fault:?}") == name).unwrap_or_else(|| panic!("no fault {name}"))
+}
+
+fn intact() -> RawSample {
+    raw(100_000.0, 298.15)
+}
+
+/// A node that measures with everything in order.
+fn measuring() -> Bench {
+    let mut bench = Bench::booted_as(Personality::Combined);
+    bench.encoder.board = Board { supply: Some(5000), current: Some(100), ..Board::default() };
+    (0..20).for_each(|_| bench.sample(&intact()));
+    bench.nmt(1);
+    bench.take();
+    bench
+}
+
+/// Brings the fault about from outside, where the bench has the means; otherwise as the firmware does that has found it.
+fn provoke(bench: &mut Bench, fault: Fault) {
+    let mut sample = intact();
+    match fault {
+        Fault::SensorBreak => sample.pressure = 100,
+        Fault::PressureRail => sample.pressure = 0,
+        Fault::TemperatureRail => sample.temperature = 0,
+        Fault::EncoderBreak => bench.write(0x2100, 1, &[2]).unwrap(),
+        Fault::InputCurrent => bench.encoder.board.current = Some(1000),
+        Fault::InputVoltage => bench.encoder.board.supply = Some(0),
+        Fault::HardwareMemory => bench.encoder.board.memory_error = true,
+        Fault::Overrun => return tell(bench, BusEvent::Overrun),
+        Fault::ErrorPassive => return tell(bench, BusEvent::Passive),
+        Fault::BusOffRecovered => {
+            tell(bench, BusEvent::BusOff);
+            return tell(bench, BusEvent::Recovered);
+        }
+        Fault::SyncLength => return bench.receive(&Frame::new(0x80, &[1, 2]).unwrap()),
+        Fault::SyncMissing => {
+            bench.write(0x1006, 0, &5000_u32.to_le_bytes()).unwrap();
+            bench.receive(&Frame::new(0x80, &[]).unwrap());
+        }
+        Fault::RpdoTooShort(_) => return receive_pdo(bench, 1, &[]),
+        Fault::RpdoTooLong(_) => return receive_pdo(bench, 1, &[1, 2]),
+        Fault::RpdoDeadline(_) => {
+            bench.write(0x1400, 5, &10_u16.to_le_bytes()).unwrap();
+            receive_pdo(bench, 1, &[1]);
+        }
+        Fault::MpdoNotTaken => {
+            return receive_pdo(bench, MULTIPLEXED, &[0x80 | ID, 0x00, 0x50, 0, 0, 0, 0, 0]);
+        }
+        Fault::Heartbeat(_) => {
+            bench.write(0x1016, 1, &0x0005_0005_u32.to_le_bytes()).unwrap();
+            bench.receive(&Frame::new(0x705, &[5]).unwrap());
+        }
+        _ => return bench.protocol.set_fault(fault, true, bench.now, &mut bench.out),
+    }
+    (0..1000).for_each(|_| bench.sample(&sample));
+}
+
+/// RPDO 1 with this many objects, the first of them a byte that nobody takes (CiA 301, 7.4.7.1), and its data.
+fn receive_pdo(bench: &mut Bench, objects: u8, data: &[u8]) {
+    let id = 0x200 + u16::from(ID);
+    bench.write(0x1600, 1, &0x0005_0008_u32.to_le_bytes()).unwrap();
+    bench.write(0x1600, 0, &[objects]).unwrap();
+    bench.write(0x1400, 1, &u32::from(id).to_le_bytes()).unwrap();
+    bench.receive(&Frame::new(id, data).unwrap());
+}
+
+fn tell(bench: &mut Bench, event: BusEvent) {
+    bench.protocol.bus_event(event, bench.now, &mut bench.out);
+}
+
+/// EMCY messages sent since the last look.
+fn emergencies(bench: &mut Bench) -> Vec<[u8; 8]> {
+    let messages = bench.take().into_iter().filter(|(id, _)| *id == EMCY);
+    messages.map(|(_, data)| data.try_into().unwrap()).collect()
+}
+
+#[test]
+fn the_table_has_every_fault_that_the_node_can_signal() {
+    let of_a_kind = |fault: Fault| format!("{fault:?}").split('(').next().unwrap().to_string();
+    let known: BTreeSet<_> = rows().filter_map(|row| row.fault).map(of_a_kind).collect();
+    assert_eq!(known, Fault::all().map(of_a_kind).collect());
+    for row in rows() {
+        assert_eq!(row.fault.map_or(row.code, Fault::code), row.code, "{row:X?}");
+    }
+}
+
+#[test]
+fn what_is_never_sent_has_a_reason() {
+    let sent: BTreeSet<u16> = Fault::all().map(Fault::code).collect();
+    for row in rows().filter(|row| row.fault.is_none()) {
+        assert!(!sent.contains(&row.code) && !row.remark.is_empty(), "{row:X?}");
+    }
+}
+
+#[test]
+fn every_fault_is_told_in_an_emcy_in_the_list_in_the_register_and_in_its_flag() {
+    for row in rows() {
+        let Some(fault) = row.fault else { continue };
+        let mut bench = measuring();
+        assert_eq!(bench.read(0x1001, 0), Ok(vec![0]), "{row:X?}");
+        provoke(&mut bench, fault);
+        let messages = emergencies(&mut bench);
+        let [low, high] = row.code.to_le_bytes();
+        let Some([a, b, register, detail @ ..]) = messages.iter().find(|data| data[..2] == [low, high])
+        else {
+            panic!("{row:X?}: {messages:X?}");
+        };
+        assert_eq!(([*a, *b], detail), ([low, high], &fault.detail()), "{row:X?}");
+        assert_eq!(register & 1, 1, "{row:X?}");
+        let listed: Vec<_> = (1..=10).filter_map(|sub| bench.read(0x1003, sub).ok()).collect();
+        assert!(listed.contains(&vec![low, high, 0, 0]), "{row:X?}: {listed:X?}");
+        let is_over = messages.last().is_some_and(|data| data[..2] == [0, 0]);
+        assert_eq!(bench.read(0x1001, 0).unwrap()[0] == 0, is_over, "{row:X?}");
+        if let Some((index, sub, bit)) = row.flag {
+            let flags = u32::from_le_bytes(bench.read(index, sub).unwrap().try_into().unwrap());
+            assert_ne!(flags & 1 << bit, 0, "{row:X?}: {flags:X}");
+        }
+    }
+}
+
+#[test]
+fn what_the_firmware_takes_back_is_gone_everywhere() {
+    for row in rows() {
+        let (Some(fault), Some((index, sub, bit))) = (row.fault, row.flag) else { continue };
+        let mut bench = measuring();
+        for is_set in [true, false] {
+            bench.protocol.set_fault(fault, is_set, bench.now, &mut bench.out);
+            let flags = u32::from_le_bytes(bench.read(index, sub).unwrap().try_into().unwrap());
+            assert_eq!(flags, u32::from(is_set) << bit, "{row:X?}");
+        }
+        assert_eq!(emergencies(&mut bench).last(), Some(&[0; 8]), "{row:X?}");
+        assert_eq!(bench.read(0x1001, 0), Ok(vec![0]), "{row:X?}");
+    }
+}

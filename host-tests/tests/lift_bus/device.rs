@@ -1,0 +1,153 @@
+//! A virtual device on the host: the same CANopen device that the nodes run, and a function that is called once a
+//! millisecond.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use canopen::dictionary::{Dictionary, Entry};
+use canopen::sdo::Abort;
+use canopen::{Action, Application, CanId, Device, Duration, Frame, Instant, NodeId, Transmit};
+use host_tests::network::Unit;
+use node::Request;
+
+use crate::world::World;
+
+/// Bytes for the values of any of the dictionaries.
+const SIZE: usize = 512;
+pub(crate) const TICK: Duration = Duration::from_millis(1);
+
+/// What a device does besides CANopen.
+pub(crate) trait Behaviour {
+    /// A millisecond has passed.
+    fn tick(&mut self, values: &mut Values, world: &mut World);
+}
+
+/// The values of a device's objects.
+pub(crate) struct Values<'a> {
+    dictionary: &'static Dictionary,
+    image: &'a mut [u8],
+}
+
+impl Values<'_> {
+    pub(crate) fn get(&self, index: u16, sub: u8) -> u64 {
+        let bytes = self.dictionary.field(index, sub).get(self.image);
+        bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
+    }
+
+    /// The value of an INTEGER32.
+    pub(crate) fn signed(&self, index: u16, sub: u8) -> i32 {
+        self.dictionary.field(index, sub).u32(self.image).cast_signed()
+    }
+
+    pub(crate) fn set(&mut self, index: u16, sub: u8, value: u64) {
+        let field = self.dictionary.field(index, sub);
+        let len = field.get(self.image).len();
+        field.set(self.image, &value.to_le_bytes()[..len]);
+    }
+
+    pub(crate) fn set_signed(&mut self, index: u16, sub: u8, value: i32) {
+        self.dictionary.field(index, sub).set(self.image, &value.to_le_bytes());
+    }
+}
+
+/// The objects have no rules of their own.
+#[derive(Debug)]
+pub(crate) struct NoRules;
+
+impl Application for NoRules {
+    fn initialise(&mut self, _: &mut [u8]) {}
+
+    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        Ok(())
+    }
+}
+
+/// The device.
+pub(crate) struct VirtualDevice {
+    device: Device<NoRules, SIZE>,
+    dictionary: &'static Dictionary,
+    behaviour: Box<dyn Behaviour>,
+    world: Rc<RefCell<World>>,
+    next_tick: Instant,
+}
+
+impl VirtualDevice {
+    pub(crate) fn new(
+        node_id: u8,
+        dictionary: &'static Dictionary,
+        behaviour: impl Behaviour + 'static,
+        world: &Rc<RefCell<World>>,
+    ) -> VirtualDevice {
+        assert!(dictionary.defaults().len() <= SIZE);
+        VirtualDevice {
+            device: Device::new(dictionary, NodeId::new(node_id), NoRules),
+            dictionary,
+            behaviour: Box::new(behaviour),
+            world: Rc::clone(world),
+            next_tick: Instant::NEVER,
+        }
+    }
+
+    /// A value of one of its objects.
+    pub(crate) fn value(&mut self, index: u16, sub: u8) -> u64 {
+        self.values().get(index, sub)
+    }
+
+    fn values(&mut self) -> Values<'_> {
+        Values { dictionary: self.dictionary, image: self.device.image_mut() }
+    }
+
+    fn tick(&mut self, now: Instant, out: &mut impl Transmit) {
+        self.next_tick = self.next_tick + TICK;
+        let mut values = Values { dictionary: self.dictionary, image: self.device.image_mut() };
+        self.behaviour.tick(&mut values, &mut self.world.borrow_mut());
+        self.device.changed(now, out);
+    }
+}
+
+impl Unit for VirtualDevice {
+    fn start(&mut self, now: Instant, out: &mut impl Transmit) {
+        self.device.start(now, out);
+        self.next_tick = now;
+    }
+
+    fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        self.device.on_process_frame(frame, now, out);
+    }
+
+    fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        self.device.on_service_frame(frame, now, out);
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        if now >= self.next_tick {
+            self.tick(now, out);
+        }
+        let process = self.device.poll_process(now, out);
+        process.min(self.device.poll_services(now, out)).min(self.next_tick)
+    }
+
+    fn take_request(&mut self) -> Option<Request> {
+        self.device.take_action().map(request)
+    }
+
+    fn process_ids(&self) -> Vec<u16> {
+        self.device.process_ids().map(CanId::get).collect()
+    }
+
+    fn service_ids(&self) -> Vec<u16> {
+        self.device.service_ids().map(CanId::get).collect()
+    }
+}
+
+/// As `node::Protocol` has it.
+pub(crate) fn request(action: Action) -> Request {
+    match action {
+        Action::ResetNode => Request::ResetNode,
+        Action::ResetCommunication => Request::ResetCommunication,
+        Action::Identifiers => Request::Filters,
+        Action::Bootloader => Request::Bootloader,
+        Action::BitRate(bit_rate) => Request::BitRate(bit_rate),
+        Action::Store(_) => Request::Store,
+    }
+}

@@ -1,0 +1,177 @@
+//! A small lift on one bus: two nodes in personality lift as car position unit and load measuring unit with a panel, and
+//! call controller, drive, doors, light barriers and a display as virtual devices of the host. All of them run the same
+//! CANopen device with dictionaries from the same catalogue.
+
+mod car;
+mod controller;
+mod device;
+mod node;
+mod small_lift;
+mod table;
+mod world;
+
+use std::collections::BTreeMap;
+
+use canbus::Stamped;
+use canopen::Frame;
+use canopen::pdo::{Address, Mpdo};
+use canopen::sdo::Multiplexer;
+use host_tests::network::from_bus;
+use profiles::encoder::UNDERFLOW;
+use profiles::lift::catalogue::{Content, by_cob_id};
+use profiles::lift::load::{FULL_LOAD, HALF_LOAD, OVERLOAD, ZERO_LOAD};
+
+use controller::{FAST, LANDINGS, call};
+use small_lift::SmallLift;
+use table::{BARRIERS, CONTROLLER, DISPLAY, DOORS, DRIVE, LOAD, POSITION};
+
+#[test]
+fn a_small_lift() {
+    let mut lift = SmallLift::new();
+    lift.install();
+    assert_eq!(lift.read(POSITION, 0x1000, 0), 0x0600_01A1, "a car position unit");
+    assert_eq!(lift.read(LOAD, 0x1000, 0), 0x0000_01A1, "load measuring unit, input and output panel unit");
+    assert_eq!(lift.read(POSITION, 0x6383, 1), u64::from(LANDINGS[0]), "the preset outlives the reset");
+
+    lift.nmt(1, 0);
+    lift.run(300);
+    assert_eq!((lift.last(0x188, 0), lift.last(0x188, 1)), (ZERO_LOAD.into(), 0));
+    assert!(lift.doors_are(car::WIDTH) && !lift.is_lit());
+
+    too_many_people(&mut lift);
+    somebody_in_the_door(&mut lift);
+    up_and_down(&mut lift);
+
+    every_frame_is_known(&lift.log);
+    every_position_is_that_of_the_car(&lift);
+    the_display_knows_what_concerns_it(&mut lift);
+    the_lamp_can_be_lit_by_a_multiplexed_pdo(&mut lift);
+    assert_eq!(lift.network.traffic().errors, 0);
+}
+
+/// With 700 kg in the car it does not leave, though it is called.
+fn too_many_people(lift: &mut SmallLift) {
+    lift.load(700.0);
+    let signals = u64::from(HALF_LOAD | FULL_LOAD | OVERLOAD);
+    assert_eq!((lift.last(0x188, 0), lift.last(0x188, 1)), (signals, 700));
+    lift.press_button();
+    assert!(lift.is_lit(), "the call is taken");
+    lift.run(1000);
+    assert!(lift.doors_are(car::WIDTH));
+    assert_eq!(lift.position(), LANDINGS[0].into());
+}
+
+/// One leaves, which takes time: the doors open again.
+fn somebody_in_the_door(lift: &mut SmallLift) {
+    lift.load(640.0);
+    assert_eq!(lift.last(0x188, 0) & u64::from(OVERLOAD), 0);
+    lift.run_until(500, |lift| !lift.doors_are(car::WIDTH));
+    lift.world.borrow_mut().is_blocked[1] = true;
+    lift.run_until(700, |lift| lift.doors_are(car::WIDTH));
+    assert_eq!(lift.position(), LANDINGS[0].into());
+    lift.world.borrow_mut().is_blocked[1] = false;
+    lift.run_until(1000, |lift| lift.doors_are(0.0));
+}
+
+/// Four floors up at full speed, three down.
+fn up_and_down(lift: &mut SmallLift) {
+    for (landing, position) in [(4, LANDINGS[4]), (1, LANDINGS[1])] {
+        lift.run_until(12_000, |lift| !lift.is_lit());
+        assert!(lift.position().abs_diff(position.into()) <= 1, "{} for {position}", lift.position());
+        lift.run_until(1000, |lift| lift.doors_are(car::WIDTH));
+        if landing == 4 {
+            lift.write(LOAD, 0x2220, 2, &call(1).to_le_bytes()[..6]);
+            lift.press_button();
+        }
+    }
+    let fastest = lift.log.iter().filter_map(|stamped| velocity(&from_bus(&stamped.frame)?));
+    let (slowest, fastest) = fastest.fold((0, 0), |(low, high), v| (v.min(low), v.max(high)));
+    assert_eq!((slowest, fastest), (-FAST, FAST));
+}
+
+/// The actual velocity in a frame that carries it.
+fn velocity(frame: &Frame) -> Option<i32> {
+    let field = by_cob_id(frame.id().into()).filter(|_| frame.id() == 0x183)?.fields().nth(3)?;
+    let word = u32::try_from(field.value(frame.data())?).ok()?;
+    Some(word.cast_signed())
+}
+
+/// Every frame is one of the catalogue, of its length, or one of CiA 301's services to or from a device that is there.
+fn every_frame_is_known(log: &[Stamped]) {
+    let mut counts = BTreeMap::<u16, usize>::new();
+    for frame in log.iter().filter_map(|stamped| from_bus(&stamped.frame)) {
+        *counts.entry(frame.id()).or_default() += 1;
+        let Some(definition) = by_cob_id(frame.id().into()) else {
+            assert!(is_service(frame.id()), "{:X}h", frame.id());
+            continue;
+        };
+        match definition.pdo.content {
+            Content::Objects(_) => {
+                let bits: usize = definition.fields().map(|field| usize::from(field.object.bits)).sum();
+                assert_eq!(frame.data().len() * 8, bits, "{}", definition.pdo.name);
+            }
+            Content::Multiplexed => {
+                let mpdo = Mpdo::parse(frame.data().try_into().unwrap()).unwrap();
+                let known: &[u16] = if definition.producer == Some(DISPLAY) {
+                    &[0x5000]
+                } else {
+                    &[0x2203, 0x2213, 0x63C0, 0x63C5]
+                };
+                assert!(known.contains(&mpdo.at.index), "{mpdo:?}");
+            }
+        }
+    }
+    let pdos: Vec<u16> = counts.keys().copied().filter(|id| by_cob_id((*id).into()).is_some()).collect();
+    let expected = [
+        0x182, 0x183, 0x188, 0x18C, 0x200, 0x201, 0x202, 0x205, 0x206, 0x400, 0x490, 0x491, 0x507, 0x510,
+        0x511,
+    ];
+    assert_eq!(pdos, expected, "each device sends its own and nobody sends another's");
+}
+
+/// Boot-up and heartbeats, and SDO responses that nobody waited for any longer: none of an error.
+fn is_service(id: u16) -> bool {
+    let devices = [CONTROLLER, DRIVE, DISPLAY, POSITION, LOAD].into_iter().chain(DOORS).chain(BARRIERS);
+    devices.map(u16::from).any(|device| [0x580 + device, 0x700 + device].contains(&id))
+}
+
+/// A position on the bus is that of the car when it was measured, to one step, and is at most a millisecond old.
+fn every_position_is_that_of_the_car(lift: &SmallLift) {
+    let world = lift.world.borrow();
+    let (mut frames, mut worst) = (0, 0.0_f64);
+    for stamped in &lift.log {
+        let Some(frame) = from_bus(&stamped.frame).filter(|frame| frame.id() == 0x18C) else { continue };
+        let position = f64::from(u32::from_le_bytes(frame.data().try_into().unwrap()));
+        let at = stamped.at.as_micros();
+        let count = world.measured.partition_point(|(time, _)| time.0 < at);
+        let (measured, car) = world.measured[count - 1];
+        // The car was at 3 m from the end of the tape when the preset made that 10 m.
+        let error = position - (car + 7_000.0);
+        assert!(error.abs() <= 1.0, "{position} at {at} us, when the car was at {car}");
+        assert!(at - measured.0 <= 1000);
+        (frames, worst) = (frames + 1, worst.max(error.abs()));
+    }
+    println!("{frames} positions, none more than {worst:.2} mm from the car");
+    assert!(frames > 7_000, "one a millisecond while it drives: {frames}");
+}
+
+/// It has the state of the position unit from that unit's multiplexed PDO, and ignores the rest of them.
+fn the_display_knows_what_concerns_it(lift: &mut SmallLift) {
+    assert_eq!(lift.shown(0x2203, 1), 0, "within its limits");
+    lift.world.borrow_mut().car -= 2_700.0;
+    lift.run(10);
+    assert_eq!(lift.shown(0x2203, 1), u64::from(UNDERFLOW), "below them");
+}
+
+/// From the call controller, to all nodes.
+fn the_lamp_can_be_lit_by_a_multiplexed_pdo(lift: &mut SmallLift) {
+    assert!(!lift.is_lit());
+    let lamp = Mpdo {
+        address: Address::Destination(None),
+        at: Multiplexer { index: 0x2222, sub: 0 },
+        data: [1, 0, 0, 0],
+    };
+    lift.network.transmit(&Frame::new(0x500 + u16::from(CONTROLLER), &lamp.encode()).unwrap());
+    lift.run(5);
+    assert!(lift.is_lit());
+}

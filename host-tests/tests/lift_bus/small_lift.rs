@@ -1,0 +1,205 @@
+//! The lift as a whole: its devices on one bus, its shaft, and what its installer does.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use canbus::Stamped;
+use canopen::sdo::Multiplexer;
+use canopen::{Duration, Frame, Instant, Transmit};
+use host_tests::network::{Network, Unit, from_bus};
+use host_tests::sdo::Client;
+use profiles::lift::catalogue::by_cob_id;
+
+use crate::car::{Barrier, Display, Door, Drive, WIDTH};
+use crate::controller::{Controller, LAMP_OFF, LAMP_ON, LANDINGS, call};
+use crate::device::VirtualDevice;
+use crate::node::LiftNode;
+use crate::table::{self, BARRIERS, CONTROLLER, DISPLAY, DOORS, DRIVE, LOAD, POSITION};
+use crate::world::World;
+
+/// A device of the lift.
+pub(crate) enum Any {
+    Node(Box<LiftNode>),
+    Virtual(Box<VirtualDevice>),
+}
+
+/// The same call for whichever it is.
+macro_rules! either {
+    ($self:ident, $unit:ident => $call:expr) => {
+        match $self {
+            Any::Node($unit) => $call,
+            Any::Virtual($unit) => $call,
+        }
+    };
+}
+
+impl Unit for Any {
+    fn start(&mut self, now: Instant, out: &mut impl Transmit) {
+        either!(self, unit => unit.start(now, out));
+    }
+
+    fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        either!(self, unit => unit.on_process_frame(frame, now, out));
+    }
+
+    fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        either!(self, unit => unit.on_service_frame(frame, now, out));
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        either!(self, unit => unit.poll(now, out))
+    }
+
+    fn take_request(&mut self) -> Option<::node::Request> {
+        either!(self, unit => unit.take_request())
+    }
+
+    fn store(&mut self, now: Instant, out: &mut impl Transmit) {
+        either!(self, unit => unit.store(now, out));
+    }
+
+    fn process_ids(&self) -> Vec<u16> {
+        either!(self, unit => unit.process_ids())
+    }
+
+    fn service_ids(&self) -> Vec<u16> {
+        either!(self, unit => unit.service_ids())
+    }
+}
+
+/// The lift: its bus, its shaft, and all frames.
+pub(crate) struct SmallLift {
+    pub(crate) network: Network<Any>,
+    pub(crate) world: Rc<RefCell<World>>,
+    pub(crate) log: Vec<Stamped>,
+}
+
+/// Places of the devices in the network.
+const LOAD_NODE: usize = 1;
+const DISPLAY_DEVICE: usize = 8;
+
+impl SmallLift {
+    /// A car at the lowest landing with open doors, all devices in Pre-operational.
+    pub(crate) fn new() -> SmallLift {
+        let world = World { car: 3_000.0, doors: [WIDTH; 2], ..World::default() };
+        let world = Rc::new(RefCell::new(world));
+        let node = |id| Any::Node(Box::new(LiftNode::new(id, &world)));
+        let [door_1, door_2] = DOORS;
+        let [barrier_1, barrier_2] = BARRIERS;
+        let virtual_devices = [
+            VirtualDevice::new(CONTROLLER, &table::CALL_CONTROLLER, Controller::default(), &world),
+            VirtualDevice::new(DRIVE, &table::CAR_DRIVE, Drive::default(), &world),
+            VirtualDevice::new(door_1, &table::DOOR_1, Door(1), &world),
+            VirtualDevice::new(door_2, &table::DOOR_2, Door(2), &world),
+            VirtualDevice::new(barrier_1, &table::BARRIER_1, Barrier(1), &world),
+            VirtualDevice::new(barrier_2, &table::BARRIER_2, Barrier(2), &world),
+            VirtualDevice::new(DISPLAY, &table::DISPLAY_UNIT, Display::default(), &world),
+        ];
+        let virtual_devices = virtual_devices.map(|device| Any::Virtual(Box::new(device)));
+        let mut network = Network::new([node(POSITION), node(LOAD)].into_iter().chain(virtual_devices));
+        network.start();
+        SmallLift { network, world, log: vec![] }
+    }
+
+    /// Lets time pass and keeps what is on the bus.
+    pub(crate) fn run(&mut self, millis: u64) {
+        self.network.run(Duration::from_millis(millis));
+        self.log.extend(std::iter::from_fn(|| self.network.hear()));
+    }
+
+    /// Lets time pass until something is the case.
+    pub(crate) fn run_until(&mut self, limit: u64, mut is_so: impl FnMut(&mut SmallLift) -> bool) {
+        for _ in 0..limit / 10 {
+            if is_so(self) {
+                return;
+            }
+            self.run(10);
+        }
+        panic!("it did not happen in {limit} ms: {:?}", self.world.borrow().car);
+    }
+
+    pub(crate) fn write(&mut self, node: u8, index: u16, sub: u8, bytes: &[u8]) {
+        let result = Client::new(&mut self.network.server(node)).write(Multiplexer { index, sub }, bytes);
+        assert_eq!(result, Ok(()), "{node}: {index:X}h:{sub}");
+    }
+
+    pub(crate) fn read(&mut self, node: u8, index: u16, sub: u8) -> u64 {
+        let bytes = Client::new(&mut self.network.server(node)).read(Multiplexer { index, sub }).unwrap();
+        bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
+    }
+
+    pub(crate) fn nmt(&mut self, command: u8, node: u8) {
+        self.network.transmit(&Frame::new(0, &[command, node]).unwrap());
+        self.run(5);
+    }
+
+    /// What the installer does: each node is one of the two units, a PDO of the other is off; then saved and reset.
+    pub(crate) fn install(&mut self) {
+        self.write(POSITION, 0x2211, 3, &0_f32.to_le_bytes());
+        self.write(POSITION, 0x2100, 1, &[6]);
+        self.write(POSITION, 0x2101, 1, &100_000_u32.to_le_bytes());
+        self.write(POSITION, 0x2105, 0, &[0]);
+        self.write(POSITION, 0x63B8, 1, &20_100_i32.to_le_bytes());
+        self.write(POSITION, 0x63B4, 1, &9_900_i32.to_le_bytes());
+        self.write(POSITION, 0x1901, 1, &0xC000_0188_u32.to_le_bytes());
+        self.run(5);
+        self.write(POSITION, 0x6382, 1, &LANDINGS[0].to_le_bytes());
+
+        self.write(LOAD, 0x2201, 1, &[0]);
+        for (sub, value) in [(1, 2.0e5_f32), (2, 0.0), (3, 6.0e5), (4, 800.0)] {
+            self.write(LOAD, 0x2211, sub, &value.to_le_bytes());
+        }
+        for (sub, kilograms) in [(1, 30_u16), (2, 300), (3, 600), (4, 660)] {
+            self.write(LOAD, 0x6483, sub, &kilograms.to_le_bytes());
+        }
+        self.write(LOAD, 0x2220, 2, &call(4).to_le_bytes()[..6]);
+        self.write(LOAD, 0x2221, 1, &LAMP_OFF.to_le_bytes()[..6]);
+        self.write(LOAD, 0x2221, 2, &LAMP_ON.to_le_bytes()[..6]);
+        self.write(LOAD, 0x1906, 1, &0xC000_018C_u32.to_le_bytes());
+        for node in [POSITION, LOAD] {
+            self.write(node, 0x1010, 1, b"save");
+            self.nmt(0x81, node);
+        }
+        self.run(5);
+    }
+
+    pub(crate) fn press_button(&mut self) {
+        self.world.borrow_mut().is_pressed = true;
+        self.run(50);
+        self.world.borrow_mut().is_pressed = false;
+        self.run(50);
+    }
+
+    pub(crate) fn load(&mut self, kilograms: f64) {
+        self.world.borrow_mut().load = kilograms;
+        self.run(250);
+    }
+
+    /// The last value of an object that a PDO with this identifier carried.
+    pub(crate) fn last(&self, id: u32, object: usize) -> u64 {
+        let field = by_cob_id(id).unwrap().fields().nth(object).unwrap();
+        let frames = self.log.iter().rev().filter_map(|stamped| from_bus(&stamped.frame));
+        let frame = frames.into_iter().find(|frame| u32::from(frame.id()) == id).unwrap();
+        field.value(frame.data()).unwrap()
+    }
+
+    pub(crate) fn position(&self) -> u64 {
+        self.last(0x18C, 0)
+    }
+
+    pub(crate) fn is_lit(&self) -> bool {
+        matches!(&self.network.stations[LOAD_NODE].unit, Any::Node(node) if node.is_lit())
+    }
+
+    /// A value that the display has.
+    pub(crate) fn shown(&mut self, index: u16, sub: u8) -> u64 {
+        match &mut self.network.stations[DISPLAY_DEVICE].unit {
+            Any::Virtual(display) => display.value(index, sub),
+            Any::Node(_) => panic!("the display is another device"),
+        }
+    }
+
+    pub(crate) fn doors_are(&self, width: f64) -> bool {
+        self.world.borrow().doors == [width; 2]
+    }
+}

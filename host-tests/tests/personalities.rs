@@ -1,0 +1,96 @@
+//! Which device a node is: object 2000h, stored at once and taken at the next reset.
+
+use canopen::Instant;
+use canopen::lss::Request as LssRequest;
+use canopen::sdo::Abort;
+use host_tests::bench::{Bench, ID};
+use node::{Parcel, Personality, Request};
+
+const VALUE_TOO_HIGH: u32 = 0x0609_0031;
+
+fn device_type(bench: &mut Bench) -> u32 {
+    u32::from_le_bytes(bench.read(0x1000, 0).unwrap().try_into().unwrap())
+}
+
+fn personality(bench: &mut Bench) -> u8 {
+    bench.read(0x2000, 0).unwrap()[0]
+}
+
+#[test]
+fn every_personality_leads_to_every_other_at_the_next_reset() {
+    let types = [0x0002_0194, 0x0005_0196, 0xFFFF_0196];
+    for from in Personality::ALL {
+        for to in Personality::ALL {
+            let mut bench = Bench::booted_as(from);
+            bench.write(0x2000, 0, &[to.number()]).unwrap();
+            assert_eq!(personality(&mut bench), to.number());
+            assert_eq!(device_type(&mut bench), types[usize::from(from.number())], "not before a reset");
+            let mut bench = bench.power_cycled();
+            assert_eq!(device_type(&mut bench), types[usize::from(to.number())]);
+            assert_eq!(personality(&mut bench), to.number());
+        }
+    }
+}
+
+#[test]
+fn one_that_does_not_exist_is_refused() {
+    let mut bench = Bench::booted();
+    let beyond = u8::try_from(Personality::ALL.len()).unwrap();
+    assert_eq!(bench.write(0x2000, 0, &[beyond]), Err(VALUE_TOO_HIGH));
+    assert_eq!(personality(&mut bench), 0);
+}
+
+#[test]
+fn a_reset_of_the_communication_shows_what_is_stored() {
+    let mut bench = Bench::booted();
+    bench.write(0x2000, 0, &[1]).unwrap();
+    bench.nmt(0x82);
+    bench.protocol.start(bench.now, &mut bench.out);
+    assert_eq!((personality(&mut bench), device_type(&mut bench)), (1, 0x0002_0194));
+}
+
+/// What one has saved is nothing to another, neither its values nor a fault; and it is there again afterwards.
+#[test]
+fn each_personality_has_its_own_saved_parameters() {
+    let mut bench = Bench::booted();
+    bench.write(0x1017, 0, &500_u16.to_le_bytes()).unwrap();
+    bench.write(0x6132, 1, &[2]).unwrap();
+    bench.write(0x1010, 1, b"save").unwrap();
+    bench.write(0x2000, 0, &[1]).unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(bench.read(0x1017, 0), Ok(1000_u16.to_le_bytes().to_vec()));
+    assert_eq!(bench.read(0x1001, 0), Ok(vec![0]));
+    bench.write(0x2000, 0, &[0]).unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(bench.read(0x1017, 0), Ok(500_u16.to_le_bytes().to_vec()));
+    assert_eq!(bench.read(0x6132, 1), Ok(vec![2]));
+}
+
+#[test]
+fn node_id_and_personality_are_stored_together_and_change_alone() {
+    let mut bench = Bench::booted();
+    bench.write(0x2000, 0, &[2]).unwrap();
+    let global = LssRequest::SwitchGlobal { configuration: true };
+    let node_id = LssRequest::NodeId(ID);
+    for request in [global, node_id, LssRequest::Store] {
+        bench.receive(&canopen::Frame::new(0x7E5, &request.encode()).unwrap());
+    }
+    let mut bench = bench.power_cycled();
+    assert_eq!(device_type(&mut bench), 0xFFFF_0196);
+}
+
+#[test]
+fn a_store_that_fails_is_told_and_changes_nothing() {
+    let mut bench = Bench::booted();
+    let now = Instant(1);
+    // Written without the bench, which would store it.
+    let frame = canopen::Frame::new(0x600 + u16::from(ID), &[0x2F, 0, 0x20, 0, 1, 0, 0, 0]).unwrap();
+    bench.protocol.on_service_frame(&frame, now, &mut bench.out);
+    assert_eq!(bench.take(), [], "the answer waits");
+    while bench.protocol.take_request().is_some_and(|request| request != Request::Store) {}
+    let mut parcel = Parcel::new();
+    assert!(bench.protocol.pack(&mut parcel));
+    bench.protocol.finish(&parcel, Err(Abort::Hardware), now, &mut bench.out);
+    assert_eq!(bench.take(), [(0x580 + u16::from(ID), vec![0x80, 0, 0x20, 0, 0, 0, 6, 6])]);
+    assert_eq!(personality(&mut bench), 0);
+}

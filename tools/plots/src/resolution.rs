@@ -1,0 +1,71 @@
+//! The resolution that is left of 16 conversions of 12 bits, by trying.
+
+use std::f64::consts::TAU;
+
+use profiles::pressure::{FactoryCalibration, PressureCalibration, RawSample};
+
+const CODES: f64 = 4096.0;
+const CONVERSIONS: u16 = 16;
+/// The supply of the transducer as the converter reads it, as on the board: 3.0 V of 3.3 V.
+const SUPPLY: u32 = 3724;
+/// Pressures tried.
+const TRIALS: u32 = 20_000;
+
+/// What is left between the pressure that is measured and the one that was there.
+#[derive(Clone, Copy, Debug)]
+pub struct Resolution {
+    /// Root mean square in steps of one conversion.
+    pub steps: f64,
+    /// Root mean square in Pa.
+    pub pascal: f64,
+}
+
+impl Resolution {
+    /// Bits of an ideal converter with the same error: one of `b` bits over the same range is off by a step of
+    /// `2^-b`, divided by the square root of 12.
+    #[must_use]
+    pub fn bits(&self) -> f64 {
+        (CODES / (self.steps * 12_f64.sqrt())).log2()
+    }
+}
+
+/// Measures pressures across the range with noise of this standard deviation, in steps, on each conversion.
+#[must_use]
+pub fn resolution(noise: f64) -> Resolution {
+    let calibration = PressureCalibration::default();
+    let mut random = fastrand::Rng::with_seed(404);
+    let (mut pascal, mut steps) = (0.0, 0.0);
+    for _ in 0..TRIALS {
+        let code = f64::from(SUPPLY) * (0.1 + 0.8 * random.f64());
+        let sum: f64 = (0..CONVERSIONS).map(|_| convert(code + noise * normal(&mut random))).sum();
+        let measured = calibration.pressure(raw(sum).ratio(), None);
+        let expected = 1e6 * (code / f64::from(SUPPLY) - 0.1) / 0.8;
+        pascal += (f64::from(measured) - expected).powi(2);
+        steps += (sum / f64::from(CONVERSIONS) - code).powi(2);
+    }
+    let root = |sum: f64| (sum / f64::from(TRIALS)).sqrt();
+    Resolution { steps: root(steps), pascal: root(pascal) }
+}
+
+/// The converter: the first transition lies at half a step.
+fn convert(code: f64) -> f64 {
+    code.round().clamp(0.0, CODES - 1.0)
+}
+
+/// A number of the standard normal distribution (Box-Muller).
+fn normal(random: &mut fastrand::Rng) -> f64 {
+    let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
+    radius * (TAU * random.f64()).cos()
+}
+
+fn raw(pressure: f64) -> RawSample {
+    RawSample {
+        pressure: pressure as u32,
+        supply: SUPPLY * u32::from(CONVERSIONS),
+        temperature: 0,
+        vrefint: 0,
+        thermistor: 0,
+        count: CONVERSIONS,
+        factory: FactoryCalibration { ts_cal1: 0, ts_cal2: 0, vrefint_cal: 0 },
+    }
+}

@@ -1,0 +1,46 @@
+//! Pressures as functions of time.
+
+use std::f64::consts::TAU;
+
+/// Milliseconds that a plot shows.
+pub(crate) const LENGTH: usize = 100;
+/// Milliseconds before anything happens.
+const START: f64 = 10.0;
+
+/// A pressure as a function of time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stimulus {
+    /// From 0 to 5 bar.
+    Step,
+    /// Around 2.5 bar with an amplitude of 2.5 bar, 20 Hz.
+    Sine,
+    /// From 0 bar on, 5 bar in 80 ms.
+    Ramp,
+}
+
+impl Stimulus {
+    /// All of them.
+    pub const ALL: [Stimulus; 3] = [Stimulus::Step, Stimulus::Sine, Stimulus::Ramp];
+
+    /// The pressure in Pa after so many milliseconds.
+    #[must_use]
+    pub fn at(self, ms: f64) -> f64 {
+        let since = (ms - START).max(0.0);
+        match self {
+            Stimulus::Step if ms < START => 0.0,
+            Stimulus::Step => 500_000.0,
+            Stimulus::Sine => 250_000.0 * (1.0 + (TAU * 0.02 * ms).sin()),
+            Stimulus::Ramp => 500_000.0 * (since / 80.0).min(1.0),
+        }
+    }
+
+    /// What a plot of it is called.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Stimulus::Step => "step to 5 bar",
+            Stimulus::Sine => "sine, 20 Hz",
+            Stimulus::Ramp => "ramp, 5 bar in 80 ms",
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! `cargo xtask plots`: what is computed with the measurement chain for its documentation.
+
+use anyhow::Result;
+
+use crate::command::{cargo, run};
+
+/// Writes the plots and the tables.
+pub(crate) fn write() -> Result<()> {
+    run(cargo().args(["run", "--quiet", "-p", "plots"]))
+}
