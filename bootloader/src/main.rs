@@ -17,10 +17,10 @@ mod session;
 mod start;
 mod target;
 
-/// Without the place: the names of all of them would take 3 KiB.
+/// Without a record of the place: the names of all of them would take 3 KiB.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    bsp::crash::panicked(None)
+    cortex_m::peripheral::SCB::sys_reset()
 }
 
 #[rtic::app(device = bsp::pac, peripherals = true)]

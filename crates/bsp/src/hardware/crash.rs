@@ -47,8 +47,8 @@ fn log_fault(fault: &Fault) {
     defmt::error!("CFSR {=u32:#010x}, HFSR {=u32:#010x}, address {=u32:#010x}", cfsr, hfsr, address);
 }
 
-/// What the panic handler of an image does. One that does not say where is linked without the names of all places at which
-/// it could panic.
+/// What the panic handler of an image does. It is not the handler itself because one that uses the place is linked with the
+/// names of all places, for which the bootloader has no room.
 pub fn panicked(place: Option<&Location<'_>>) -> ! {
     cortex_m::interrupt::disable();
     let place = place.map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));

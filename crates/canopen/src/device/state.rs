@@ -76,7 +76,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         self.core.configure(now);
         self.core.enter(State::PreOperational);
-        let starts = self.core.number(0x1F80, 0) == SELF_START;
+        let starts = !A::SERVICES_ONLY && self.core.number(0x1F80, 0) == SELF_START;
         self.core.pending.with_values = starts.then_some(State::Operational);
         self.poll_services(now, out);
     }
