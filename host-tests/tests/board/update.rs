@@ -1,8 +1,8 @@
 //! The field update with the images as they are: the application, the bootloader, and a master that follows CiA 302-3.
 
-use canbus::Time;
+use canbus::{StandardId, Time};
 use canopen::sdo::Multiplexer;
-use chip::{Peripherals as _, Stm32f4};
+use chip::Stm32f4;
 use ed25519_dalek::SigningKey;
 use emulator::Machine;
 use host_tests::sdo::{Channel, Client, Failure};
@@ -148,9 +148,9 @@ impl Channel for Bench {
 
     fn received(&mut self) -> Option<[u8; 8]> {
         let port = self.world.port(self.master.port);
-        let response = u32::from(0x580 + u16::from(self.node));
+        let response = StandardId::new(0x580 + u16::from(self.node))?.into();
         std::iter::from_fn(|| port.receive())
-            .find(|stamped| stamped.frame.id().as_raw() == response)
+            .find(|stamped| stamped.frame.id() == response)
             .and_then(|stamped| stamped.frame.bytes().try_into().ok())
     }
 

@@ -11,6 +11,9 @@ pub fn vectors() -> Option<Vectors> {
     Vectors::check(words, &memory::ram(), &image)
 }
 
+/// Words of the NVIC that the chip has: up to 97 interrupts (RM0390, table 38).
+const INTERRUPT_WORDS: usize = 4;
+
 /// Whether the place of the header is erased, as after a debugger has put a program there.
 pub fn has_no_header() -> bool {
     let bytes = memory::header();
@@ -27,7 +30,7 @@ pub fn start(core: &cortex_m::Peripherals, vectors: Vectors) -> ! {
     // SAFETY: the slot is aligned as VTOR wants it (memory.x), `vectors` is checked, and this function does not return, so
     // nobody misses the stack. Interrupts are enabled again as a reset leaves them; none of them is in the NVIC.
     unsafe {
-        for (enabled, pending) in core.NVIC.icer.iter().zip(&core.NVIC.icpr) {
+        for (enabled, pending) in core.NVIC.icer.iter().zip(&core.NVIC.icpr).take(INTERRUPT_WORDS) {
             enabled.write(u32::MAX);
             pending.write(u32::MAX);
         }
