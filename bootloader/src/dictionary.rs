@@ -19,8 +19,8 @@ const OBJECTS: [Object; 19] = [
     fixed(0x1001, 0, "Error register", Type::Unsigned8),
     fixed(0x1008, 0, "Manufacturer device name", Type::VisibleString(10))
         .default(DefaultValue::Text("Bootloader")),
-    fixed(0x1009, 0, "Manufacturer hardware version", Type::VisibleString(32)),
-    fixed(0x100A, 0, "Manufacturer software version", Type::VisibleString(16))
+    fixed(0x1009, 0, "Manufacturer hardware version", Type::VisibleString(13)),
+    fixed(0x100A, 0, "Manufacturer software version", Type::VisibleString(11))
         .default(DefaultValue::Text(env!("CARGO_PKG_VERSION"))),
     Object::new(0x1017, 0, "Producer heartbeat time", Type::Unsigned16, Access::ReadWrite)
         .value(1000)

@@ -64,7 +64,8 @@ impl Session {
             let _ = updater.install();
         }
         let node_id = note.map_or(NODE_ID, |note| note.node_id.and_then(NodeId::new));
-        let timing = note.map(|note| note.timing).or_else(|| BitTiming::of(KBIT)).unwrap_or(BitTiming::FASTEST);
+        let timing =
+            note.map(|note| note.timing).or_else(|| BitTiming::of(KBIT)).unwrap_or(BitTiming::FASTEST);
         Session {
             device: Device::new(&DICTIONARY, node_id, Program::new(updater, TARGET)),
             can,

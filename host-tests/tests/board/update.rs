@@ -186,7 +186,8 @@ fn signed(length: usize, change: impl FnOnce(&mut Description)) -> Image {
     let mut code = version_a().code;
     code.resize(length.max(code.len() + 4), 0xB0);
     let version = Version { major: 9, minor: 8, patch: 7 };
-    let mut about = Description { product: product::PRODUCT, hardware: product::HARDWARE, version, counter: 0 };
+    let mut about =
+        Description { product: product::PRODUCT, hardware: product::HARDWARE, version, counter: 0 };
     change(&mut about);
     Image::sign(about, code, &sign::key::development()).unwrap()
 }
@@ -272,7 +273,8 @@ fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
     let good = version_b(0);
     let mut flipped = good.to_bytes();
     flipped[HEADER_LEN + 1000] ^= 1;
-    let stranger = Image::sign(*good.header.description(), good.code.clone(), &SigningKey::from_bytes(&[7; 32]));
+    let stranger =
+        Image::sign(*good.header.description(), good.code.clone(), &SigningKey::from_bytes(&[7; 32]));
     let foreign = signed(0, |about| about.product += 1);
     let elsewhere = signed(0, |about| about.hardware = 2);
     let bad = [

@@ -27,7 +27,11 @@ impl ProgramFlash {
         let start = start.ok_or(out_of_bounds)?;
         let end = u32::try_from(len).ok().and_then(|len| start.checked_add(len));
         end.filter(|&end| end <= area.end).ok_or(out_of_bounds)?;
-        if start.is_multiple_of(boundary) { Ok(start) } else { Err(Error::Place(NorFlashErrorKind::NotAligned)) }
+        if start.is_multiple_of(boundary) {
+            Ok(start)
+        } else {
+            Err(Error::Place(NorFlashErrorKind::NotAligned))
+        }
     }
 }
 

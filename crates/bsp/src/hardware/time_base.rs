@@ -45,6 +45,7 @@ pub struct Clock;
 impl Clock {
     /// The present instant, right at every priority.
     #[must_use]
+    #[inline(never)]
     pub fn now() -> Instant {
         Instant(EXTENSION.read(|| registers().cnt().read().cnt().bits()))
     }
