@@ -74,6 +74,8 @@ pub(crate) fn close_flash<P: Peripherals>(cpu: &mut Cpu<P>, model: &Model, close
     if cpu.get_data().flash_closed != closed {
         let protection = if closed { Prot::EXEC } else { Prot::READ | Prot::EXEC };
         let _ = cpu.mem_protect(model.flash.start.into(), model.flash.len() as u64, protection);
+        // The library goes by what it has cached of the pages.
+        let _ = cpu.ctl_flush_tlb();
         cpu.get_data_mut().flash_closed = closed;
     }
 }

@@ -19,6 +19,7 @@ fn program_and_read(words: *mut u32) -> (u32, u32) {
     unsafe {
         let start = CYCCNT.read_volatile();
         words.write_volatile(0);
+        cortex_m::asm::isb();
         let stored = CYCCNT.read_volatile();
         words.add(1).read_volatile();
         (stored.wrapping_sub(start), CYCCNT.read_volatile().wrapping_sub(stored))
