@@ -121,11 +121,12 @@ mod app {
         let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
         let [process_alarm, mut services_alarm] = board.alarms;
         services_alarm.set(Clock::now() + FIRST_SAMPLE);
+        let parameters = Some(protocol.prepare());
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
             snapshot: None,
-            parameters: None,
+            parameters,
             kept: None,
             watchdog: board.watchdog.supervise(),
         };

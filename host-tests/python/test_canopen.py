@@ -18,7 +18,7 @@ from simulator import PATIENCE, Master, Simulator
 EDS = Path(__file__).parents[2] / "eds" / "pressure.eds"
 
 #: Objects whose value is a command or belongs to the moment.
-COMMANDS = {0x1010, 0x1011, 0x1F51, 0x6125}
+COMMANDS = {0x1010, 0x1011, 0x1F51, 0x2203, 0x2204, 0x6125}
 #: What the EDS gives a default for and the node measures or counts.
 MEASURED = {0x1F56, 0x6100, 0x6130, 0x6150, 0x7130, 0x9130}
 
@@ -91,6 +91,8 @@ def test_every_object_of_the_eds_is_written_or_refused(master: NodeWithEds):
     for number in (1, 2):
         master.write(0x1800 + number - 1, 1, 0x8000_0081 + 0x100 * number, 4)
         master.write(0x1A00 + number - 1, 0, 0, 1)
+    # The key to the calibration; "cali".
+    master.write(0x2203, 0, 0x696C_6163, 4)
     for index, sub, variable, remote in master.variables():
         if index in COMMANDS or index == 0x2F00:
             continue
@@ -159,17 +161,26 @@ def test_a_pdo_is_remapped_saved_and_found_after_a_power_cycle(tmp_path):
     simulator.quit()
 
 
+def scan(lss) -> list[int]:
+    """One more identity. The client tells a bit by an answer that does not come for a while of the host's time, so on a busy
+    machine a scan may have to be repeated; a wrong identity cannot come of it, for its end is answered or is none."""
+    for _ in range(5):
+        is_found, identity = lss.fast_scan()
+        if is_found:
+            return identity
+    raise AssertionError("no node is found")
+
+
 def test_three_nodes_without_a_node_id_are_found_and_moved_to_another_bit_rate():
     nodes = [flag for number in (201, 202, 203) for flag in ("--node", f"{number}:pressure")]
     simulator = Simulator("--bitrate", "250", *nodes, speed="real")
     master = Master(simulator)
     lss = master.network.lss
-    lss.RESPONSE_TIMEOUT = 0.25
+    lss.RESPONSE_TIMEOUT = 0.4
     found = {}
     for node_id in (11, 12, 13):
         boot_up = master.listen(0x700 + node_id)
-        is_found, identity = lss.fast_scan()
-        assert is_found
+        identity = scan(lss)
         lss.configure_node_id(node_id)
         assert lss.inquire_node_id() == 255, "the new one counts from the next start of the communication"
         lss.configure_bit_timing(2)

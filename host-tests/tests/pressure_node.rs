@@ -1,8 +1,8 @@
 //! The pressure node as a whole: from converter readings to frames, parameters back into the chain, faults.
 
-use canopen::Frame;
-use host_tests::bench::{Bench, ID, raw};
-use node::{BusEvent, Fault, Request, State};
+use canopen::{Frame, Instant};
+use host_tests::bench::{Bench, ID, Queue, raw, setup};
+use node::{BusEvent, Fault, Measurement, Protocol, RawEncoder, Request, Start, State};
 
 const TPDO1: u16 = 0x180 + ID as u16;
 const EMCY: u16 = 0x080 + ID as u16;
@@ -43,6 +43,22 @@ fn tpdo1_carries_the_live_pressure_and_temperature() {
         assert!(is_close(bar, pascal as f32 / 100_000.0, 10.0 / (0.8 * 64_000.0)), "{bar}");
         assert!(is_close(celsius, 25.0, 80.0 / (16.0 * 270.0)), "{celsius}");
     }
+}
+
+#[test]
+fn a_node_that_is_started_the_moment_it_boots_sends_what_it_has_measured_before() {
+    let setup = setup();
+    let (mut protocol, mut measurement) = (Protocol::new(&setup), Measurement::new(Start::First));
+    let (mut out, now) = (Queue::default(), Instant(0));
+    measurement.apply(&protocol.prepare());
+    let snapshot = measurement.sample(&raw(250_000.0, 298.15), &RawEncoder::default());
+    protocol.publish(&snapshot, now, &mut out);
+    protocol.start(now, &mut out);
+    protocol.on_process_frame(&Frame::new(0, &[1, ID]).unwrap(), now, &mut out);
+    let last = out.0.last().unwrap();
+    assert_eq!(last.id(), TPDO1);
+    let bar = f32::from_le_bytes(last.data()[..4].try_into().unwrap());
+    assert!(is_close(bar, 2.5, 0.001), "{bar}");
 }
 
 #[test]

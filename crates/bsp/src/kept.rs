@@ -10,11 +10,14 @@ use crate::checksum::CRC;
 /// Bytes that a copy holds.
 pub const CAPACITY: usize = 72;
 
-const CONTENT: usize = CAPACITY / 4;
-/// Mark, sequence number, content, CRC.
-const WORDS: usize = 3 + CONTENT;
+/// Mark, sequence number, content, CRC, of which all but the content are a word each.
+const SIZE: usize = 12 + CAPACITY;
+const WORDS: usize = SIZE / 4;
 /// Tells a damaged copy from memory that never held one.
 const MARK: u32 = 0x4B45_5054;
+
+/// A copy.
+type Sealed = [u8; SIZE];
 
 /// The place of a copy in memory.
 pub type Slot = [AtomicU32; WORDS];
@@ -35,36 +38,35 @@ pub enum Found {
 
 /// Writes the copies in turn.
 pub struct Keeper<'a> {
-    copies: &'a Slots,
+    slots: &'a Slots,
     /// Of the latest copy; its lowest bit tells which one that is.
     sequence: u32,
 }
 
 impl<'a> Keeper<'a> {
     /// Finds the newer good copy. The next write goes over the other one.
-    pub fn open(copies: &'a Slots) -> (Keeper<'a>, Found) {
-        let good = [0, 1].map(|n| read(&copies[n]).filter(|sealed| sealed[1] as usize % 2 == n));
+    pub fn open(slots: &'a Slots) -> (Keeper<'a>, Found) {
+        let good = [0, 1].map(|n| read(&slots[n]).filter(|sealed| sequence(sealed) as usize % 2 == n));
         let newer = match good {
-            [Some(first), Some(second)] if is_later(first[1], second[1]) => Some(first),
+            [Some(first), Some(second)] if is_later(sequence(&first), sequence(&second)) => Some(first),
             [first, second] => second.or(first),
         };
-        let had_one = copies.iter().any(|copy| copy[0].load(Ordering::Relaxed) == MARK);
+        let had_one = slots.iter().any(|slot| slot[0].load(Ordering::Relaxed) == MARK);
         let found = match newer {
             Some(sealed) => Found::Kept(content(&sealed)),
             None if had_one => Found::Damaged,
             None => Found::Nothing,
         };
-        (Keeper { copies, sequence: newer.map_or(0, |sealed| sealed[1]) }, found)
+        (Keeper { slots, sequence: newer.map_or(0, |sealed| sequence(&sealed)) }, found)
     }
 
     /// Keeps `bytes`; those beyond [`CAPACITY`] are left out.
     pub fn write(&mut self, bytes: &[u8]) {
         self.sequence = self.sequence.wrapping_add(1);
-        let copy = &self.copies[self.sequence as usize % 2];
-        let sealed = seal(self.sequence, bytes);
+        let slot = &self.slots[self.sequence as usize % 2];
         // The mark comes last: where a first write is cut short there was nothing, and not something that is damaged.
-        for (to, from) in copy.iter().zip(sealed).rev() {
-            to.store(from, Ordering::Relaxed);
+        for (to, from) in slot.iter().zip(seal(self.sequence, bytes).as_chunks().0).rev() {
+            to.store(u32::from_le_bytes(*from), Ordering::Relaxed);
         }
     }
 }
@@ -74,37 +76,39 @@ fn is_later(sequence: u32, than: u32) -> bool {
     sequence.wrapping_sub(than) < 1 << 31
 }
 
-fn seal(sequence: u32, bytes: &[u8]) -> [u32; WORDS] {
-    let mut sealed = [0; WORDS];
-    sealed[0] = MARK;
-    sealed[1] = sequence;
-    for (word, bytes) in sealed[2..WORDS - 1].iter_mut().zip(bytes.chunks(4)) {
-        let mut padded = [0; 4];
-        padded[..bytes.len()].copy_from_slice(bytes);
-        *word = u32::from_le_bytes(padded);
-    }
-    sealed[WORDS - 1] = checksum(&sealed);
+fn seal(sequence: u32, bytes: &[u8]) -> Sealed {
+    let mut sealed = [0; SIZE];
+    let length = bytes.len().min(CAPACITY);
+    sealed[..4].copy_from_slice(&MARK.to_le_bytes());
+    sealed[4..8].copy_from_slice(&sequence.to_le_bytes());
+    sealed[8..8 + length].copy_from_slice(&bytes[..length]);
+    let sum = checksum(&sealed);
+    sealed[SIZE - 4..].copy_from_slice(&sum);
     sealed
 }
 
 /// A copy that is good.
-fn read(copy: &Slot) -> Option<[u32; WORDS]> {
-    let sealed = copy.each_ref().map(|word| word.load(Ordering::Relaxed));
-    (sealed[0] == MARK && sealed[WORDS - 1] == checksum(&sealed)).then_some(sealed)
+fn read(slot: &Slot) -> Option<Sealed> {
+    let mut sealed = [0; SIZE];
+    let words = slot.iter().map(|word| word.load(Ordering::Relaxed).to_le_bytes());
+    sealed.as_chunks_mut().0.iter_mut().zip(words).for_each(|(to, from)| *to = from);
+    (sealed[..4] == MARK.to_le_bytes() && sealed[SIZE - 4..] == checksum(&sealed)).then_some(sealed)
 }
 
-fn content(sealed: &[u32; WORDS]) -> [u8; CAPACITY] {
+fn sequence(sealed: &Sealed) -> u32 {
+    let [_, _, _, _, a, b, c, d, ..] = *sealed;
+    u32::from_le_bytes([a, b, c, d])
+}
+
+fn content(sealed: &Sealed) -> [u8; CAPACITY] {
     let mut content = [0; CAPACITY];
-    let (chunks, _) = content.as_chunks_mut();
-    chunks.iter_mut().zip(&sealed[2..]).for_each(|(to, from)| *to = from.to_le_bytes());
+    content.copy_from_slice(&sealed[8..8 + CAPACITY]);
     content
 }
 
-/// CRC-32 of all words but the last.
-fn checksum(sealed: &[u32; WORDS]) -> u32 {
-    let mut digest = CRC.digest();
-    sealed[..WORDS - 1].iter().for_each(|word| digest.update(&word.to_le_bytes()));
-    digest.finalize()
+/// CRC-32 of everything before it.
+fn checksum(sealed: &Sealed) -> [u8; 4] {
+    CRC.checksum(&sealed[..SIZE - 4]).to_le_bytes()
 }
 
 #[cfg(test)]
@@ -121,7 +125,7 @@ mod tests {
 
     /// What `write` with this number keeps.
     fn bytes(number: u8) -> [u8; CAPACITY] {
-        core::array::from_fn(|n| number.wrapping_mul(31).wrapping_add(n as u8))
+        core::array::from_fn(|n| number.wrapping_mul(31).wrapping_add(n.to_le_bytes()[0]))
     }
 
     fn written(writes: u8) -> Slots {
@@ -152,7 +156,7 @@ mod tests {
     #[test]
     fn the_sequence_may_wrap() {
         let copies = memory(0);
-        let mut keeper = Keeper { copies: &copies, sequence: u32::MAX - 3 };
+        let mut keeper = Keeper { slots: &copies, sequence: u32::MAX - 3 };
         for number in 0..8 {
             keeper.write(&bytes(number));
             assert_eq!(found(&copies), Found::Kept(bytes(number)));
@@ -179,8 +183,8 @@ mod tests {
                 let copies = written(writes);
                 let sealed = seal(u32::from(writes) + 1, &bytes(writes + 1));
                 let target = &copies[(usize::from(writes) + 1) % 2];
-                for (to, from) in target.iter().zip(sealed).rev().take(done) {
-                    to.store(from, Ordering::Relaxed);
+                for (to, from) in target.iter().zip(sealed.as_chunks().0).rev().take(done) {
+                    to.store(u32::from_le_bytes(*from), Ordering::Relaxed);
                 }
                 let expected = if writes == 0 { Found::Nothing } else { Found::Kept(bytes(writes)) };
                 // From the second round on the mark is there already: without it the write is complete.

@@ -6,7 +6,7 @@ use crate::manufacturer::PERSONALITY;
 use crate::personality::Definition;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
-use crate::{REVISION, Setup, VENDOR_ID, combined, encoder, pressure};
+use crate::{REVISION, Setup, Snapshot, VENDOR_ID, combined, encoder, pressure};
 use canopen::dictionary::{Entry, Group, Object, packed_size};
 use canopen::emcy::Fault;
 use canopen::sdo::Abort;
@@ -45,6 +45,8 @@ const fn largest(sizes: [usize; TABLES.len()]) -> usize {
 pub(crate) struct Profile {
     pub(crate) setup: Setup,
     pub(crate) configured: Configured,
+    /// As last published: a reset of the dictionary does not reset what is measured.
+    pub(crate) snapshot: Snapshot,
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
     pub(crate) buffer: TransferBuffer,
@@ -55,6 +57,7 @@ impl Profile {
         Profile {
             setup: *setup,
             configured: Configured::of(setup),
+            snapshot: Snapshot::default(),
             flags: Flags::default(),
             stored: Stored::NOTHING,
             buffer: TransferBuffer::EMPTY,
@@ -63,6 +66,17 @@ impl Profile {
 
     pub(crate) fn definition(&self) -> &'static Definition {
         self.setup.personality.definition()
+    }
+
+    /// Shows what was measured.
+    pub(crate) fn show_values(&self, image: &mut [u8]) {
+        let (definition, snapshot) = (self.definition(), &self.snapshot);
+        if let (Some(fields), Some(snapshot)) = (definition.pressure, &snapshot.pressure) {
+            fields.publish(snapshot, image);
+        }
+        if let (Some(fields), Some(snapshot)) = (definition.encoder, &snapshot.encoder) {
+            fields.publish(snapshot, image);
+        }
     }
 
     /// Shows the flags, where the personality has them.
@@ -101,6 +115,7 @@ impl Application for Profile {
         }
         self.show_personality(image);
         self.show_flags(image);
+        self.show_values(image);
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {

@@ -64,14 +64,8 @@ impl Protocol {
         if snapshot.is_empty() {
             return;
         }
-        let definition = self.device.application().definition();
-        let image = self.device.image_mut();
-        if let (Some(fields), Some(snapshot)) = (definition.pressure, &snapshot.pressure) {
-            fields.publish(snapshot, image);
-        }
-        if let (Some(fields), Some(snapshot)) = (definition.encoder, &snapshot.encoder) {
-            fields.publish(snapshot, image);
-        }
+        self.device.application_mut().snapshot = *snapshot;
+        self.device.show(Profile::show_values);
         let conditions = Conditions::of(snapshot);
         if self.conditions != conditions {
             self.take_conditions(conditions, now, out);
@@ -106,12 +100,22 @@ impl Protocol {
 
     /// The parameters for `Measurement::apply`, when they have changed since the last call (and after `start`).
     pub fn take_parameters(&mut self) -> Option<Parameters> {
-        let image = self.device.take_parameters_changed().then(|| self.device.image())?;
+        self.device.take_parameters_changed().then(|| self.parameters())
+    }
+
+    /// The parameters with which `start` will begin: a measurement that has them before has a sample for the first PDO.
+    pub fn prepare(&mut self) -> Parameters {
+        self.device.prepare();
+        self.parameters()
+    }
+
+    fn parameters(&self) -> Parameters {
+        let image = self.device.image();
         let definition = self.device.application().definition();
-        Some(Parameters {
+        Parameters {
             pressure: definition.pressure.map(|fields| fields.parameters(image)),
             encoder: definition.encoder.map(|fields| fields.parameters(image)),
-        })
+        }
     }
 
     /// Identifiers for FIFO 0, data and remote frames.

@@ -82,6 +82,7 @@ extern "C" fn start(protocol: &mut Protocol, setup: &Setup, store: &mut Option<S
     let Ok(mut view) = View::open(Flash, Pages::new(0, 16 * 1024)) else { return };
     protocol.load(&mut view);
     *store = Store::prepare(view).ok();
+    let _ = protocol.prepare();
     protocol.start(Instant(now), &mut Queue);
 }
 

@@ -190,6 +190,20 @@ fn faults_of_the_absolute_encoder_are_told() {
     }
 }
 
+/// It is written after every sample, below the sampling.
+#[test]
+fn to_keep_the_position_costs_little() {
+    /// TAMP_STAMP, to which the firmware binds the task: interrupt 2.
+    const REMEMBER: usize = 16 + 2;
+    let (mut world, _) = start("--shaft rpm:6000");
+    let summary = run(&mut world, SECOND);
+    let stats = world.machine(0).stats().exceptions[REMEMBER];
+    let each = stats.instructions / stats.entries;
+    println!("{each} instructions to keep a position");
+    assert!(stats.entries.abs_diff(summary.nodes[0].sampling.samples) < 10, "{stats:?}");
+    assert!(each < 2000, "{stats:?}");
+}
+
 /// Switches the board off for a second, and on again.
 fn cycle_power(world: &mut World) {
     let now = world.now();

@@ -80,7 +80,7 @@ fn up_and_down(lift: &mut SmallLift) {
         assert!(lift.position().abs_diff(position.into()) <= 1, "{} for {position}", lift.position());
         lift.run_until(1000, |lift| lift.doors_are(car::WIDTH));
         if landing == 4 {
-            lift.write(LOAD, 0x2220, 2, &call(1).to_le_bytes()[..6]);
+            lift.write(LOAD, 0x2320, 2, &call(1).to_le_bytes()[..6]);
             lift.press_button();
         }
     }
@@ -115,7 +115,7 @@ fn every_frame_is_known(log: &[Stamped]) {
                 let known: &[u16] = if definition.producer == Some(DISPLAY) {
                     &[0x5000]
                 } else {
-                    &[0x2203, 0x2213, 0x63C0, 0x63C5]
+                    &[0x2303, 0x2313, 0x63C0, 0x63C5]
                 };
                 assert!(known.contains(&mpdo.at.index), "{mpdo:?}");
             }
@@ -157,10 +157,10 @@ fn every_position_is_that_of_the_car(lift: &SmallLift) {
 
 /// It has the state of the position unit from that unit's multiplexed PDO, and ignores the rest of them.
 fn the_display_knows_what_concerns_it(lift: &mut SmallLift) {
-    assert_eq!(lift.shown(0x2203, 1), 0, "within its limits");
+    assert_eq!(lift.shown(0x2303, 1), 0, "within its limits");
     lift.world.borrow_mut().car -= 2_700.0;
     lift.run(10);
-    assert_eq!(lift.shown(0x2203, 1), u64::from(UNDERFLOW), "below them");
+    assert_eq!(lift.shown(0x2303, 1), u64::from(UNDERFLOW), "below them");
 }
 
 /// From the call controller, to all nodes.
@@ -168,7 +168,7 @@ fn the_lamp_can_be_lit_by_a_multiplexed_pdo(lift: &mut SmallLift) {
     assert!(!lift.is_lit());
     let lamp = Mpdo {
         address: Address::Destination(None),
-        at: Multiplexer { index: 0x2222, sub: 0 },
+        at: Multiplexer { index: 0x2322, sub: 0 },
         data: [1, 0, 0, 0],
     };
     lift.network.transmit(&Frame::new(0x500 + u16::from(CONTROLLER), &lamp.encode()).unwrap());

@@ -39,7 +39,11 @@ impl Application for Rules {
 
     fn stored(&self, group: Group) -> Stored<'_> {
         let [communication, application] = &self.stored;
-        let packed = if group == Group::Communication { communication } else { application };
+        let packed: &[u8] = match group {
+            Group::Communication => communication,
+            Group::Application => application,
+            Group::Calibration | Group::Volatile => &[],
+        };
         Stored { packed, is_sound: true }
     }
 }

@@ -135,7 +135,7 @@ impl SmallLift {
 
     /// What the installer does: each node is one of the two units, a PDO of the other is off; then saved and reset.
     pub(crate) fn install(&mut self) {
-        self.write(POSITION, 0x2211, 3, &0_f32.to_le_bytes());
+        self.write(POSITION, 0x2311, 3, &0_f32.to_le_bytes());
         self.write(POSITION, 0x2100, 1, &[6]);
         self.write(POSITION, 0x2101, 1, &100_000_u32.to_le_bytes());
         self.write(POSITION, 0x2105, 0, &[0]);
@@ -145,16 +145,16 @@ impl SmallLift {
         self.run(5);
         self.write(POSITION, 0x6382, 1, &LANDINGS[0].to_le_bytes());
 
-        self.write(LOAD, 0x2201, 1, &[0]);
+        self.write(LOAD, 0x2301, 1, &[0]);
         for (sub, value) in [(1, 2.0e5_f32), (2, 0.0), (3, 6.0e5), (4, 800.0)] {
-            self.write(LOAD, 0x2211, sub, &value.to_le_bytes());
+            self.write(LOAD, 0x2311, sub, &value.to_le_bytes());
         }
         for (sub, kilograms) in [(1, 30_u16), (2, 300), (3, 600), (4, 660)] {
             self.write(LOAD, 0x6483, sub, &kilograms.to_le_bytes());
         }
-        self.write(LOAD, 0x2220, 2, &call(4).to_le_bytes()[..6]);
-        self.write(LOAD, 0x2221, 1, &LAMP_OFF.to_le_bytes()[..6]);
-        self.write(LOAD, 0x2221, 2, &LAMP_ON.to_le_bytes()[..6]);
+        self.write(LOAD, 0x2320, 2, &call(4).to_le_bytes()[..6]);
+        self.write(LOAD, 0x2321, 1, &LAMP_OFF.to_le_bytes()[..6]);
+        self.write(LOAD, 0x2321, 2, &LAMP_ON.to_le_bytes()[..6]);
         self.write(LOAD, 0x1906, 1, &0xC000_018C_u32.to_le_bytes());
         for node in [POSITION, LOAD] {
             self.write(node, 0x1010, 1, b"save");

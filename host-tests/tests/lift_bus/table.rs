@@ -201,8 +201,8 @@ dictionary!(
         &multiplexed_tpdo(""),
         &tpdo_mapping::<1>(2, ""),
         &[
-            array(0x2203, 1),
-            take(0x2203, 1, Type::Unsigned8),
+            array(0x2303, 1),
+            take(0x2303, 1, Type::Unsigned8),
             // Of another maker: nobody else on the bus has it.
             out(0x5000, 0, Type::Unsigned16),
         ],

@@ -90,6 +90,11 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
     }
 
+    /// Takes the values that [`start`](Device::start) will begin with: for parameters that are needed before there is a bus.
+    pub fn prepare(&mut self) {
+        self.core.load();
+    }
+
     /// The next thing that is left to the caller.
     pub fn take_action(&mut self) -> Option<Action> {
         let pending = &mut self.core.pending;

@@ -1,4 +1,4 @@
-//! Manufacturer-specific objects of the lift, 2200h to 2222h: which sensors the virtual devices have, and what CiA 417
+//! Manufacturer-specific objects of the lift, 2300h to 2322h: which sensors the virtual devices have, and what CiA 417
 //! leaves open. The sensors of positions are described as those of the encoder are (2100h to 2106h).
 
 use super::rules;
@@ -11,7 +11,7 @@ const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Objec
 
 /// The channel of the encoder that a position unit measures with; 0 for a unit that is not there.
 const fn source(sub: u8, name: &'static str, default: i64) -> Object {
-    parameter(0x2201, sub, name, Type::Unsigned8)
+    parameter(0x2301, sub, name, Type::Unsigned8)
         .limits(0, 2)
         .value(default)
         .rule(Rule::Application(rules::SOURCE))
@@ -19,60 +19,60 @@ const fn source(sub: u8, name: &'static str, default: i64) -> Object {
 
 /// What a preset or a change of direction leads to.
 const fn offset(sub: u8, name: &'static str) -> Object {
-    parameter(0x2202, sub, name, Type::Integer32).unit("6384h:1")
+    parameter(0x2302, sub, name, Type::Integer32).unit("6384h:1")
 }
 
 const fn state(sub: u8, name: &'static str) -> Object {
-    Object::new(0x2203, sub, name, Type::Unsigned8, Access::ReadOnly)
+    Object::new(0x2303, sub, name, Type::Unsigned8, Access::ReadOnly)
         .value(UNKNOWN as i64)
         .mappable(Mapping::Tpdo)
 }
 
 pub(super) const OBJECTS: &[Object] = &[
-    parameter(0x2200, 0, "Way of the car per revolution", Type::Unsigned32)
+    parameter(0x2300, 0, "Way of the car per revolution", Type::Unsigned32)
         .limits(1, 0xFFFF_FFFF)
         .value(200_000)
         .unit("um")
         .rule(Rule::Application(rules::TRAVEL)),
-    Object::highest(0x2201, 4, "Position unit sources"),
+    Object::highest(0x2301, 4, "Position unit sources"),
     source(1, "Position unit 1 source", 1),
     source(2, "Position unit 2 source", 0),
     source(3, "Position unit 3 source", 0),
     source(4, "Position unit 4 source", 0),
-    Object::highest(0x2202, 4, "Position unit offsets"),
+    Object::highest(0x2302, 4, "Position unit offsets"),
     offset(1, "Position unit 1 offset"),
     offset(2, "Position unit 2 offset"),
     offset(3, "Position unit 3 offset"),
     offset(4, "Position unit 4 offset"),
-    Object::highest(0x2203, 4, "Position unit states"),
+    Object::highest(0x2303, 4, "Position unit states"),
     state(1, "Position unit 1 state"),
     state(2, "Position unit 2 state"),
     state(3, "Position unit 3 state"),
     state(4, "Position unit 4 state"),
-    Object::highest(0x2210, 2, "Load filter"),
+    Object::highest(0x2310, 2, "Load filter"),
     // As 61A0h and 61A1h of CiA 404.
-    parameter(0x2210, 1, "Load filter type", Type::Unsigned8).value(2),
-    parameter(0x2210, 2, "Load filter constant", Type::Unsigned8).limits(1, 255).value(100),
+    parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),
+    parameter(0x2310, 2, "Load filter constant", Type::Unsigned8).limits(1, 255).value(100),
     // Two equal pressures: there is no load measuring unit.
-    Object::highest(0x2211, 4, "Load calibration"),
-    parameter(0x2211, 1, "Pressure at point 1", Type::Real32).unit("Pa"),
-    parameter(0x2211, 2, "Load at point 1", Type::Real32).unit("kg"),
-    parameter(0x2211, 3, "Pressure at point 2", Type::Real32).real(1.0e6).unit("Pa"),
-    parameter(0x2211, 4, "Load at point 2", Type::Real32).real(1000.0).unit("kg"),
+    Object::highest(0x2311, 4, "Load calibration"),
+    parameter(0x2311, 1, "Pressure at point 1", Type::Real32).unit("Pa"),
+    parameter(0x2311, 2, "Load at point 1", Type::Real32).unit("kg"),
+    parameter(0x2311, 3, "Pressure at point 2", Type::Real32).real(1.0e6).unit("Pa"),
+    parameter(0x2311, 4, "Load at point 2", Type::Real32).real(1000.0).unit("kg"),
     // What 6486h leads to.
-    parameter(0x2212, 0, "Load offset", Type::Real32).unit("kg"),
-    Object::highest(0x2213, 2, "Load measurement"),
-    Object::new(0x2213, 1, "Load as measured", Type::Real32, Access::ReadOnly).unit("kg"),
+    parameter(0x2312, 0, "Load offset", Type::Real32).unit("kg"),
+    Object::highest(0x2313, 2, "Load measurement"),
+    Object::new(0x2313, 1, "Load as measured", Type::Real32, Access::ReadOnly).unit("kg"),
     // 1: the sensor or its wiring is broken.
-    Object::new(0x2213, 2, "Load sensor state", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo),
+    Object::new(0x2313, 2, "Load sensor state", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo),
     // Two equal words: there is no input panel unit.
-    Object::highest(0x2220, 2, "Button"),
-    parameter(0x2220, 1, "Virtual input while released", Type::Unsigned48),
-    parameter(0x2220, 2, "Virtual input while pressed", Type::Unsigned48),
+    Object::highest(0x2320, 2, "Button"),
+    parameter(0x2320, 1, "Virtual input while released", Type::Unsigned48),
+    parameter(0x2320, 2, "Virtual input while pressed", Type::Unsigned48),
     // Two equal words: there is no output panel unit.
-    Object::highest(0x2221, 2, "Lamp words"),
-    parameter(0x2221, 1, "Virtual output that puts the lamp out", Type::Unsigned48),
-    parameter(0x2221, 2, "Virtual output that lights the lamp", Type::Unsigned48),
+    Object::highest(0x2321, 2, "Lamp words"),
+    parameter(0x2321, 1, "Virtual output that puts the lamp out", Type::Unsigned48),
+    parameter(0x2321, 2, "Virtual output that lights the lamp", Type::Unsigned48),
     // Not 0: lit. A multiplexed PDO may write it, and an SDO client.
-    Object::new(0x2222, 0, "Lamp", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo),
+    Object::new(0x2322, 0, "Lamp", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo),
 ];

@@ -1,7 +1,7 @@
 //! The lift: its part of a dictionary, and how measured values and parameters come in and out of it.
 //!
 //! The pre-defined PDOs (CiA 417-3-1), the objects of the application profile (6000h to 64FFh), and those of the
-//! manufacturer that they need (21xxh, 22xxh). What else a node has, 1000h to 1FFFh, is common to all personalities.
+//! manufacturer that they need (21xxh to 23xxh). What else a node has, 1000h to 1FFFh, is common to all personalities.
 
 mod manufacturer;
 pub mod pdos;
@@ -12,6 +12,7 @@ mod values;
 
 pub use values::Fields;
 
+use crate::pressure::CALIBRATION;
 use canopen::dictionary::{self, Dictionary, Entry, Object};
 
 /// The PDO objects, sorted: 1400h to 1BFFh.
@@ -20,7 +21,7 @@ pub static PDOS: &[Object] = &pdos::ROWS;
 /// All other objects, sorted: 2100h to 64FFh.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 
-static PARTS: &[&[Object]] = &[&sensors::OBJECTS, manufacturer::OBJECTS, &PROFILE];
+static PARTS: &[&[Object]] = &[&sensors::OBJECTS, CALIBRATION, manufacturer::OBJECTS, &PROFILE];
 static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
 
 /// Both, as the smallest dictionary that a lift device can run.

@@ -1,6 +1,7 @@
 //! Rules of the lift's own objects.
 
 use super::values::{Fields, UnitFields};
+use crate::pressure::CALIBRATION_RULES;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
 use profiles::lift::position::{INVERTED, UNKNOWN};
@@ -13,9 +14,9 @@ pub(super) const PRESET: u8 = 0x41;
 pub(super) const STEP: u8 = 0x42;
 /// 6486h.
 pub(super) const REFERENCE: u8 = 0x43;
-/// 2200h.
+/// 2300h.
 pub(super) const TRAVEL: u8 = 0x44;
-/// 2201h.
+/// 2301h.
 pub(super) const SOURCE: u8 = 0x45;
 /// 2100h to 2103h.
 pub(super) const SENSOR: u8 = 0x46;
@@ -34,6 +35,7 @@ impl Fields {
             STEP | TRAVEL | SENSOR => self.measure_anew(entry.field(), bytes, image),
             SOURCE => self.take_source(unit, entry.field(), bytes, image),
             REFERENCE => self.weigh(value, image),
+            _ if CALIBRATION_RULES.contains(&rule) => self.transducer.write(rule, entry, bytes, image),
             _ => Ok(()),
         }
     }

@@ -39,7 +39,7 @@ impl Node {
     fn new() -> Node {
         let raw = RawLift { encoder: RawEncoder::default(), pressure: pressure(0), button: false };
         let mut node = Node { image: DEFAULTS, lift: Lift::default(), raw };
-        node.write(0x2210, 1, 0).unwrap();
+        node.write(0x2310, 1, 0).unwrap();
         node.sample();
         node
     }
@@ -96,23 +96,23 @@ fn the_defaults_of_the_table_are_those_of_the_measurement() {
 
 #[test]
 fn every_parameter_is_saved_and_nothing_else() {
-    let others: Vec<u16> = OBJECTS
-        .iter()
+    let own = OBJECTS.iter().filter(|row| !CALIBRATION.iter().any(|other| other.index == row.index));
+    let others: Vec<u16> = own
         .filter(|row| (row.access == Access::ReadWrite) != (row.group == Group::Application))
         .map(|row| row.index)
         .collect();
-    assert_eq!(others, [0x2222, 0x6011], "outputs");
+    assert_eq!(others, [0x2322, 0x6011], "outputs");
 }
 
 /// But for the words of the panel and the lift number, which do not concern the measurement, and what a preset and a
 /// reference weight leave behind.
 #[test]
 fn every_parameter_changes_what_the_measurement_gets() {
-    let silent = [0x2220, 0x2221, 0x6001, 0x6382, 0x6486];
+    let silent = [0x2320, 0x2321, 0x6001, 0x6382, 0x6486];
     let special = |index, sub| match (index, sub) {
-        (0x2105 | 0x2201, _) | (0x2103, 3) => 0,
+        (0x2105 | 0x2301, _) | (0x2103, 3) => 0,
         (0x2101, _) => 8000,
-        (0x2200, _) => 300_000,
+        (0x2300, _) => 300_000,
         (0x6380, _) => INVERTED.into(),
         (0x6384, 1) => 200,
         _ => 5,
@@ -121,7 +121,7 @@ fn every_parameter_changes_what_the_measurement_gets() {
     for row in parameters.filter(|row| !silent.contains(&row.index)) {
         let mut node = Node::new();
         node.write(0x2100, 2, 7).unwrap();
-        (2..=4).for_each(|sub| node.write(0x2201, sub, 1).unwrap());
+        (2..=4).for_each(|sub| node.write(0x2301, sub, 1).unwrap());
         let before = FIELDS.parameters(&node.image);
         let (low, high) = row.limits.or(row.kind.range()).unwrap_or((i64::MIN, i64::MAX));
         let value = match (row.index, row.sub) {
@@ -145,11 +145,11 @@ fn a_preset_is_read_at_once_and_stays() {
     assert_eq!(node.read(0x6383, 1), 77_000);
     node.lift.apply(&FIELDS.parameters(&node.image));
     node.go_to(20_480 + 2048);
-    assert_eq!((node.read(0x6383, 1), node.read(0x2202, 1)), (77_100, 76_000));
+    assert_eq!((node.read(0x6383, 1), node.read(0x2302, 1)), (77_100, 76_000));
     // It is a parameter: after a reset that finds it stored it is the same.
     let stored = node.image;
     node.image = DEFAULTS;
-    DICTIONARY.field(0x2202, 1).set(&mut node.image, DICTIONARY.field(0x2202, 1).get(&stored));
+    DICTIONARY.field(0x2302, 1).set(&mut node.image, DICTIONARY.field(0x2302, 1).get(&stored));
     node.lift.apply(&FIELDS.parameters(&node.image));
     node.sample();
     assert_eq!(node.read(0x6383, 1), 77_100);
@@ -162,7 +162,7 @@ fn a_preset_without_a_position_or_beyond_the_sensor_is_refused() {
     assert_eq!(node.write(0x6382, 2, 1), Err(Abort::DeviceState), "there is no unit 2");
     node.write(0x2100, 1, 2).unwrap();
     node.sample();
-    assert_eq!(node.read(0x2203, 1) & u64::from(UNKNOWN), u64::from(UNKNOWN));
+    assert_eq!(node.read(0x2303, 1) & u64::from(UNKNOWN), u64::from(UNKNOWN));
     assert_eq!(node.write(0x6382, 1, 1), Err(Abort::DeviceState), "there is no SSI encoder");
 }
 
@@ -184,13 +184,13 @@ fn the_other_direction_leaves_the_position() {
 
 #[test]
 fn another_measuring_step_clears_the_offset_and_must_be_one_of_the_sensor() {
-    for (index, sub, value, position) in [(0x6384, 1, 50, 200), (0x2200, 0, 400_000, 200)] {
+    for (index, sub, value, position) in [(0x6384, 1, 50, 200), (0x2300, 0, 400_000, 200)] {
         let mut node = Node::new();
         node.go_to(2048);
         node.write(0x6382, 1, 5000).unwrap();
         node.write(index, sub, value).unwrap();
         node.sample();
-        assert_eq!((node.read(0x2202, 1), node.read(0x6383, 1)), (0, position), "{index:X}h");
+        assert_eq!((node.read(0x2302, 1), node.read(0x6383, 1)), (0, position), "{index:X}h");
     }
     let mut node = Node::new();
     node.write(0x6382, 1, 5000).unwrap();
@@ -198,19 +198,19 @@ fn another_measuring_step_clears_the_offset_and_must_be_one_of_the_sensor() {
     for (index, sub, value) in [(0x6384, 1, 4), (0x2101, 1, 199), (0x2103, 2, 31)] {
         assert_eq!(node.write(index, sub, value), Err(Abort::InvalidValue), "{index:X}h");
     }
-    assert_eq!((node.read(0x2202, 1), node.read(0x6384, 1), node.read(0x2101, 1)), (5000, 100, 4096));
+    assert_eq!((node.read(0x2302, 1), node.read(0x6384, 1), node.read(0x2101, 1)), (5000, 100, 4096));
     assert_eq!(node.write(0x6384, 1, 5), Ok(()));
 }
 
 #[test]
 fn units_take_their_sensor_where_the_table_says() {
     let mut node = Node::new();
-    node.write(0x2201, 3, 1).unwrap();
+    node.write(0x2301, 3, 1).unwrap();
     node.go_to(2048);
     assert_eq!([1, 2, 3, 4].map(|unit| node.read(0x6383, unit)), [100, 0, 100, 0]);
     node.write(0x6382, 3, 1).unwrap();
-    node.write(0x2201, 3, 2).unwrap();
-    assert_eq!(node.read(0x2202, 3), 0, "the offset belonged to the other sensor");
+    node.write(0x2301, 3, 2).unwrap();
+    assert_eq!(node.read(0x2302, 3), 0, "the offset belonged to the other sensor");
     assert_eq!(node.read(0x63C4, 1), 0x3D);
 }
 
@@ -242,19 +242,32 @@ fn what_is_not_weighed_is_no_reference() {
     let mut node = Node::new();
     node.raw.pressure.pressure = 0;
     node.sample();
-    assert_eq!((node.read(0x6480, 1), node.read(0x2213, 2)), (0xFFFF, 1));
+    assert_eq!((node.read(0x6480, 1), node.read(0x2313, 2)), (0xFFFF, 1));
     assert_eq!(node.write(0x6486, 0, 0), Err(Abort::DeviceState));
-    node.write_real(0x2211, 3, 0.0);
+    node.write_real(0x2311, 3, 0.0);
     node.sample();
-    assert_eq!((node.read(0x6480, 1), node.read(0x2213, 2)), (0, 0), "no load measuring unit");
+    assert_eq!((node.read(0x6480, 1), node.read(0x2313, 2)), (0, 0), "no load measuring unit");
     assert_eq!(node.write(0x6486, 0, 0), Err(Abort::DeviceState));
+}
+
+#[test]
+fn the_transducer_is_calibrated_as_that_of_the_pressure_transmitter() {
+    let mut node = Node::new();
+    let key = u32::from_le_bytes(*b"cali").into();
+    assert_eq!(node.write(0x2200, 2, 0x4A74_2400), Err(Abort::Access), "locked");
+    node.write(0x2203, 0, key).unwrap();
+    // 0 to 40 bar.
+    node.write_real(0x2200, 2, 4.0e6);
+    node.raw.pressure = pressure(100);
+    node.sample();
+    assert_eq!(node.read(0x6480, 1), 400);
 }
 
 #[test]
 fn a_button_is_a_word_and_a_word_is_a_lamp() {
     let mut node = Node::new();
     for (index, sub, word) in
-        [(0x2220, 1, 0x11), (0x2220, 2, 0x9988_7766_5544), (0x2221, 1, 0x22), (0x2221, 2, 0x33)]
+        [(0x2320, 1, 0x11), (0x2320, 2, 0x9988_7766_5544), (0x2321, 1, 0x22), (0x2321, 2, 0x33)]
     {
         node.write(index, sub, word).unwrap();
     }
@@ -269,7 +282,7 @@ fn a_button_is_a_word_and_a_word_is_a_lamp() {
         FIELDS.follow_output(&mut lamp, &mut node.image);
         assert_eq!(FIELDS.is_lit(&node.image), is_lit, "{word:X}h");
     }
-    node.write(0x2222, 0, 1).unwrap();
+    node.write(0x2322, 0, 1).unwrap();
     FIELDS.follow_output(&mut lamp, &mut node.image);
     assert!(FIELDS.is_lit(&node.image), "an old output says nothing new");
 }
@@ -279,17 +292,17 @@ fn the_device_type_names_the_only_virtual_device_or_none() {
     let mut node = Node::new();
     let device_type = |node: &Node| FIELDS.device_type(&node.image);
     assert_eq!(device_type(&node), 0x0000_01A1, "position and load");
-    node.write_real(0x2211, 3, 0.0);
+    node.write_real(0x2311, 3, 0.0);
     assert_eq!(device_type(&node), 0x0600_01A1);
-    node.write(0x2201, 1, 0).unwrap();
+    node.write(0x2301, 1, 0).unwrap();
     assert_eq!(device_type(&node), 0x0000_01A1, "nothing");
-    node.write(0x2220, 1, 7).unwrap();
+    node.write(0x2320, 1, 7).unwrap();
     assert_eq!(device_type(&node), 0x0200_01A1);
-    node.write(0x2220, 1, 0).unwrap();
-    node.write(0x2221, 1, 7).unwrap();
+    node.write(0x2320, 1, 0).unwrap();
+    node.write(0x2321, 1, 7).unwrap();
     assert_eq!(device_type(&node), 0x0300_01A1);
-    node.write(0x2221, 1, 0).unwrap();
-    node.write_real(0x2211, 3, 1.0);
+    node.write(0x2321, 1, 0).unwrap();
+    node.write_real(0x2311, 3, 1.0);
     assert_eq!(device_type(&node), 0x0A00_01A1);
 }
 

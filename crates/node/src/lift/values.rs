@@ -1,6 +1,7 @@
 //! Measured values into the image, parameters out of it.
 
 use crate::encoder::Sensors;
+use crate::pressure::Places;
 use canopen::dictionary::{Dictionary, Field};
 use core::num::{NonZeroU16, NonZeroU32};
 use profiles::encoder::Area;
@@ -12,6 +13,7 @@ use profiles::lift::{Parameters, Snapshot};
 /// Where the lift's values are in the image of a dictionary that has its objects.
 pub struct Fields {
     pub(super) sensors: Sensors,
+    pub(super) transducer: Places,
     pub(super) units: [UnitFields; UNITS],
     travel: Field,
     position_step: Field,
@@ -52,9 +54,9 @@ pub(super) struct UnitFields {
 impl UnitFields {
     const fn new(d: &Dictionary, sub: u8) -> UnitFields {
         UnitFields {
-            source: d.field(0x2201, sub),
-            offset: d.field(0x2202, sub),
-            state: d.field(0x2203, sub),
+            source: d.field(0x2301, sub),
+            offset: d.field(0x2302, sub),
+            state: d.field(0x2303, sub),
             operating: d.field(0x6380, sub),
             position: d.field(0x6383, sub),
             speed: d.field(0x6390, sub),
@@ -99,29 +101,30 @@ impl Fields {
     pub const fn new(d: &Dictionary) -> Fields {
         Fields {
             sensors: Sensors::new(d),
+            transducer: Places::new(d),
             units: [
                 UnitFields::new(d, 1),
                 UnitFields::new(d, 2),
                 UnitFields::new(d, 3),
                 UnitFields::new(d, 4),
             ],
-            travel: d.field(0x2200, 0),
+            travel: d.field(0x2300, 0),
             position_step: d.field(0x6384, 1),
             speed_step: d.field(0x6384, 2),
             load: d.field(0x6480, 1),
             signals: d.field(0x6482, 1),
             limits: [d.field(0x6483, 1), d.field(0x6483, 2), d.field(0x6483, 3), d.field(0x6483, 4)],
-            filter_type: d.field(0x2210, 1),
-            filter_constant: d.field(0x2210, 2),
-            points: [[d.field(0x2211, 1), d.field(0x2211, 2)], [d.field(0x2211, 3), d.field(0x2211, 4)]],
-            load_offset: d.field(0x2212, 0),
-            measured_load: d.field(0x2213, 1),
-            load_state: d.field(0x2213, 2),
+            filter_type: d.field(0x2310, 1),
+            filter_constant: d.field(0x2310, 2),
+            points: [[d.field(0x2311, 1), d.field(0x2311, 2)], [d.field(0x2311, 3), d.field(0x2311, 4)]],
+            load_offset: d.field(0x2312, 0),
+            measured_load: d.field(0x2313, 1),
+            load_state: d.field(0x2313, 2),
             input: d.field(0x6010, 0),
             output: d.field(0x6011, 0),
-            button: [d.field(0x2220, 1), d.field(0x2220, 2)],
-            lamp_words: [d.field(0x2221, 1), d.field(0x2221, 2)],
-            lamp: d.field(0x2222, 0),
+            button: [d.field(0x2320, 1), d.field(0x2320, 2)],
+            lamp_words: [d.field(0x2321, 1), d.field(0x2321, 2)],
+            lamp: d.field(0x2322, 0),
         }
     }
 
@@ -181,12 +184,12 @@ impl Fields {
         let point =
             |[pressure, load]: [Field; 2]| Point { pressure: pressure.f32(image), load: load.f32(image) };
         load::Parameters {
+            transducer: self.transducer.calibration(image),
             filter_type: self.filter_type.u8(image),
             filter_constant: self.filter_constant.u8(image),
             points: self.points.map(point),
             offset: self.load_offset.f32(image),
             limits: self.limits.map(|at| at.u16(image)),
-            ..load::Parameters::default()
         }
     }
 

@@ -4,7 +4,6 @@
 //! refused with 0601 0000h; a value that would leave a calibration which is not valid is refused with 0604 0043h. What is
 //! written acts from the next sample on, and is kept when 2204h gets "save". 1010h and 1011h do not touch it.
 
-use super::values::Fields;
 use canopen::dictionary::{Access, Dictionary, Entry, Field, Group, Object, Rule, Type};
 use canopen::sdo::Abort;
 use profiles::pressure::{
@@ -66,8 +65,11 @@ pub(crate) const CALIBRATION: &[Object] = &[
     command(0x2204, "Save calibration", Rule::StoreCalibration).value(1),
 ];
 
+/// The rules of these objects.
+pub(crate) const RULES: core::ops::RangeInclusive<u8> = VALUE..=LOCK;
+
 /// Where the values are.
-pub(super) struct Places {
+pub(crate) struct Places {
     pressure: [Field; 11],
     thermometer: Field,
     temperature: [Field; 6],
@@ -75,7 +77,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    pub(super) const fn new(d: &Dictionary) -> Places {
+    pub(crate) const fn new(d: &Dictionary) -> Places {
         Places {
             pressure: fields(d, 0x2200, 1),
             thermometer: d.field(0x2201, 1),
@@ -85,7 +87,7 @@ impl Places {
     }
 
     /// The calibration in the image. One that no write could have put there acts as the default one.
-    pub(super) fn calibration(&self, image: &[u8]) -> Calibration {
+    pub(crate) fn calibration(&self, image: &[u8]) -> Calibration {
         Some(self.load(image)).filter(Calibration::is_valid).unwrap_or_default()
     }
 
@@ -118,23 +120,14 @@ impl Places {
         field.store(image, before);
         is_valid
     }
-}
 
-impl Fields {
     /// Decides on a write to an object with one of the rules above.
-    pub(super) fn write_calibration(
-        &self,
-        rule: u8,
-        entry: &Entry,
-        bytes: &[u8],
-        image: &mut [u8],
-    ) -> Result<(), Abort> {
-        let places = &self.calibration;
+    pub(crate) fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         match rule {
             LOCK if bytes == KEY || bytes == [0; 4] => Ok(()),
             LOCK => Err(Abort::NotStored),
-            _ if places.lock.load(image) != KEY => Err(Abort::Access),
-            VALUE if !places.admits(entry.field(), bytes, image) => Err(Abort::Parameter),
+            _ if self.lock.load(image) != KEY => Err(Abort::Access),
+            VALUE if !self.admits(entry.field(), bytes, image) => Err(Abort::Parameter),
             _ => Ok(()),
         }
     }

@@ -22,7 +22,7 @@ impl Fields {
         let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let known = match rule {
             AUTOZERO => return self.autozero(entry.sub(), bytes, image),
-            VALUE..=LOCK => return self.write_calibration(rule, entry, bytes, image),
+            VALUE..=LOCK => return self.calibration.write(rule, entry, bytes, image),
             PRESSURE_UNIT => Unit::pressure(code).is_some(),
             TEMPERATURE_UNIT => Unit::temperature(code).is_some(),
             _ => true,
