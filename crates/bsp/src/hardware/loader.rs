@@ -47,8 +47,8 @@ pub struct Bus {
 }
 
 impl Loader {
-    /// The watchdog comes first: a crystal that does not start ends in a reset too. The clock is raised because the CRC of
-    /// the longest application takes 0.12 s at the 16 MHz of a reset, and 13 ms at 144.
+    /// The watchdog comes first: a crystal that does not start ends in a reset too. The clock is raised for the CRC of the
+    /// application, which takes nine times as long at the 16 MHz of a reset.
     #[must_use]
     pub fn start(device: Peripherals) -> Loader {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
