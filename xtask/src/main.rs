@@ -1,5 +1,6 @@
 //! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
 
+mod bench;
 mod command;
 mod eds;
 mod images;
@@ -47,6 +48,8 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
+    /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
+    Bench(bench::Options),
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
     Test {
         /// Run only the steps whose name contains this text
@@ -62,6 +65,7 @@ fn main() -> ExitCode {
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
         Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
+        Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {

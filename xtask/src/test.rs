@@ -7,10 +7,10 @@ use anyhow::{Result, ensure};
 use crate::command::{cargo, root, run};
 use crate::steps::Steps;
 use crate::target::Toolchain;
-use crate::{images, native, python, sim};
+use crate::{bench, images, native, python, sim};
 
 /// The packages that only build for the embedded target.
-const IMAGES: [&str; 4] = ["firmware", "bootloader", "mechanics-images", "panic-free"];
+const IMAGES: [&str; 5] = ["firmware", "bootloader", "mechanics-images", "panic-free", "bench-images"];
 
 /// Runs the steps.
 fn run_all(steps: &mut Steps) -> Result<()> {
@@ -24,6 +24,7 @@ fn run_all(steps: &mut Steps) -> Result<()> {
     steps.run("other chips", other_chips)?;
     steps.run("no panic", no_panic)?;
     steps.run("test host", || run(with_images(&mut host("test"))))?;
+    steps.run("performance", bench::check)?;
     steps.run("test python", test_python)
 }
 
@@ -56,6 +57,8 @@ fn lint_images() -> Result<()> {
         "mechanics-images",
         "-p",
         "panic-free",
+        "-p",
+        "bench-images",
         "-p",
         "bsp",
     ];

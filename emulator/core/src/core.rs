@@ -10,6 +10,7 @@ use crate::cost::Costs;
 use crate::exception::Exception;
 use crate::mechanism::Mechanism;
 use crate::nvic::{Masks, Nvic};
+use crate::profile::Profile;
 use crate::scb::Scb;
 use crate::stats::Stats;
 use crate::systick::SysTick;
@@ -52,6 +53,7 @@ pub(crate) struct Core<P> {
     pub(crate) scb: Scb,
     pub(crate) systick: SysTick,
     pub(crate) stats: Stats,
+    pub(crate) profile: Profile,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
     pub(crate) effects: VecDeque<Effect>,
@@ -86,6 +88,7 @@ impl<P: Peripherals> Core<P> {
             scb: Scb::default(),
             systick: SysTick::default(),
             stats: Stats::default(),
+            profile: Profile::default(),
             halt: None,
             unmapped: None,
             effects: VecDeque::new(),

@@ -66,7 +66,9 @@ fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32)
         return;
     }
     let cost = core.costs.get(address as u32, size).unwrap_or_else(|| learn(cpu, address, size));
-    cpu.get_data_mut().spend(cost.instructions, cost.cycles);
+    let core = cpu.get_data_mut();
+    core.profile.visit(address as u32, size);
+    core.spend(cost.instructions, cost.cycles);
 }
 
 /// Lets loads from flash fail while it is busy, or lets them through again.

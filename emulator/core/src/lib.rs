@@ -12,7 +12,7 @@
 //! | `core` | what hooks and run loop share |
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
 //! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
-//! | `cost`, `stats` | cycles of a block; what was counted |
+//! | `cost`, `stats`, `profile` | cycles of a block; what was counted, and where |
 //! | `loader` | ELF files |
 //!
 //! # Simplifications
@@ -39,6 +39,7 @@ mod mechanism;
 mod model;
 mod nvic;
 mod ppb;
+mod profile;
 mod scb;
 mod stats;
 mod systick;
@@ -50,4 +51,5 @@ pub use loader::{Image, Segment};
 pub use machine::{Machine, RAM_PATTERN, Stop};
 pub use mechanism::Mechanism;
 pub use model::{Error, Model};
+pub use profile::Visits;
 pub use stats::{Activity, Stats};

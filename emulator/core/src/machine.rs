@@ -12,6 +12,7 @@ use crate::incident::Incident;
 use crate::loader::{self, Image};
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
+use crate::profile::Visits;
 use crate::stats::Stats;
 
 /// The value of every byte of RAM after power-on: what still has it was never written.
@@ -152,6 +153,16 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// What was counted.
     pub fn stats(&self) -> &Stats {
         &self.cpu.get_data().stats
+    }
+
+    /// Counts how often each block of code runs, from now on or no longer.
+    pub fn set_profiling(&mut self, on: bool) {
+        self.cpu.get_data_mut().profile.is_on = on;
+    }
+
+    /// How often each block has run while that was counted, by address; from here on they count from zero.
+    pub fn take_profile(&mut self) -> Vec<Visits> {
+        self.cpu.get_data_mut().profile.take()
     }
 
     /// Faults and resets since power-on of the machine, with their instants.

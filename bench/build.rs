@@ -1,0 +1,20 @@
+//! The programs start at reset and have the whole flash; zencan's dictionary is generated from its description.
+
+use std::path::Path;
+use std::{env, fs};
+
+const SCRIPT: &str = "MEMORY { BENCH (rx) : ORIGIN = 0x08000000, LENGTH = 512K }\nREGION_ALIAS(\"FLASH\", BENCH);\n_stack_start = ORIGIN(STACK) + LENGTH(STACK);\n_stack_end = ORIGIN(STACK);\n";
+
+fn main() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    fs::write(Path::new(&out).join("image.x"), SCRIPT).expect("OUT_DIR can be written");
+    zencan_build::build_node_from_device_config("NODE", "zencan.toml").expect("zencan.toml is good");
+    println!("cargo::rustc-link-search={out}");
+    println!("cargo::rustc-link-search={}", root.display());
+    println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    println!("cargo::rustc-link-arg-bins=--nmagic");
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=zencan.toml");
+    println!("cargo::rerun-if-changed={}", root.join("memory.x").display());
+}

@@ -1,0 +1,51 @@
+//! Nothing: what is subtracted from the sizes of the others.
+#![no_std]
+#![no_main]
+
+use bench_images::{Bits, Domain, Node, transmit};
+use cortex_m_rt::entry;
+
+/// Does nothing but what every program has around its node: a driver, and the content of a domain.
+struct Empty(Domain);
+
+/// A frame as it is in the registers.
+struct Raw(Bits);
+
+impl From<Bits> for Raw {
+    fn from(bits: Bits) -> Raw {
+        Raw(bits)
+    }
+}
+
+impl Empty {
+    fn echo(&mut self, frame: &Raw) {
+        self.0.write(frame.0.len, &frame.0.data);
+        transmit(frame, |frame| frame.0);
+    }
+}
+
+impl Node for Empty {
+    type Frame = Raw;
+
+    fn pass(&mut self, _: u64) {}
+
+    fn sort(&mut self, frame: Raw, _: u64) {
+        self.echo(&frame);
+    }
+
+    fn process(&mut self, frame: Raw, _: u64) {
+        self.echo(&frame);
+    }
+
+    fn serve(&mut self, frame: Raw, _: u64) {
+        self.echo(&frame);
+    }
+
+    fn disturb(&mut self, _: u64) {}
+}
+
+#[entry]
+fn main() -> ! {
+    static mut NODE: Empty = Empty(Domain::new());
+    bench_images::run(NODE)
+}

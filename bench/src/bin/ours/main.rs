@@ -1,0 +1,149 @@
+//! Our device, called as the firmware calls it: one task for process data and one for services, each asks for its next
+//! deadline at its end.
+#![no_std]
+#![no_main]
+
+mod dictionary;
+
+use bench_images::{Bits, Domain, Node, transmit};
+use core::hint::black_box;
+use core::mem::MaybeUninit;
+
+use canopen::dictionary::{Entry, Group};
+use canopen::emcy::Fault;
+use canopen::sdo::Abort;
+use canopen::{
+    Action, Application, CanId, Device, Frame, Instant, NodeId, Part, QueueFull, Stored, Transmit,
+};
+use cortex_m_rt::entry;
+
+/// The node-ID that the host talks to.
+const ID: u8 = 1;
+
+/// The application: it keeps a domain.
+struct Keeper(Domain);
+
+impl Application for Keeper {
+    fn initialise(&mut self, _: &mut [u8]) {}
+
+    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        Ok(())
+    }
+
+    fn stored(&self, _: Group) -> Stored<'_> {
+        // The optimiser must not know that nothing is ever stored: reading it belongs to the size.
+        Stored { packed: black_box(&[]), is_sound: black_box(true) }
+    }
+
+    fn read_domain(&self, _: u8) -> Result<&[u8], Abort> {
+        Ok(self.0.content())
+    }
+
+    fn write_domain(&mut self, _: u8, part: Part<'_>) -> Result<(), Abort> {
+        let has_room = match part {
+            Part::Begin(_) | Part::End(_) => true,
+            Part::Data(offset, bytes) => self.0.write(offset, bytes),
+        };
+        if has_room { Ok(()) } else { Err(Abort::NotStored) }
+    }
+}
+
+/// A queue of which the optimiser knows nothing.
+struct Driver {
+    room: usize,
+}
+
+impl Transmit for Driver {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        if transmit(&frame, bits) { Ok(()) } else { Err(QueueFull) }
+    }
+
+    fn room(&self) -> usize {
+        self.room
+    }
+}
+
+fn bits(frame: &Frame) -> Bits {
+    let mut data = [0; 8];
+    for (to, from) in data.iter_mut().zip(frame.data()) {
+        *to = *from;
+    }
+    Bits { id: frame.id(), len: frame.len(), data }
+}
+
+/// A received frame.
+struct Received(Frame);
+
+impl From<Bits> for Received {
+    fn from(bits: Bits) -> Received {
+        let data = bits.data.get(..bits.len).unwrap_or(&[]);
+        Received(Frame::new(bits.id, data).expect("the host sends valid frames"))
+    }
+}
+
+struct Ours {
+    device: Device<Keeper, { dictionary::SIZE }>,
+    driver: Driver,
+}
+
+impl Node for Ours {
+    type Frame = Received;
+
+    fn pass(&mut self, now: u64) {
+        self.device.poll_process(Instant(now), &mut self.driver);
+        self.device.poll_services(Instant(now), &mut self.driver);
+        while let Some(action) = self.device.take_action() {
+            self.fulfil(action, Instant(now));
+        }
+    }
+
+    fn disturb(&mut self, now: u64) {
+        self.device.raise(Fault::RpdoDeadline(0), Instant(now));
+        self.device.image_mut().fill(0);
+        self.device.changed(Instant(now), &mut self.driver);
+        self.device.clear(Fault::RpdoDeadline(0), Instant(now));
+    }
+
+    fn sort(&mut self, Received(frame): Received, now: u64) {
+        self.device.on_process_frame(&frame, Instant(now), &mut self.driver);
+        self.device.on_service_frame(&frame, Instant(now), &mut self.driver);
+    }
+
+    fn process(&mut self, Received(frame): Received, now: u64) {
+        self.device.on_process_frame(&frame, Instant(now), &mut self.driver);
+        self.device.poll_process(Instant(now), &mut self.driver);
+    }
+
+    fn serve(&mut self, Received(frame): Received, now: u64) {
+        self.device.on_service_frame(&frame, Instant(now), &mut self.driver);
+        self.device.poll_services(Instant(now), &mut self.driver);
+    }
+}
+
+impl Ours {
+    fn new() -> Ours {
+        let device = Device::new(&dictionary::DICTIONARY, NodeId::new(ID), Keeper(Domain::new()));
+        let mut ours = Ours { device, driver: Driver { room: black_box(usize::MAX) } };
+        ours.device.start(Instant(0), &mut ours.driver);
+        ours
+    }
+
+    /// Does what the device leaves to its caller.
+    fn fulfil(&mut self, action: Action, now: Instant) {
+        match action {
+            Action::ResetNode | Action::ResetCommunication => self.device.start(now, &mut self.driver),
+            Action::Identifiers => {
+                let ids = self.device.process_ids().chain(self.device.service_ids());
+                black_box(ids.map(CanId::get).fold(0, u16::wrapping_add));
+            }
+            Action::Store(_) => self.device.finish(Ok(()), now, &mut self.driver),
+            Action::BitRate(_) | Action::Bootloader => (),
+        }
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    static mut NODE: MaybeUninit<Ours> = MaybeUninit::uninit();
+    bench_images::run(NODE.write(Ours::new()))
+}

@@ -1,0 +1,82 @@
+//! `cargo xtask bench`: counts the instructions of CANopen nodes on the emulated Cortex-M4, operation by operation.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `operations`, `client` | what is measured, and the client that makes the node do it |
+//! | `program`, `mailbox` | an image on the emulated core, its registers, the count |
+//! | `sizes`, `profile` | what an image takes, and where its instructions are |
+//! | `report`, `page` | the tables, and the page that states them |
+
+mod client;
+mod mailbox;
+mod operations;
+mod page;
+mod profile;
+mod program;
+mod report;
+mod sizes;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Parser;
+
+use operations::{OPERATIONS, operational};
+use program::Program;
+use report::{Optimisation, Report};
+
+/// Counts the instructions of CANopen nodes on the emulated Cortex-M4
+#[derive(Parser)]
+struct Cli {
+    /// Where the ELF files of bench-images are
+    #[arg(long)]
+    images: PathBuf,
+    /// The images are optimised for speed: compare with what CANopenNode does with -O2
+    #[arg(long)]
+    speed: bool,
+    /// Replace the tables in this page
+    #[arg(long, value_name = "PAGE")]
+    write: Option<PathBuf>,
+    /// Fail when a number of ours is worse than this page states
+    #[arg(long, value_name = "PAGE", conflicts_with = "write")]
+    check: Option<PathBuf>,
+    /// Instead of the tables, say where the instructions of the operations are whose name contains this
+    #[arg(long, value_name = "OPERATION")]
+    profile: Option<String>,
+}
+
+fn main() -> ExitCode {
+    match run(&Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(cli: &Cli) -> Result<()> {
+    if let Some(operation) = &cli.profile {
+        return print_profile(&cli.images.join("ours"), operation);
+    }
+    let optimisation = if cli.speed { Optimisation::Speed } else { Optimisation::Size };
+    let report = Report::measure(&cli.images, optimisation)?;
+    println!("{report}");
+    match (&cli.write, &cli.check) {
+        (Some(path), _) => page::write(path, &report),
+        (_, Some(path)) => page::check(path, &report),
+        _ => Ok(()),
+    }
+}
+
+fn print_profile(image: &Path, operation: &str) -> Result<()> {
+    let mut client = operational(Program::start(image)?)?;
+    for operation in OPERATIONS.iter().filter(|row| row.name.contains(operation)) {
+        println!("{:8} {}", operation.measure(&mut client)?, operation.name);
+        for (function, instructions) in profile::functions(image, &client.take_profile())? {
+            println!("{instructions:8}     {function}");
+        }
+    }
+    Ok(())
+}

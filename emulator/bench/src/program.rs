@@ -1,0 +1,76 @@
+//! A program on the emulated core: one request at a time, and what it took.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use canbus::Time;
+use canopen::Frame;
+use emulator::{Machine, Model, Stop, Visits};
+
+use crate::mailbox::{Mailbox, Request};
+
+/// No operation takes this long.
+const LIMIT: Time = Time::from_millis(1000);
+
+/// A program that waits for its next request.
+pub(crate) struct Program {
+    machine: Machine<Mailbox>,
+    /// What the empty loop takes.
+    empty: u64,
+}
+
+/// What a request took and brought.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    /// The empty loop subtracted.
+    pub(crate) instructions: u64,
+    pub(crate) frames: Vec<Frame>,
+}
+
+impl Program {
+    /// Loads an ELF file and measures its empty loop.
+    pub(crate) fn start(path: &Path) -> Result<Program> {
+        let file = std::fs::read(path).with_context(|| path.display().to_string())?;
+        let mut machine = Machine::new(Model::stm32f4(512 * 1024), Mailbox::default())?;
+        machine.load_elf(&file)?;
+        machine.power_on(Time::ZERO);
+        let mut program = Program { machine, empty: 0 };
+        // The first one lets it start up.
+        program.run(Request::default())?;
+        program.empty = program.run(Request::default())?.instructions;
+        Ok(program)
+    }
+
+    /// Carries out a request. The program may send frames meanwhile.
+    pub(crate) fn run(&mut self, request: Request) -> Result<Outcome> {
+        let mailbox = self.machine.peripherals_mut();
+        (mailbox.request, mailbox.is_done) = (request, false);
+        let mut instructions = 0;
+        let end = self.machine.now() + LIMIT;
+        while !self.is_done()? {
+            self.machine.set_profiling(self.machine.peripherals().counts);
+            let (counted, before) = (self.machine.peripherals().counts, self.machine.stats().instructions);
+            ensure!(self.machine.run_until(end) == Stop::Poked, "the program does not come to an end");
+            let passed = self.machine.stats().instructions - before;
+            match (counted, self.machine.peripherals().counts) {
+                (true, true) => instructions += passed,
+                (true, false) => instructions += passed - self.empty,
+                _ => (),
+            }
+        }
+        Ok(Outcome { instructions, frames: std::mem::take(&mut self.machine.peripherals_mut().sent) })
+    }
+
+    /// Where the counted instructions of the last requests are.
+    pub(crate) fn take_profile(&mut self) -> Vec<Visits> {
+        self.machine.take_profile()
+    }
+
+    fn is_done(&self) -> Result<bool> {
+        let mailbox = self.machine.peripherals();
+        if mailbox.has_panicked {
+            bail!("the program has panicked");
+        }
+        Ok(mailbox.is_done)
+    }
+}

@@ -1,0 +1,67 @@
+//! `cargo xtask bench`: builds the programs of bench/ and counts their instructions.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+
+use crate::command::{cargo, root, run, target_dir};
+use crate::native;
+use crate::target::{TRIPLE, Toolchain};
+
+/// What to do with the figures.
+#[derive(Args, Default)]
+pub(crate) struct Options {
+    /// Optimise for speed (opt-level 2), not for size as the firmware is
+    #[arg(long)]
+    speed: bool,
+    /// Write the tables into docs/performance.md
+    #[arg(long)]
+    write: bool,
+    /// Fail when a number of ours is more than a few per cent worse than docs/performance.md states
+    #[arg(long, conflicts_with = "write")]
+    check: bool,
+    /// Instead of the tables, say where the instructions of the operations are whose name contains this
+    #[arg(long, value_name = "OPERATION")]
+    profile: Option<String>,
+}
+
+impl Options {
+    /// The profile that the programs are built with, also the name of its directory.
+    fn cargo_profile(&self) -> &'static str {
+        if self.speed { "speed" } else { "release" }
+    }
+}
+
+/// Measures and prints.
+pub(crate) fn measure(options: &Options) -> Result<()> {
+    native::ensure_emulator_tools()?;
+    let images = build(options)?;
+    let page = root().join("docs/performance.md");
+    let mut command = cargo();
+    command.args(["run", "--quiet", "--profile", "sim", "-p", "bench", "--", "--images"]).arg(images);
+    if options.speed {
+        command.arg("--speed");
+    }
+    if options.write {
+        command.arg("--write").arg(&page);
+    }
+    if options.check {
+        command.arg("--check").arg(&page);
+    }
+    if let Some(operation) = &options.profile {
+        command.arg("--profile").arg(operation);
+    }
+    run(&mut command)
+}
+
+/// The step of the test command: what is flashed has not become worse than stated.
+pub(crate) fn check() -> Result<()> {
+    measure(&Options { check: true, ..Options::default() })
+}
+
+fn build(options: &Options) -> Result<PathBuf> {
+    let profile = options.cargo_profile();
+    run(&mut Toolchain::ensure()?.cargo("build", &["--profile", profile, "-p", "bench-images"]))?;
+    Ok(target_dir().join(TRIPLE).join(profile))
+}
