@@ -59,7 +59,9 @@ mod app {
     use bsp::reset_cause::ResetCause;
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
-    use bsp::{BackupMemory, Board, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog};
+    use bsp::{
+        BackupMemory, Board, Buttons, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog,
+    };
     use node::{EncoderBoard, FactoryCalibration, Kept, Measurement, Parameters, Parcel, Protocol, Snapshot};
 
     use crate::bit_rate::Rate;
@@ -89,6 +91,7 @@ mod app {
         receiver_services: Receiver,
         sampling: Sampling,
         shaft: Shaft,
+        buttons: Buttons,
         measurement: &'static mut Measurement,
         factory: FactoryCalibration,
         transmitter: Transmitter,
@@ -135,11 +138,12 @@ mod app {
             receiver_services,
             sampling: board.sampling,
             shaft: Shaft::new(board.encoder, board.ssi, surroundings),
+            buttons: board.buttons,
             measurement: cx.local.measurement_place.write(Measurement::new(remembering::start(&board.found))),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
-            process: Process { frames: process_frames, alarm: process_alarm },
+            process: Process { frames: process_frames, alarm: process_alarm, lamps: board.lamps },
             services: Services::new(
                 board.can,
                 Rate::of(setup.bit_rate),
@@ -176,7 +180,7 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, measurement, factory],
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, buttons, measurement, factory],
            shared = [snapshot, parameters, kept, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(sums) = cx.local.sampling.take() else { return };
@@ -189,9 +193,9 @@ mod app {
             cx.local.shaft.apply(&parameters);
         }
         let raw = configuration::raw_sample(&sums, *cx.local.factory);
-        let snapshot = cx.local.measurement.sample(&raw, &cx.local.shaft.read(&sums));
-        if snapshot.encoder.is_some() {
-            let now = cx.local.measurement.kept();
+        let (shaft, pressed) = (cx.local.shaft.read(&sums), cx.local.buttons.sample());
+        let snapshot = cx.local.measurement.sample(&raw, &shaft, pressed);
+        if let Some(now) = cx.local.measurement.kept() {
             cx.shared.kept.lock(|kept| *kept = Some(now));
             rtic::pend(REMEMBER);
         }

@@ -1,6 +1,6 @@
-//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO.
+//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO, the lamps.
 
-use bsp::{Alarm, Clock, Frames, Received};
+use bsp::{Alarm, Clock, Frames, Lamps, Received};
 use node::Snapshot;
 
 use crate::SERVICES;
@@ -10,6 +10,7 @@ use crate::shared::Shared;
 pub(crate) struct Process {
     pub(crate) frames: Frames,
     pub(crate) alarm: Alarm,
+    pub(crate) lamps: Lamps,
 }
 
 impl Process {
@@ -21,12 +22,13 @@ impl Process {
             rtic::pend(SERVICES);
         }
         let now = Clock::now();
-        let next = node.call(|protocol, out| {
+        let (next, lit) = node.call(|protocol, out| {
             if let Some(snapshot) = snapshot {
                 protocol.publish(&snapshot, now, out);
             }
-            protocol.poll_process(now, out)
+            (protocol.poll_process(now, out), protocol.lamps())
         });
         self.alarm.set(next);
+        self.lamps.set(lit);
     }
 }

@@ -20,8 +20,8 @@ impl Shaft {
     /// Looks which sensors there are.
     pub(crate) fn apply(&mut self, parameters: &Parameters) {
         let absolute = |channel: &node::EncoderChannel| channel.kind.is_some_and(|kind| kind.is_absolute());
-        let encoder = parameters.encoder.filter(|encoder| encoder.channels.iter().any(absolute));
-        self.length = encoder.map(|encoder| encoder.format.length());
+        let sensors = parameters.sensors().filter(|sensors| sensors.channels.iter().any(absolute));
+        self.length = sensors.map(|sensors| sensors.format.length());
     }
 
     /// What belongs to the millisecond of these sums. A word of SSI is that of the last millisecond, and the next one is

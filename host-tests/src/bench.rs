@@ -44,6 +44,8 @@ pub struct Bench {
     pub store: Flash,
     /// What is read of the encoder.
     pub encoder: RawEncoder,
+    /// Which buttons are pressed.
+    pub buttons: [bool; 2],
     /// What it is where nothing is stored.
     setup: Setup,
     demands: VecDeque<Demand>,
@@ -148,6 +150,7 @@ impl Bench {
             now: Instant(0),
             store: Store::prepare(view).expect("a store"),
             encoder: RawEncoder::default(),
+            buttons: [false; 2],
             setup: *unless_stored,
             demands: VecDeque::new(),
         };
@@ -160,7 +163,7 @@ impl Bench {
     #[must_use]
     pub fn power_cycled(self) -> Bench {
         let (flash, kept) = (self.store.into_flash().0, self.measurement.kept());
-        Bench::start(flash, &self.setup, Start::Kept(kept))
+        Bench::start(flash, &self.setup, kept.map_or(Start::First, Start::Kept))
     }
 
     /// The next thing that the node asks of its firmware, but for storing, which it has got.
@@ -215,7 +218,7 @@ impl Bench {
         if let Some(parameters) = self.protocol.take_parameters() {
             self.measurement.apply(&parameters);
         }
-        let snapshot = self.measurement.sample(raw, &self.encoder);
+        let snapshot = self.measurement.sample(raw, &self.encoder, self.buttons);
         self.protocol.publish(&snapshot, self.now, &mut self.out);
         self.poll();
     }
@@ -247,10 +250,18 @@ impl Bench {
     /// # Panics
     /// When the node refuses.
     pub fn disable_tpdo(&mut self, number: u16) {
+        self.switch_tpdo_off(number);
+        self.write(0x1A00 + number, 0, &[0]).expect("step 2");
+    }
+
+    /// Makes a TPDO invalid.
+    ///
+    /// # Panics
+    /// When the node refuses.
+    pub fn switch_tpdo_off(&mut self, number: u16) {
         let cob_id = self.read(0x1800 + number, 1).expect("a COB-ID");
         let [a, b, c, d] = cob_id.try_into().expect("four bytes");
         self.write(0x1800 + number, 1, &[a, b, c, d | 0x80]).expect("step 1");
-        self.write(0x1A00 + number, 0, &[0]).expect("step 2");
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod domain;
+pub mod lift417;
 pub mod lss;
 pub mod network;
 pub mod pressure;

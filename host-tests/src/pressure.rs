@@ -41,7 +41,7 @@ impl PressureNode {
         if let Some(parameters) = self.protocol.take_parameters() {
             self.measurement.apply(&parameters);
         }
-        let snapshot = self.measurement.sample(&self.raw, &RawEncoder::default());
+        let snapshot = self.measurement.sample(&self.raw, &RawEncoder::default(), [false; 2]);
         self.protocol.publish(&snapshot, now, out);
     }
 }

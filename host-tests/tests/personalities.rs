@@ -18,7 +18,7 @@ fn personality(bench: &mut Bench) -> u8 {
 
 #[test]
 fn every_personality_leads_to_every_other_at_the_next_reset() {
-    let types = [0x0002_0194, 0x0005_0196, 0xFFFF_0196];
+    let types = [0x0002_0194, 0x0005_0196, 0xFFFF_0196, 0x0000_01A1];
     for from in Personality::ALL {
         for to in Personality::ALL {
             let mut bench = Bench::booted_as(from);

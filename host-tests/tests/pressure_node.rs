@@ -51,7 +51,7 @@ fn a_node_that_is_started_the_moment_it_boots_sends_what_it_has_measured_before(
     let (mut protocol, mut measurement) = (Protocol::new(&setup), Measurement::new(Start::First));
     let (mut out, now) = (Queue::default(), Instant(0));
     measurement.apply(&protocol.prepare());
-    let snapshot = measurement.sample(&raw(250_000.0, 298.15), &RawEncoder::default());
+    let snapshot = measurement.sample(&raw(250_000.0, 298.15), &RawEncoder::default(), [false; 2]);
     protocol.publish(&snapshot, now, &mut out);
     protocol.start(now, &mut out);
     protocol.on_process_frame(&Frame::new(0, &[1, ID]).unwrap(), now, &mut out);

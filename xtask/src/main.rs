@@ -3,6 +3,7 @@
 mod bench;
 mod command;
 mod eds;
+mod fuzz;
 mod images;
 mod native;
 mod plots;
@@ -48,6 +49,8 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
+    /// Let libFuzzer look for inputs that break a rule (docs/evidence.md)
+    Fuzz(fuzz::Flags),
     /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
     Bench(bench::Options),
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
@@ -65,6 +68,7 @@ fn main() -> ExitCode {
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
         Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
+        Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };

@@ -4,7 +4,7 @@ use crate::profile::Profile;
 use crate::{BusEvent, Protocol, Snapshot};
 use canopen::emcy::Fault;
 use canopen::{Instant, Transmit};
-use profiles::{encoder, pressure};
+use profiles::{encoder, lift, pressure};
 
 /// Sub-indexes of 1029h.
 const COMMUNICATION_ERROR: u8 = 1;
@@ -20,10 +20,20 @@ pub(crate) struct Conditions {
 impl Conditions {
     /// What is not measured has no fault.
     pub(crate) fn of(snapshot: &Snapshot) -> Conditions {
+        if let Some(lift) = &snapshot.lift {
+            return Conditions::of_lift(lift);
+        }
         Conditions {
             pressure: snapshot.pressure.map(|values| values.conditions).unwrap_or_default(),
             encoder: snapshot.encoder.map(|values| values.conditions).unwrap_or_default(),
         }
+    }
+
+    /// The load measuring unit is on the pressure input, the position units are on those of the encoder.
+    fn of_lift(snapshot: &lift::Snapshot) -> Conditions {
+        let sensor_break = snapshot.load.is_broken;
+        let pressure = pressure::Conditions { sensor_break, ..pressure::Conditions::default() };
+        Conditions { pressure, encoder: snapshot.position.conditions }
     }
 
     fn faults(self) -> [(Fault, bool); 7] {

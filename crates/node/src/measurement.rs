@@ -1,6 +1,8 @@
 //! The sampling half: one raw sample in, one snapshot out, a thousand times a second.
 
 use profiles::encoder::{self, Encoder, Kept, RawEncoder, Start};
+use profiles::lift::panel::BUTTONS;
+use profiles::lift::{self, Lift, RawLift};
 use profiles::pressure::{self, RawSample, Transmitter};
 
 /// All parameters of the measurement, as one consistent set; `None` for what the personality does not measure.
@@ -10,6 +12,16 @@ pub struct Parameters {
     pub pressure: Option<pressure::Parameters>,
     /// Of the encoder.
     pub encoder: Option<encoder::Parameters>,
+    /// Of the lift's units, which share the inputs of both.
+    pub lift: Option<lift::Parameters>,
+}
+
+impl Parameters {
+    /// What the sensors of positions are, where there are any.
+    #[must_use]
+    pub fn sensors(&self) -> Option<&encoder::Parameters> {
+        self.encoder.as_ref().or(self.lift.as_ref().map(|lift| &lift.position.sensors))
+    }
 }
 
 /// All measured values of one millisecond, as one consistent set; `None` for what is not measured.
@@ -19,11 +31,13 @@ pub struct Snapshot {
     pub pressure: Option<pressure::Snapshot>,
     /// Of the encoder.
     pub encoder: Option<encoder::Snapshot>,
+    /// Of the lift's units.
+    pub lift: Option<lift::Snapshot>,
 }
 
 impl Snapshot {
     pub(crate) fn is_empty(&self) -> bool {
-        self.pressure.is_none() && self.encoder.is_none()
+        self.pressure.is_none() && self.encoder.is_none() && self.lift.is_none()
     }
 }
 
@@ -32,45 +46,61 @@ impl Snapshot {
 pub struct Measurement {
     pressure: Transmitter,
     encoder: Encoder,
+    lift: Lift,
     has_pressure: bool,
     has_encoder: bool,
+    has_lift: bool,
 }
 
 impl Measurement {
-    /// A measurement after power-on, with what was kept of the encoder.
+    /// A measurement after power-on, with what was kept of the position sensors.
     #[must_use]
     pub fn new(start: Start) -> Measurement {
         Measurement {
             pressure: Transmitter::default(),
             encoder: Encoder::new(start),
+            lift: Lift::new(start),
             has_pressure: false,
             has_encoder: false,
+            has_lift: false,
         }
     }
 
     /// Takes over new parameters, from the next sample on.
     pub fn apply(&mut self, parameters: &Parameters) {
-        let Parameters { pressure, encoder } = parameters;
-        (self.has_pressure, self.has_encoder) = (pressure.is_some(), encoder.is_some());
+        let Parameters { pressure, encoder, lift } = parameters;
+        (self.has_pressure, self.has_encoder, self.has_lift) =
+            (pressure.is_some(), encoder.is_some(), lift.is_some());
         if let Some(pressure) = pressure {
             self.pressure.apply(pressure);
         }
         if let Some(encoder) = encoder {
             self.encoder.apply(encoder);
         }
-    }
-
-    /// Processes the sums of one millisecond, and what was read of the encoder at its end.
-    pub fn sample(&mut self, raw: &RawSample, encoder: &RawEncoder) -> Snapshot {
-        Snapshot {
-            pressure: self.has_pressure.then(|| self.pressure.sample(raw)),
-            encoder: self.has_encoder.then(|| self.encoder.sample(encoder)),
+        if let Some(lift) = lift {
+            self.lift.apply(lift);
         }
     }
 
-    /// What is to outlive a loss of power.
+    /// Processes the sums of one millisecond, what was read of the position sensors at its end, and which buttons are
+    /// pressed, debounced.
+    pub fn sample(&mut self, raw: &RawSample, encoder: &RawEncoder, buttons: [bool; BUTTONS]) -> Snapshot {
+        Snapshot {
+            pressure: self.has_pressure.then(|| self.pressure.sample(raw)),
+            encoder: self.has_encoder.then(|| self.encoder.sample(encoder)),
+            lift: self
+                .has_lift
+                .then(|| self.lift.sample(&RawLift { encoder: *encoder, pressure: *raw, buttons })),
+        }
+    }
+
+    /// What is to outlive a loss of power; `None` where no position is measured.
     #[must_use]
-    pub fn kept(&self) -> Kept {
-        self.encoder.kept()
+    pub fn kept(&self) -> Option<Kept> {
+        match (self.has_encoder, self.has_lift) {
+            (true, _) => Some(self.encoder.kept()),
+            (_, true) => Some(self.lift.kept()),
+            _ => None,
+        }
     }
 }

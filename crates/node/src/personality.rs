@@ -1,6 +1,6 @@
 //! Which device the node is.
 
-use crate::{combined, encoder, flags, pressure};
+use crate::{combined, encoder, flags, lift, pressure};
 use canopen::dictionary::Dictionary;
 
 /// Which device the node is: its dictionary, its default parameters and its profile.
@@ -13,6 +13,8 @@ pub enum Personality {
     Encoder,
     /// Both, as a module of two devices (CiA 301, 7.5.2.1).
     Combined,
+    /// Car position, load measuring and panel units of a lift, CiA 417.
+    Lift,
 }
 
 /// What a personality is made of.
@@ -22,11 +24,20 @@ pub(crate) struct Definition {
     pub(crate) flags: Option<&'static flags::Fields>,
     pub(crate) pressure: Option<&'static pressure::Fields>,
     pub(crate) encoder: Option<&'static encoder::Fields>,
+    pub(crate) lift: Option<&'static lift::Fields>,
+}
+
+impl Definition {
+    /// Whether the dictionary has the calibration of the pressure channel.
+    pub(crate) const fn is_calibrated(&self) -> bool {
+        self.pressure.is_some() || self.lift.is_some()
+    }
 }
 
 impl Personality {
     /// All of them, in the order of their numbers.
-    pub const ALL: [Personality; 3] = [Personality::Pressure, Personality::Encoder, Personality::Combined];
+    pub const ALL: [Personality; 4] =
+        [Personality::Pressure, Personality::Encoder, Personality::Combined, Personality::Lift];
 
     /// The personality of a number in the device record; `None` for one that this image does not have.
     #[must_use]
@@ -35,6 +46,7 @@ impl Personality {
             0 => Some(Personality::Pressure),
             1 => Some(Personality::Encoder),
             2 => Some(Personality::Combined),
+            3 => Some(Personality::Lift),
             _ => None,
         }
     }
@@ -46,6 +58,7 @@ impl Personality {
             Personality::Pressure => 0,
             Personality::Encoder => 1,
             Personality::Combined => 2,
+            Personality::Lift => 3,
         }
     }
 
@@ -56,6 +69,7 @@ impl Personality {
             Personality::Pressure => 1,
             Personality::Encoder => 2,
             Personality::Combined => 3,
+            Personality::Lift => 4,
         }
     }
 
@@ -64,6 +78,7 @@ impl Personality {
             Personality::Pressure => &pressure::DEFINITION,
             Personality::Encoder => &encoder::DEFINITION,
             Personality::Combined => &combined::DEFINITION,
+            Personality::Lift => &lift::DEFINITION,
         }
     }
 }

@@ -6,18 +6,19 @@ use crate::manufacturer::PERSONALITY;
 use crate::personality::Definition;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
-use crate::{REVISION, Setup, Snapshot, VENDOR_ID, combined, encoder, pressure};
+use crate::{REVISION, Setup, Snapshot, VENDOR_ID, combined, encoder, lift, pressure};
 use canopen::dictionary::{Entry, Group, Object, packed_size};
 use canopen::emcy::Fault;
 use canopen::sdo::Abort;
 use canopen::{Application, Part};
+use profiles::lift::panel::{LAMPS, Lamp};
 
 /// The tables of all personalities.
-const TABLES: [&[Object]; 3] = [&pressure::OBJECTS, &encoder::OBJECTS, &combined::OBJECTS];
+const TABLES: [&[Object]; 4] = [&pressure::OBJECTS, &encoder::OBJECTS, &combined::OBJECTS, &lift::OBJECTS];
 
 /// Large enough for the values of every personality.
 pub(crate) const IMAGE_SIZE: usize =
-    largest([pressure::IMAGE_SIZE, encoder::IMAGE_SIZE, combined::IMAGE_SIZE]);
+    largest([pressure::IMAGE_SIZE, encoder::IMAGE_SIZE, combined::IMAGE_SIZE, lift::IMAGE_SIZE]);
 
 /// The same for the parameters as they are stored.
 pub(crate) const COMMUNICATION_SIZE: usize = largest_packed(Group::Communication);
@@ -27,8 +28,8 @@ const _: () = assert!(COMMUNICATION_SIZE <= storage::MAX_VALUE && APPLICATION_SI
 const _: () = assert!(CALIBRATION_SIZE <= storage::MAX_VALUE);
 
 const fn largest_packed(group: Group) -> usize {
-    let [a, b, c] = TABLES;
-    largest([packed_size(a, group), packed_size(b, group), packed_size(c, group)])
+    let [a, b, c, d] = TABLES;
+    largest([packed_size(a, group), packed_size(b, group), packed_size(c, group), packed_size(d, group)])
 }
 
 const fn largest(sizes: [usize; TABLES.len()]) -> usize {
@@ -50,6 +51,7 @@ pub(crate) struct Profile {
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
     pub(crate) buffer: TransferBuffer,
+    lamps: [Lamp; LAMPS],
 }
 
 impl Profile {
@@ -61,6 +63,7 @@ impl Profile {
             flags: Flags::default(),
             stored: Stored::NOTHING,
             buffer: TransferBuffer::EMPTY,
+            lamps: [Lamp::default(); LAMPS],
         }
     }
 
@@ -77,6 +80,21 @@ impl Profile {
         if let (Some(fields), Some(snapshot)) = (definition.encoder, &snapshot.encoder) {
             fields.publish(snapshot, image);
         }
+        if let (Some(fields), Some(snapshot)) = (definition.lift, &snapshot.lift) {
+            fields.publish(snapshot, image);
+        }
+    }
+
+    /// Lets the lamps follow the virtual output, where there are any.
+    pub(crate) fn follow_output(&mut self, image: &mut [u8]) {
+        if let Some(fields) = self.definition().lift {
+            fields.follow_output(&mut self.lamps, image);
+        }
+    }
+
+    /// Which lamps are lit.
+    pub(crate) fn lit(&self, image: &[u8]) -> [bool; LAMPS] {
+        self.definition().lift.map_or([false; LAMPS], |fields| fields.lit(image))
     }
 
     /// Shows the flags, where the personality has them.
@@ -113,17 +131,18 @@ impl Application for Profile {
         if let Some(fields) = self.definition().encoder {
             fields.initialise(setup.serial_number, image);
         }
+        if let Some(fields) = self.definition().lift {
+            fields.initialise(image);
+        }
         self.show_personality(image);
         self.show_flags(image);
         self.show_values(image);
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {
-        match self.definition().pressure {
-            // It is that of the pressure channel: what does not have one lets it be.
-            None if group == Group::Calibration => self.stored.get(Group::Volatile),
-            _ => self.stored.get(group),
-        }
+        // It is that of the pressure channel: what does not have one lets it be.
+        let has_it = group != Group::Calibration || self.definition().is_calibrated();
+        self.stored.get(if has_it { group } else { Group::Volatile })
     }
 
     fn loaded(&mut self, group: Group, good: bool) {
@@ -146,6 +165,7 @@ impl Application for Profile {
 
     fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         match self.definition() {
+            Definition { lift: Some(fields), .. } => fields.write(number, entry, bytes, image),
             Definition { encoder: Some(fields), .. } if number >= encoder::FIRST_RULE => {
                 fields.write(number, entry, bytes, image)
             }

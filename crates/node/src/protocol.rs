@@ -5,6 +5,7 @@ use crate::profile::{IMAGE_SIZE, Profile};
 use crate::{Parameters, Request, Setup, Snapshot};
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
+use profiles::lift::panel::LAMPS;
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
 ///
@@ -51,11 +52,13 @@ impl Protocol {
     /// A frame of FIFO 0: NMT, SYNC, RPDO, or a remote request for a TPDO.
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         self.device.on_process_frame(frame, now, out);
+        self.device.update(Profile::follow_output);
     }
 
     /// A frame of FIFO 1: everything else.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         self.device.on_service_frame(frame, now, out);
+        self.device.update(Profile::follow_output);
     }
 
     /// Takes the values of the last millisecond into the dictionary and sends what their change triggers. Before the
@@ -115,7 +118,14 @@ impl Protocol {
         Parameters {
             pressure: definition.pressure.map(|fields| fields.parameters(image)),
             encoder: definition.encoder.map(|fields| fields.parameters(image)),
+            lift: definition.lift.map(|fields| fields.parameters(image)),
         }
+    }
+
+    /// Which lamps of the panel are lit. To be asked after each frame.
+    #[must_use]
+    pub fn lamps(&self) -> [bool; LAMPS] {
+        self.device.application().lit(self.device.image())
     }
 
     /// Identifiers for FIFO 0, data and remote frames.

@@ -88,7 +88,8 @@
 //! A transaction whose CRC fails is left out as a whole, and the search for the next goes on word by word. The state of
 //! every group it may have held is then the one before, and [`Health`] says so. A save that was cut is no damage: its
 //! words end in order, before the closing mark. Cells of the newest transactions that return to the erased value
-//! altogether look just like it; this is the one loss that goes unreported.
+//! altogether look just like it; this is the one loss that goes unreported. The other way round, an erase that was cut
+//! where nothing was ever saved cannot be told from damage: it is reported though nothing is lost.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]

@@ -15,11 +15,14 @@ pub enum Personality {
     Encoder,
     /// Both, as a module of two devices.
     Combined,
+    /// Units of a lift (CiA 417).
+    Lift,
 }
 
 impl Personality {
     /// Every personality that the firmware has.
-    const ALL: [Personality; 3] = [Personality::Pressure, Personality::Encoder, Personality::Combined];
+    const ALL: [Personality; 4] =
+        [Personality::Pressure, Personality::Encoder, Personality::Combined, Personality::Lift];
 
     /// The number in the device record.
     pub fn number(self) -> u8 {
@@ -27,6 +30,7 @@ impl Personality {
             Personality::Pressure => 0,
             Personality::Encoder => 1,
             Personality::Combined => 2,
+            Personality::Lift => 3,
         }
     }
 }
@@ -37,6 +41,7 @@ impl fmt::Display for Personality {
             Personality::Pressure => "pressure",
             Personality::Encoder => "encoder",
             Personality::Combined => "combined",
+            Personality::Lift => "lift",
         })
     }
 }
@@ -62,6 +67,8 @@ mod tests {
         for personality in Personality::ALL {
             assert_eq!(personality.to_string().parse(), Ok(personality));
         }
-        assert!("valve".parse::<Personality>().unwrap_err().contains("it has: pressure, encoder, combined"));
+        assert!(
+            "valve".parse::<Personality>().unwrap_err().contains("it has: pressure, encoder, combined, lift")
+        );
     }
 }

@@ -112,19 +112,22 @@ extern "C" fn measure(
     measurement: &mut Measurement,
     raw: &RawSample,
     encoder: &RawEncoder,
+    buttons: &[bool; 2],
+    lit: &mut [bool; 2],
     now: u64,
 ) {
     if let Some(parameters) = protocol.take_parameters() {
         measurement.apply(&parameters);
     }
-    let snapshot: Snapshot = measurement.sample(raw, encoder);
+    let snapshot: Snapshot = measurement.sample(raw, encoder, *buttons);
     protocol.publish(&snapshot, Instant(now), &mut Queue);
+    *lit = protocol.lamps();
 }
 
 /// What the encoder keeps, out and in again.
 #[unsafe(no_mangle)]
 extern "C" fn power_cycle(measurement: &mut Measurement) {
-    *measurement = Measurement::new(Start::Kept(measurement.kept()));
+    *measurement = Measurement::new(measurement.kept().map_or(Start::First, Start::Kept));
 }
 
 /// Storing.

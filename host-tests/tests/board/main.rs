@@ -1,6 +1,7 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
 
 mod configuring;
+mod differential;
 mod encoder;
 mod faults;
 mod measuring;

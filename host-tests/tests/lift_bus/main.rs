@@ -168,7 +168,7 @@ fn the_lamp_can_be_lit_by_a_multiplexed_pdo(lift: &mut SmallLift) {
     assert!(!lift.is_lit());
     let lamp = Mpdo {
         address: Address::Destination(None),
-        at: Multiplexer { index: 0x2322, sub: 0 },
+        at: Multiplexer { index: 0x2322, sub: 1 },
         data: [1, 0, 0, 0],
     };
     lift.network.transmit(&Frame::new(0x500 + u16::from(CONTROLLER), &lamp.encode()).unwrap());

@@ -55,17 +55,6 @@ macro_rules! dictionary {
     };
 }
 
-// The devices of the nodes: what node::lift has, and the communication profile.
-static NODE_PARTS: &[&[Object]] = &[COMMUNICATION, node::lift::PDOS, &node::lift::OBJECTS];
-static NODE_TABLE: [Object; dictionary::count(NODE_PARTS)] = dictionary::gather(NODE_PARTS);
-static NODE_ENTRIES: [Entry; NODE_TABLE.len()] = dictionary::compile(&NODE_TABLE);
-static NODE_DEFAULTS: [u8; NODE_SIZE] = dictionary::default_image(&NODE_TABLE);
-pub(crate) const NODE_SIZE: usize = dictionary::image_size(&NODE_TABLE);
-pub(crate) static NODE: Dictionary = {
-    dictionary::check(&NODE_TABLE);
-    Dictionary::new(&NODE_ENTRIES, &NODE_DEFAULTS)
-};
-
 dictionary!(
     CALL_CONTROLLER,
     &[

@@ -1,9 +1,7 @@
 //! What is there besides the bus: the shaft with the car, its doors, who is in it and who presses a button.
 
 use canopen::Instant;
-use node::RawSample;
-use profiles::encoder::RawEncoder;
-use profiles::lift::RawLift;
+use node::{RawEncoder, RawSample};
 
 use host_tests::bench;
 
@@ -28,19 +26,16 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// What the sensors of a node read: a tape in the shaft, the pressure in the cylinder, the button.
+    /// What the position sensor reads of a tape in the shaft.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub(crate) fn read(&self) -> RawLift {
+    pub(crate) fn tape(&self) -> RawEncoder {
         let counter = (self.car / TAPE).floor() as i64 as u16;
-        RawLift {
-            encoder: RawEncoder { counter, ..RawEncoder::default() },
-            pressure: self.pressure(),
-            button: self.is_pressed,
-        }
+        RawEncoder { counter, ..RawEncoder::default() }
     }
 
+    /// What the input for the pressure in the cylinder reads.
     /// 2 bar carry the empty car, 1 bar more 200 kg.
-    fn pressure(&self) -> RawSample {
+    pub(crate) fn pressure(&self) -> RawSample {
         bench::raw(2.0e5 + self.load * 500.0, 298.15)
     }
 }

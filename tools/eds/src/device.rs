@@ -1,7 +1,7 @@
 //! The devices that the project builds, one for each personality.
 
 use canopen::dictionary::Object as Row;
-use node::{Personality, combined, encoder, pressure};
+use node::{Personality, combined, encoder, lift, pressure};
 
 /// A device: what its data sheet is made from.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub struct Device {
 }
 
 /// All of them.
-pub static DEVICES: [Device; 3] = [
+pub static DEVICES: [Device; 4] = [
     Device {
         file_name: "pressure.eds",
         description: "Pressure and temperature transmitter, CiA 404",
@@ -35,5 +35,11 @@ pub static DEVICES: [Device; 3] = [
         description: "Encoder and transmitter in one, CiA 406 and CiA 404",
         personality: Personality::Combined,
         rows: &combined::OBJECTS,
+    },
+    Device {
+        file_name: "lift.eds",
+        description: "Car position, load measuring and panel units of a lift, CiA 417",
+        personality: Personality::Lift,
+        rows: &lift::OBJECTS,
     },
 ];

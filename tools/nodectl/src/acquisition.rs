@@ -90,7 +90,7 @@ impl<'n> Acquisition<'n> {
         objects: &[Multiplexer],
     ) -> Result<Acquisition<'n>, Interruption> {
         let mut client = Client::new(network, setup.node, setup.options);
-        let tpdos = tpdo::read(&mut client)?;
+        let tpdos = tpdo::read(&mut client, catalogue)?;
         let mapped = tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|mapped| at(mapped.index, mapped.sub));
         let objects = if objects.is_empty() { mapped.collect() } else { objects.to_vec() };
         let mut signals = Vec::new();

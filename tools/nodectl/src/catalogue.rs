@@ -34,6 +34,12 @@ impl Catalogue {
         DEVICES.iter().map(eds::Device::eds).find(is_it).map(Catalogue::new)
     }
 
+    /// The data sheet of a device of this project, by its file name.
+    #[must_use]
+    pub fn of_file(name: &str) -> Option<Catalogue> {
+        DEVICES.iter().find(|device| device.file_name == name).map(|device| Catalogue::new(device.eds()))
+    }
+
     /// The object that a person means, by address or by name. An address that no data sheet has is one all the same.
     ///
     /// # Errors

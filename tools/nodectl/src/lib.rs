@@ -20,6 +20,7 @@ pub mod bus;
 mod catalogue;
 pub mod cli;
 pub mod heartbeat;
+pub mod lift;
 pub mod lss;
 mod network;
 pub mod nmt;

@@ -4,10 +4,11 @@ use canopen::CobId;
 use canopen::pdo::MappedObject;
 use canopen::sdo::Multiplexer;
 
+use crate::Catalogue;
 use crate::object::at;
 use crate::sdo::{Client, Error};
 
-/// So many TPDOs in a row that do not exist, and there are no more. Devices may leave gaps.
+/// So many TPDOs in a row that do not exist, and there are no more but those of the data sheet. Devices may leave gaps.
 const GAP: u16 = 4;
 /// As many as there can be (CiA 301, 7.5.2.37).
 const TPDOS: u16 = 512;
@@ -54,18 +55,18 @@ fn bits(data: &[u8], from: usize, length: usize) -> Option<Vec<u8>> {
 ///
 /// # Errors
 /// Those of SDO.
-pub fn read(client: &mut Client) -> Result<Vec<Tpdo>, Error> {
+pub fn read(client: &mut Client, catalogue: &Catalogue) -> Result<Vec<Tpdo>, Error> {
     let (mut found, mut missing) = (Vec::new(), 0);
     for number in 0..TPDOS {
+        if missing >= GAP && catalogue.entry(at(0x1800 + number, 1)).is_none() {
+            continue;
+        }
         match word(client, at(0x1800 + number, 1))? {
             None => missing += 1,
             Some(cob_id) => {
                 missing = 0;
                 found.extend(read_one(client, number, cob_id)?);
             }
-        }
-        if missing == GAP {
-            break;
         }
     }
     Ok(found)

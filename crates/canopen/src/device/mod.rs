@@ -157,6 +157,11 @@ impl<A: Application, const N: usize> Device<A, N> {
         show(&self.core.application, &mut self.core.image);
     }
 
+    /// As [`show`](Device::show), where that changes the state of the application too.
+    pub fn update(&mut self, update: impl FnOnce(&mut A, &mut [u8])) {
+        update(&mut self.core.application, &mut self.core.image);
+    }
+
     /// The application.
     #[must_use]
     pub fn application(&self) -> &A {

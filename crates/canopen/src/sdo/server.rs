@@ -62,6 +62,7 @@ impl Server {
     /// Forgets the transfer under way, without a word to the client: the NMT state no longer allows any.
     pub(crate) fn reset(&mut self) {
         self.transfer = Transfer::Idle;
+        self.multiplexer = Multiplexer { index: 0, sub: 0 };
         self.previous = ([0; 8], None);
         (self.expiry, self.pause) = (Instant::NEVER, Instant::NEVER);
     }

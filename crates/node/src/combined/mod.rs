@@ -35,6 +35,7 @@ const PARTS: &[&[Object]] = &[
     communication::ERRORS_AND_SYNC,
     &[communication::device_name("STM32F4 encoder and transmitter")],
     communication::SERVICES,
+    &communication::error_behaviour(0),
     &communication::RPDOS,
     communication::tpdos(&pdos::TPDOS).as_flattened(),
     communication::tpdo_mappings(&pdos::TPDOS).as_flattened(),
@@ -67,4 +68,5 @@ pub(crate) static DEFINITION: Definition = Definition {
     flags: Some(&FLAGS),
     pressure: Some(&PRESSURE),
     encoder: Some(&ENCODER),
+    lift: None,
 };

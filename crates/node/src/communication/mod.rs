@@ -6,7 +6,7 @@ mod pdos;
 mod start_up;
 
 pub(crate) use objects::{
-    ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, STATUS_REGISTER, device_name, device_type,
+    ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, STATUS_REGISTER, device_name, device_type, error_behaviour,
 };
 pub(crate) use pdos::{
     RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, sync_start, tpdo_mappings, tpdos,

@@ -67,7 +67,7 @@ pub(crate) const fn device_name(name: &'static str) -> Object {
     text(0x1008, "Manufacturer device name", 32).default(DefaultValue::Text(name))
 }
 
-/// 1009h to 1029h.
+/// 1009h to 1019h.
 pub(crate) const SERVICES: &[Object] = &[
     text(0x1009, "Manufacturer hardware version", 32),
     text(0x100A, "Manufacturer software version", 50),
@@ -100,8 +100,14 @@ pub(crate) const SERVICES: &[Object] = &[
     parameter(0x1019, 0, "Synchronous counter overflow value", Type::Unsigned8)
         .limits(0, 240)
         .rule(Rule::SyncOverflow),
-    Object::highest(0x1029, 2, "Error behaviour"),
-    // 255 is refused, 3 to 254 are kept and change nothing.
-    parameter(0x1029, 1, "Communication error", Type::Unsigned8).limits(0, 254),
-    parameter(0x1029, 2, "Device error", Type::Unsigned8).limits(0, 2),
 ];
+
+/// 1029h, with what a fault of the device does by default: 0 pre-operational, 1 nothing.
+pub(crate) const fn error_behaviour(device_error: i64) -> [Object; 3] {
+    [
+        Object::highest(0x1029, 2, "Error behaviour"),
+        // 255 is refused, 3 to 254 are kept and change nothing.
+        parameter(0x1029, 1, "Communication error", Type::Unsigned8).limits(0, 254),
+        parameter(0x1029, 2, "Device error", Type::Unsigned8).limits(0, 2).value(device_error),
+    ]
+}

@@ -34,6 +34,7 @@ const PARTS: &[&[Object]] = &[
     communication::ERRORS_AND_SYNC,
     &[communication::device_name("STM32F4 encoder")],
     communication::SERVICES,
+    &communication::error_behaviour(0),
     &communication::RPDOS,
     communication::tpdos(&pdos::TPDOS).as_flattened(),
     communication::tpdo_mappings(&pdos::TPDOS).as_flattened(),
@@ -54,7 +55,7 @@ static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
 static FIELDS: Fields = Fields::new(&DICTIONARY, 0x1000);
 
 pub(crate) static DEFINITION: Definition =
-    Definition { dictionary: &DICTIONARY, flags: None, pressure: None, encoder: Some(&FIELDS) };
+    Definition { dictionary: &DICTIONARY, flags: None, pressure: None, encoder: Some(&FIELDS), lift: None };
 
 #[cfg(test)]
 mod tests;

@@ -28,6 +28,10 @@ const fn state(sub: u8, name: &'static str) -> Object {
         .mappable(Mapping::Tpdo)
 }
 
+const fn lamp(sub: u8, name: &'static str) -> Object {
+    Object::new(0x2322, sub, name, Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo)
+}
+
 pub(super) const OBJECTS: &[Object] = &[
     parameter(0x2300, 0, "Way of the car per revolution", Type::Unsigned32)
         .limits(1, 0xFFFF_FFFF)
@@ -65,14 +69,20 @@ pub(super) const OBJECTS: &[Object] = &[
     Object::new(0x2313, 1, "Load as measured", Type::Real32, Access::ReadOnly).unit("kg"),
     // 1: the sensor or its wiring is broken.
     Object::new(0x2313, 2, "Load sensor state", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo),
-    // Two equal words: there is no input panel unit.
-    Object::highest(0x2320, 2, "Button"),
-    parameter(0x2320, 1, "Virtual input while released", Type::Unsigned48),
-    parameter(0x2320, 2, "Virtual input while pressed", Type::Unsigned48),
-    // Two equal words: there is no output panel unit.
-    Object::highest(0x2321, 2, "Lamp words"),
-    parameter(0x2321, 1, "Virtual output that puts the lamp out", Type::Unsigned48),
-    parameter(0x2321, 2, "Virtual output that lights the lamp", Type::Unsigned48),
+    // Two equal words: the button is not used, and without one there is no input panel unit.
+    Object::highest(0x2320, 4, "Button words"),
+    parameter(0x2320, 1, "Virtual input of button 1 released", Type::Unsigned48),
+    parameter(0x2320, 2, "Virtual input of button 1 pressed", Type::Unsigned48),
+    parameter(0x2320, 3, "Virtual input of button 2 released", Type::Unsigned48),
+    parameter(0x2320, 4, "Virtual input of button 2 pressed", Type::Unsigned48),
+    // Two equal words: the lamp is not used, and without one there is no output panel unit.
+    Object::highest(0x2321, 4, "Lamp words"),
+    parameter(0x2321, 1, "Virtual output that puts lamp 1 out", Type::Unsigned48),
+    parameter(0x2321, 2, "Virtual output that lights lamp 1", Type::Unsigned48),
+    parameter(0x2321, 3, "Virtual output that puts lamp 2 out", Type::Unsigned48),
+    parameter(0x2321, 4, "Virtual output that lights lamp 2", Type::Unsigned48),
     // Not 0: lit. A multiplexed PDO may write it, and an SDO client.
-    Object::new(0x2322, 0, "Lamp", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo),
+    Object::highest(0x2322, 2, "Lamps"),
+    lamp(1, "Lamp 1"),
+    lamp(2, "Lamp 2"),
 ];

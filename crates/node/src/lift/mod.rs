@@ -1,7 +1,7 @@
-//! The lift: its part of a dictionary, and how measured values and parameters come in and out of it.
+//! The lift: its dictionary, and how measured values and parameters come in and out of it.
 //!
 //! The pre-defined PDOs (CiA 417-3-1), the objects of the application profile (6000h to 64FFh), and those of the
-//! manufacturer that they need (21xxh to 23xxh). What else a node has, 1000h to 1FFFh, is common to all personalities.
+//! manufacturer that they need (21xxh to 23xxh).
 
 mod manufacturer;
 pub mod pdos;
@@ -10,35 +10,49 @@ mod rules;
 mod sensors;
 mod values;
 
-pub use values::Fields;
+pub(crate) use values::Fields;
 
+use crate::manufacturer::{TRANSFER_BUFFER, personality};
+use crate::personality::Definition;
 use crate::pressure::CALIBRATION;
+use crate::{Personality, communication};
 use canopen::dictionary::{self, Dictionary, Entry, Object};
 
-/// The PDO objects, sorted: 1400h to 1BFFh.
-pub static PDOS: &[Object] = &pdos::ROWS;
-
-/// All other objects, sorted: 2100h to 64FFh.
+/// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 
-static PARTS: &[&[Object]] = &[&sensors::OBJECTS, CALIBRATION, manufacturer::OBJECTS, &PROFILE];
 static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
 
-/// Both, as the smallest dictionary that a lift device can run.
-static TABLE: [Object; dictionary::count(&[&pdos::ROWS, &OBJECTS])] =
-    dictionary::gather(&[&pdos::ROWS, &OBJECTS]);
-static ENTRIES: [Entry; TABLE.len()] = dictionary::compile(&TABLE);
-static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&TABLE);
-const _: () = dictionary::check(&TABLE);
+/// Other devices of the lift do what its PDOs say: a fault is in them, so it must not end them.
+const NO_CHANGE: i64 = 1;
+
+const PARTS: &[&[Object]] = &[
+    &[communication::device_type(values::PROFILE as i64), communication::ERROR_REGISTER],
+    communication::ERRORS_AND_SYNC,
+    &[communication::device_name("STM32F4 lift unit")],
+    communication::SERVICES,
+    &communication::error_behaviour(NO_CHANGE),
+    &pdos::ROWS,
+    communication::START_UP,
+    &[personality(Personality::Lift)],
+    &sensors::OBJECTS,
+    CALIBRATION,
+    manufacturer::OBJECTS,
+    &[TRANSFER_BUFFER],
+    &PROFILE,
+];
+static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
+static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
+const _: () = dictionary::check(&OBJECTS);
 
 /// Bytes of the image of all values.
-pub const IMAGE_SIZE: usize = dictionary::image_size(&TABLE);
+pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-/// The dictionary with nothing but the lift in it.
-pub static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static FIELDS: Fields = Fields::new(&DICTIONARY);
 
-/// Where the values of [`DICTIONARY`] are. Another dictionary that has the lift's objects has its own.
-pub static FIELDS: Fields = Fields::new(&DICTIONARY);
+pub(crate) static DEFINITION: Definition =
+    Definition { dictionary: &DICTIONARY, flags: None, pressure: None, encoder: None, lift: Some(&FIELDS) };
 
 #[cfg(test)]
 mod tests;

@@ -147,7 +147,7 @@ macro_rules! mapped {
 
 /// Those of this node. As consumer: virtual outputs, and the multiplexed PDOs of the nodes 1 to 7; as producer: its own
 /// multiplexed PDO, virtual inputs, the load, the positions. Units 2 to 4 are off until they have a sensor.
-static PARTS: &[&[Object]] = &[
+const PARTS: &[&[Object]] = &[
     &rpdo(2, 1, communication!("RPDO", 2)),
     &rpdo(2, 2, communication!("RPDO", 3)),
     &rpdo(2, 3, communication!("RPDO", 4)),

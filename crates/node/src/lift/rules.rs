@@ -22,11 +22,8 @@ pub(super) const SOURCE: u8 = 0x45;
 pub(super) const SENSOR: u8 = 0x46;
 
 impl Fields {
-    /// Decides on a write to an object with one of the rules above.
-    ///
-    /// # Errors
-    /// The reason to refuse it.
-    pub fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    /// Decides on a write to an object with one of the rules above, or with one of the calibration.
+    pub(crate) fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let unit = usize::from(entry.sub()).wrapping_sub(1);
         let value = word(bytes);
         match rule {

@@ -37,7 +37,7 @@ fn pressure(permille: u32) -> RawSample {
 
 impl Node {
     fn new() -> Node {
-        let raw = RawLift { encoder: RawEncoder::default(), pressure: pressure(0), button: false };
+        let raw = RawLift { encoder: RawEncoder::default(), pressure: pressure(0), buttons: [false; 2] };
         let mut node = Node { image: DEFAULTS, lift: Lift::default(), raw };
         node.write(0x2310, 1, 0).unwrap();
         node.sample();
@@ -69,7 +69,7 @@ impl Node {
     }
 
     fn write_bytes(&mut self, entry: &Entry, bytes: &[u8]) -> Result<(), Abort> {
-        let row = TABLE.iter().find(|row| (row.index, row.sub) == (entry.index(), entry.sub())).unwrap();
+        let row = OBJECTS.iter().find(|row| (row.index, row.sub) == (entry.index(), entry.sub())).unwrap();
         if let Rule::Application(rule) = row.rule {
             FIELDS.write(rule, entry, bytes, &mut self.image)?;
         }
@@ -96,12 +96,15 @@ fn the_defaults_of_the_table_are_those_of_the_measurement() {
 
 #[test]
 fn every_parameter_is_saved_and_nothing_else() {
-    let own = OBJECTS.iter().filter(|row| !CALIBRATION.iter().any(|other| other.index == row.index));
+    let common = [personality(Personality::Lift), TRANSFER_BUFFER];
+    let others = || CALIBRATION.iter().chain(&common);
+    let application = OBJECTS.iter().filter(|row| row.index >= 0x2000);
+    let own = application.filter(|row| !others().any(|other| other.index == row.index));
     let others: Vec<u16> = own
         .filter(|row| (row.access == Access::ReadWrite) != (row.group == Group::Application))
         .map(|row| row.index)
         .collect();
-    assert_eq!(others, [0x2322, 0x6011], "outputs");
+    assert_eq!(others, [0x2322, 0x2322, 0x6011], "outputs");
 }
 
 /// But for the words of the panel and the lift number, which do not concern the measurement, and what a preset and a
@@ -266,25 +269,55 @@ fn the_transducer_is_calibrated_as_that_of_the_pressure_transmitter() {
 #[test]
 fn a_button_is_a_word_and_a_word_is_a_lamp() {
     let mut node = Node::new();
-    for (index, sub, word) in
-        [(0x2320, 1, 0x11), (0x2320, 2, 0x9988_7766_5544), (0x2321, 1, 0x22), (0x2321, 2, 0x33)]
-    {
-        node.write(index, sub, word).unwrap();
+    let words = [(1, 0x11), (2, 0x9988_7766_5544), (3, 0x12), (4, 0x13)];
+    for (sub, word) in words {
+        node.write(0x2320, sub, word).unwrap();
     }
     node.sample();
     assert_eq!(node.read(0x6010, 0), 0x11);
-    node.raw.button = true;
-    (0..25).for_each(|_| node.sample());
-    assert_eq!(node.read(0x6010, 0), 0x9988_7766_5544);
-    let mut lamp = Lamp::default();
-    for (word, is_lit) in [(0x33, true), (0x44, true), (0x22, false), (0, false)] {
-        node.write(0x6011, 0, word).unwrap();
-        FIELDS.follow_output(&mut lamp, &mut node.image);
-        assert_eq!(FIELDS.is_lit(&node.image), is_lit, "{word:X}h");
+    // The second button is told a millisecond after the first, and what was told last stays.
+    for (buttons, word) in [
+        ([true, true], 0x9988_7766_5544),
+        ([true, true], 0x13),
+        ([false, true], 0x11),
+        ([false, false], 0x12),
+        ([false, false], 0x12),
+    ] {
+        node.raw.buttons = buttons;
+        node.sample();
+        assert_eq!(node.read(0x6010, 0), word, "{buttons:?}");
     }
-    node.write(0x2322, 0, 1).unwrap();
-    FIELDS.follow_output(&mut lamp, &mut node.image);
-    assert!(FIELDS.is_lit(&node.image), "an old output says nothing new");
+    let words = [(1, 0x22), (2, 0x33), (3, 0x55), (4, 0x33)];
+    for (sub, word) in words {
+        node.write(0x2321, sub, word).unwrap();
+    }
+    let mut lamps = [Lamp::default(); 2];
+    for (word, lit) in [
+        (0x33, [true, true]),
+        (0x44, [true, true]),
+        (0x22, [false, true]),
+        (0x55, [false, false]),
+        (0, [false, false]),
+    ] {
+        node.write(0x6011, 0, word).unwrap();
+        FIELDS.follow_output(&mut lamps, &mut node.image);
+        assert_eq!(FIELDS.lit(&node.image), lit, "{word:X}h");
+    }
+    node.write(0x2322, 2, 1).unwrap();
+    FIELDS.follow_output(&mut lamps, &mut node.image);
+    assert_eq!(FIELDS.lit(&node.image), [false, true], "an old output says nothing new");
+}
+
+#[test]
+fn a_button_that_is_not_used_says_nothing() {
+    let mut node = Node::new();
+    node.write(0x2320, 3, 0x12).unwrap();
+    node.write(0x2320, 4, 0x13).unwrap();
+    for (buttons, word) in [([true, false], 0), ([true, true], 0x13), ([false, true], 0x13)] {
+        node.raw.buttons = buttons;
+        node.sample();
+        assert_eq!(node.read(0x6010, 0), word, "{buttons:?}");
+    }
 }
 
 #[test]
@@ -309,7 +342,7 @@ fn the_device_type_names_the_only_virtual_device_or_none() {
 /// What the catalogue says of a PDO is what the device reads in the objects.
 #[test]
 fn the_pdos_are_those_of_the_catalogue() {
-    let row = |index, sub| PDOS.iter().find(|row| (row.index, row.sub) == (index, sub));
+    let row = |index, sub| OBJECTS.iter().find(|row| (row.index, row.sub) == (index, sub));
     let value = |index, sub| match row(index, sub)?.default {
         dictionary::DefaultValue::Integer(value) => Some(value),
         dictionary::DefaultValue::NodeId(base) => Some(base.into()),
@@ -337,7 +370,8 @@ fn the_pdos_are_those_of_the_catalogue() {
 /// An identifier twice would be two PDOs in one frame.
 #[test]
 fn no_two_pdos_share_an_identifier() {
-    let mut ids: Vec<i64> = PDOS.iter().filter(|row| row.rule == Rule::PdoPredefined).map(cob_id).collect();
+    let mut ids: Vec<i64> =
+        OBJECTS.iter().filter(|row| row.rule == Rule::PdoPredefined).map(cob_id).collect();
     assert_eq!(ids.len(), 15);
     ids.sort_unstable();
     ids.dedup();

@@ -6,12 +6,13 @@ use canopen::dictionary::{Dictionary, Field};
 use core::num::{NonZeroU16, NonZeroU32};
 use profiles::encoder::Area;
 use profiles::lift::load::{self, Point};
-use profiles::lift::panel::Lamp;
+use profiles::lift::panel::{BUTTONS, Contact, LAMPS, Lamp};
 use profiles::lift::position::{self, Source, UNITS, UnitParameters, UnitValues};
 use profiles::lift::{Parameters, Snapshot};
 
-/// Where the lift's values are in the image of a dictionary that has its objects.
-pub struct Fields {
+/// Where the lift's values are in the image of its dictionary.
+pub(crate) struct Fields {
+    device_type: Field,
     pub(super) sensors: Sensors,
     pub(super) transducer: Places,
     pub(super) units: [UnitFields; UNITS],
@@ -29,11 +30,11 @@ pub struct Fields {
     pub(super) load_state: Field,
     input: Field,
     output: Field,
-    /// The words while the button is released and while it is pressed.
-    button: [Field; 2],
-    /// The words that put the lamp out and that light it.
-    lamp_words: [Field; 2],
-    lamp: Field,
+    /// The words of a button while it is released and while it is pressed.
+    buttons: [[Field; 2]; BUTTONS],
+    /// The words that put a lamp out and that light it.
+    lamp_words: [[Field; 2]; LAMPS],
+    lamps: [Field; LAMPS],
 }
 
 /// Where the values of one position unit are.
@@ -93,13 +94,10 @@ impl UnitFields {
 }
 
 impl Fields {
-    /// Looks them up.
-    ///
-    /// # Panics
-    /// During compilation, when the dictionary does not have them all.
-    #[must_use]
-    pub const fn new(d: &Dictionary) -> Fields {
+    /// Looks them up, during compilation.
+    pub(crate) const fn new(d: &Dictionary) -> Fields {
         Fields {
+            device_type: d.field(0x1000, 0),
             sensors: Sensors::new(d),
             transducer: Places::new(d),
             units: [
@@ -116,26 +114,34 @@ impl Fields {
             limits: [d.field(0x6483, 1), d.field(0x6483, 2), d.field(0x6483, 3), d.field(0x6483, 4)],
             filter_type: d.field(0x2310, 1),
             filter_constant: d.field(0x2310, 2),
-            points: [[d.field(0x2311, 1), d.field(0x2311, 2)], [d.field(0x2311, 3), d.field(0x2311, 4)]],
+            points: [pair(d, 0x2311, 1), pair(d, 0x2311, 3)],
             load_offset: d.field(0x2312, 0),
             measured_load: d.field(0x2313, 1),
             load_state: d.field(0x2313, 2),
             input: d.field(0x6010, 0),
             output: d.field(0x6011, 0),
-            button: [d.field(0x2320, 1), d.field(0x2320, 2)],
-            lamp_words: [d.field(0x2321, 1), d.field(0x2321, 2)],
-            lamp: d.field(0x2322, 0),
+            buttons: [pair(d, 0x2320, 1), pair(d, 0x2320, 3)],
+            lamp_words: [pair(d, 0x2321, 1), pair(d, 0x2321, 3)],
+            lamps: pair(d, 0x2322, 1),
         }
     }
 
     /// Takes a snapshot into the image.
-    pub fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+    pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
         for (unit, values) in self.units.iter().zip(&snapshot.position.units) {
             unit.publish(values, image);
         }
         self.publish_load(&snapshot.load, image);
-        let [released, pressed] = self.button;
-        let word = if snapshot.is_pressed { pressed } else { released };
+        self.publish_input(snapshot.button, image);
+    }
+
+    /// Of a button that is used: the virtual input says what it has said before, whatever the others do.
+    fn publish_input(&self, contact: Contact, image: &mut [u8]) {
+        let Some(words) = self.buttons.get(contact.button).filter(|words| differ(**words, image)) else {
+            return;
+        };
+        let [released, pressed] = words;
+        let word = if contact.is_pressed { pressed } else { released };
         self.input.store(image, word.load::<6>(image));
     }
 
@@ -151,22 +157,23 @@ impl Fields {
 
     /// Does what a new virtual output says. To be called after every frame that may have brought one: the next may be for
     /// another panel.
-    pub fn follow_output(&self, lamp: &mut Lamp, image: &mut [u8]) {
-        let [off, on] = self.lamp_words.map(|at| at.load(image));
-        if let Some(is_lit) = lamp.follow(self.output.load(image), on, off) {
-            self.lamp.store(image, [is_lit.into()]);
+    pub(crate) fn follow_output(&self, followers: &mut [Lamp; LAMPS], image: &mut [u8]) {
+        let output = self.output.load(image);
+        for ((follower, words), lamp) in followers.iter_mut().zip(&self.lamp_words).zip(&self.lamps) {
+            let [off, on] = words.map(|at| at.load(image));
+            if let Some(is_lit) = follower.follow(output, on, off) {
+                lamp.store(image, [is_lit.into()]);
+            }
         }
     }
 
-    /// Whether the lamp is lit.
-    #[must_use]
-    pub fn is_lit(&self, image: &[u8]) -> bool {
-        self.lamp.u8(image) != 0
+    /// Which lamps are lit.
+    pub(crate) fn lit(&self, image: &[u8]) -> [bool; LAMPS] {
+        self.lamps.map(|lamp| lamp.u8(image) != 0)
     }
 
     /// The parameters in the image. A value that no write could have put there acts as the smallest.
-    #[must_use]
-    pub fn parameters(&self, image: &[u8]) -> Parameters {
+    pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
         Parameters { position: self.position_parameters(image), load: self.load_parameters(image) }
     }
 
@@ -193,13 +200,17 @@ impl Fields {
         }
     }
 
+    /// Fills in what follows from the parameters: the device type.
+    pub(crate) fn initialise(&self, image: &mut [u8]) {
+        self.device_type.store(image, self.device_type(image).to_le_bytes());
+    }
+
     /// Device type (1000h): the virtual device that this one is, or 0 in bits 24 to 31 for several in one.
-    #[must_use]
-    pub fn device_type(&self, image: &[u8]) -> u32 {
-        let differ = |[a, b]: [Field; 2]| a.get(image) != b.get(image);
+    pub(super) fn device_type(&self, image: &[u8]) -> u32 {
+        let is_used = |all: &[[Field; 2]]| all.iter().any(|words| differ(*words, image));
         let has = [
-            (INPUT_PANEL, differ(self.button)),
-            (OUTPUT_PANEL, differ(self.lamp_words)),
+            (INPUT_PANEL, is_used(&self.buttons)),
+            (OUTPUT_PANEL, is_used(&self.lamp_words)),
             (POSITION_UNIT, self.units.iter().any(|unit| unit.source.u8(image) != 0)),
             (LOAD_UNIT, self.load_parameters(image).is_calibrated()),
         ];
@@ -212,8 +223,17 @@ impl Fields {
     }
 }
 
+/// Two sub-indexes in a row.
+const fn pair(d: &Dictionary, index: u16, first: u8) -> [Field; 2] {
+    [d.field(index, first), d.field(index, first + 1)]
+}
+
+fn differ([a, b]: [Field; 2], image: &[u8]) -> bool {
+    a.get(image) != b.get(image)
+}
+
 /// The number of the profile, and codes of virtual devices in object 1000h.
-const PROFILE: u32 = 417;
+pub(super) const PROFILE: u32 = 417;
 const INPUT_PANEL: u32 = 0x02;
 const OUTPUT_PANEL: u32 = 0x03;
 const POSITION_UNIT: u32 = 0x06;

@@ -29,6 +29,7 @@ const PARTS: &[&[Object]] = &[
     communication::ERRORS_AND_SYNC,
     &[communication::device_name("STM32F4 pressure transmitter")],
     communication::SERVICES,
+    &communication::error_behaviour(0),
     &PDOS,
     communication::START_UP,
     &[personality(Personality::Pressure)],
@@ -49,5 +50,10 @@ static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
 static FLAGS: flags::Fields = flags::Fields::new(&DICTIONARY);
 static FIELDS: Fields = Fields::new(&DICTIONARY, 0);
 
-pub(crate) static DEFINITION: Definition =
-    Definition { dictionary: &DICTIONARY, flags: Some(&FLAGS), pressure: Some(&FIELDS), encoder: None };
+pub(crate) static DEFINITION: Definition = Definition {
+    dictionary: &DICTIONARY,
+    flags: Some(&FLAGS),
+    pressure: Some(&FIELDS),
+    encoder: None,
+    lift: None,
+};

@@ -71,6 +71,12 @@ impl Object {
         if self.index == Self::RESERVED { Object { index: 0x0005, ..self } } else { self }
     }
 
+    /// Whether its value can be below 0: velocities and the effort of the drive, as those of CiA 402 can.
+    #[must_use]
+    pub const fn is_signed(self) -> bool {
+        matches!(self.index, 0x6406 | 0x6430 | 0x6433)
+    }
+
     /// The value of a PDO mapping entry (CiA 301: index, sub-index, length).
     #[must_use]
     pub const fn entry(self) -> u32 {

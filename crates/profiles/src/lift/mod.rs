@@ -1,7 +1,7 @@
 //! The lift application profile, CiA 417: lift 1.
 //!
 //! A device is several virtual devices in one: here up to four car position units ([`position`]), a load measuring unit
-//! ([`load`]), and a panel with one button and one lamp ([`panel`]). [`catalogue`] knows what all virtual devices of a
+//! ([`load`]), and a panel with two buttons and two lamps ([`panel`]). [`catalogue`] knows what all virtual devices of a
 //! lift send each other.
 
 pub mod catalogue;
@@ -28,8 +28,8 @@ pub struct RawLift {
     pub encoder: RawEncoder,
     /// Pressure input.
     pub pressure: RawSample,
-    /// The button's contact is closed.
-    pub button: bool,
+    /// Which buttons are pressed, debounced.
+    pub buttons: [bool; panel::BUTTONS],
 }
 
 /// What the virtual devices give for one sample.
@@ -39,8 +39,8 @@ pub struct Snapshot {
     pub position: position::Snapshot,
     /// Of the load measuring unit.
     pub load: load::Snapshot,
-    /// The button is pressed.
-    pub is_pressed: bool,
+    /// The button that has changed last.
+    pub button: panel::Contact,
 }
 
 /// All virtual devices with their state.
@@ -48,7 +48,7 @@ pub struct Snapshot {
 pub struct Lift {
     position: position::PositionUnits,
     load: load::LoadUnit,
-    button: panel::Contact,
+    buttons: panel::Buttons,
 }
 
 impl Lift {
@@ -69,7 +69,7 @@ impl Lift {
         Snapshot {
             position: self.position.sample(&raw.encoder),
             load: self.load.sample(&raw.pressure),
-            is_pressed: self.button.sample(raw.button),
+            button: self.buttons.sample(raw.buttons),
         }
     }
 

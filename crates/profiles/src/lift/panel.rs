@@ -1,28 +1,40 @@
-//! Input and output panel units: a button and a lamp.
+//! Input and output panel units: two buttons and two lamps.
 //!
 //! Virtual inputs (6010h) and outputs (6011h) are words of 48 bits whose structure is not public. So the node does not
-//! look into them: it sends one word while the button is pressed and another one while it is not, and it lights the lamp
-//! on one word and puts it out on another. Every other word is for somebody else.
+//! look into them: each button has one word for when it is pressed and another one for when it is released, each lamp one
+//! that lights it and another one that puts it out. Every other word is for somebody else.
 
-/// Milliseconds for which a contact must stay before it is believed.
-const DEBOUNCE: u8 = 20;
+/// Buttons of a panel.
+pub const BUTTONS: usize = 2;
+/// Lamps of a panel.
+pub const LAMPS: usize = 2;
 
-/// A contact that bounces.
-#[derive(Clone, Copy, Debug, Default)]
+/// A button and what has happened to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Contact {
-    is_closed: bool,
-    /// Milliseconds for which it has been the other way.
-    other: u8,
+    /// Which one, from 0.
+    pub button: usize,
+    /// Whether it is pressed.
+    pub is_pressed: bool,
 }
 
-impl Contact {
-    /// Takes the state of the pin, once a millisecond; returns that of the contact.
-    pub fn sample(&mut self, is_closed: bool) -> bool {
-        self.other = if is_closed == self.is_closed { 0 } else { self.other.saturating_add(1) };
-        if self.other >= DEBOUNCE {
-            *self = Contact { is_closed, other: 0 };
+/// The buttons. The virtual input says one thing at a time: of buttons that change in the same millisecond, the second is
+/// told in the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Buttons {
+    told: [bool; BUTTONS],
+    last: Contact,
+}
+
+impl Buttons {
+    /// Takes which buttons are pressed, once a millisecond and debounced; returns the last change.
+    pub fn sample(&mut self, pressed: [bool; BUTTONS]) -> Contact {
+        let changed = (0..).zip(self.told.iter_mut().zip(pressed)).find(|(_, (told, now))| **told != *now);
+        if let Some((button, (told, is_pressed))) = changed {
+            *told = is_pressed;
+            self.last = Contact { button, is_pressed };
         }
-        self.is_closed
+        self.last
     }
 }
 
@@ -52,12 +64,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_contact_that_bounces_is_one_contact() {
-        let mut contact = Contact::default();
-        assert!((0..100).all(|t| !contact.sample(t % 15 != 0)));
-        let closed = (0..100).map(|_| contact.sample(true)).position(|is_closed| is_closed);
-        assert_eq!(closed, Some(usize::from(DEBOUNCE) - 1 - 9), "nine of them were before");
-        assert!(contact.sample(false));
+    fn buttons_are_told_one_after_the_other() {
+        let contact = |button, is_pressed| Contact { button, is_pressed };
+        let mut buttons = Buttons::default();
+        let pressed =
+            [[false, false], [true, true], [true, true], [true, true], [false, true], [false, false]];
+        let told = pressed.map(|pressed| buttons.sample(pressed));
+        let expected = [
+            contact(0, false),
+            contact(0, true),
+            contact(1, true),
+            contact(1, true),
+            contact(0, false),
+            contact(1, false),
+        ];
+        assert_eq!(told, expected);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::io;
 use std::rc::Rc;
 
 use clap::Parser;
+use node::Personality;
 use nodectl::cli::{Cli, Failure, Output, Session};
 
 use crate::loader::{Loader, identification};
@@ -186,6 +187,36 @@ fn monitor_takes_pdos_and_reads_the_rest() {
         objects.contains(&"\"6130h:2\"".to_owned()) && objects.contains(&"\"1001h:0\"".to_owned()),
         "{lines}"
     );
+}
+
+#[test]
+fn monitor_knows_the_pdos_of_a_lift_without_asking_anybody() {
+    let wire = Wire::new(Pressure::of(Personality::Lift, 16));
+    printed(&wire, &["nmt", "start", "--node", "16", "--no-wait"]);
+    let lines = printed(&wire, &["monitor", "--lift", "--count", "5"]);
+    for expected in [
+        "490h virtual input of node 16: virtual input = 00 00 00 00 00 00",
+        "188h load measuring unit: load signals = 0",
+        "188h load measuring unit: load = 0",
+        "18Ch car position 1: position 1 = 0",
+        "510h multiplexed PDO of node 16: Position unit states/Position unit 1 state = 8",
+    ] {
+        assert!(lines.contains(expected), "{expected}: {lines}");
+    }
+    let line = printed(&wire, &["--json", "monitor", "--lift", "--count", "1"]);
+    let value: serde_json::Value = serde_json::from_str(&line).unwrap();
+    assert_eq!((value["can_id"].as_u64(), value["producer"].as_u64()), (Some(0x510), Some(16)), "{line}");
+    assert!(run(&wire, &["monitor", "--lift", "--count", "0"]).1.is_ok());
+}
+
+/// TPDO 130, 258 and 263: the data sheet says where they are.
+#[test]
+fn monitor_finds_the_tpdos_of_a_lift_node() {
+    let wire = Wire::new(Pressure::of(Personality::Lift, 16));
+    let lines = printed(&wire, &["monitor", "--node", "16", "--start", "--count", "4"]);
+    for expected in ["6010h:0 Virtual input", "6482h:1", "6480h:1", "6383h:1"] {
+        assert!(lines.contains(expected), "{expected}: {lines}");
+    }
 }
 
 #[test]

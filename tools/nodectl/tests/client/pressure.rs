@@ -18,8 +18,13 @@ pub(crate) struct Pressure {
 impl Pressure {
     /// A node as it comes from the factory; `None` for one that waits for LSS.
     pub(crate) fn new(id: impl Into<Option<u8>>) -> Pressure {
+        Pressure::of(Personality::Pressure, id)
+    }
+
+    /// The same node as something else.
+    pub(crate) fn of(personality: Personality, id: impl Into<Option<u8>>) -> Pressure {
         let setup = Setup {
-            personality: Personality::Pressure,
+            personality,
             node_id: id.into().and_then(NodeId::new),
             bit_rate: BitRate::from_kbit(250).expect("a bit rate"),
             serial_number: 0x1234_5678,

@@ -1,5 +1,6 @@
 //! `nodectl monitor`
 
+mod lift;
 mod screen;
 mod view;
 
@@ -25,6 +26,10 @@ const SILENCE: Duration = Duration::from_millis(2000);
 pub(super) struct Monitor {
     #[command(flatten)]
     source: Source,
+
+    /// A line for each value in the pre-defined PDOs of a lift (CiA 417), whoever sends them; no node is asked.
+    #[arg(long, conflicts_with_all = ["objects", "start", "window"])]
+    lift: bool,
 
     /// End after so many values.
     #[arg(long, value_name = "N")]
@@ -85,6 +90,9 @@ struct Line<'a> {
 
 impl Monitor {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        if self.lift {
+            return lift::print_lines(session, self.count.unwrap_or(usize::MAX));
+        }
         if session.output.is_interactive() {
             let (mut acquisition, _) = self.source.open(session)?;
             let view = View::new(acquisition.signals(), self.window.max(1).into());

@@ -1,0 +1,190 @@
+//! An update: what a master, noise and power cuts can do to a node that runs image A and is sent image B. Whatever it
+//! is, the node starts A or B, whole: nobody but the owner of the key can sign a third.
+
+use std::sync::LazyLock;
+
+use arbitrary::{Arbitrary, Unstructured};
+use update::mock::{MockFlash, Weak};
+use update::{
+    Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Start, Status, Target,
+    Updater, Version, boot,
+};
+
+/// Bootloader; application in two sectors; staging in two.
+const SECTORS: [usize; 5] = [256, 512, 512, 512, 1024];
+const APPLICATION: usize = 256;
+const PRODUCT: u32 = 0x8271;
+/// More polls than any step of an update takes.
+const POLLS: u32 = 2000;
+
+#[derive(Arbitrary, Debug)]
+enum Step<'a> {
+    /// 1F51h = 3.
+    Clear,
+    /// A download to 1F50h begins.
+    Begin { size: Option<u16> },
+    /// Some bytes come.
+    Receive(&'a [u8]),
+    /// The next bytes of image B come, perhaps with one of them changed.
+    ReceiveImage { len: u16, flip: Option<(u16, u8)> },
+    /// The download ends.
+    Finish,
+    /// 1F51h = 1.
+    Install,
+    /// Time passes.
+    Poll { times: u8 },
+    /// Time passes until nothing is left to do.
+    PollAll,
+    /// Power off and on.
+    Restart,
+    /// The power is cut so many operations from now.
+    Cut { after: u8, weak: u8 },
+}
+
+/// Takes steps; and the first bytes as a header.
+pub fn run(data: &[u8]) {
+    if let Some(bytes) = data.first_chunk::<HEADER_LEN>()
+        && let Ok(header) = Header::parse(bytes)
+    {
+        assert_eq!(&header.encode(), bytes);
+    }
+    let mut input = Unstructured::new(data);
+    let mut node = Node::new();
+    while !input.is_empty() {
+        let Ok(step) = input.arbitrary::<Step>() else { break };
+        node.take(&step);
+    }
+    node.restart();
+}
+
+fn keys() -> salty::Keypair {
+    salty::Keypair::from(&[7; 32])
+}
+
+fn target() -> Target {
+    let layout = Layout::new(Area::new(256, &[512, 512]), Area::new(1280, &[512, 1024])).expect("they fit");
+    Target { layout, product: PRODUCT, hardware: 0, key: keys().public.to_bytes() }
+}
+
+fn image(major: u16, len: usize) -> Image {
+    let version = Version { major, minor: 0, patch: 0 };
+    let description = Description { product: PRODUCT, hardware: 1, version, counter: 1 };
+    let code: Vec<u8> = (1..=u8::MAX).cycle().skip(usize::from(major)).take(len).collect();
+    let header = Header::describe(description, &code).expect("it fits");
+    let hash = salty::Sha512::new().updated(&header.signed_part()).updated(&code).finalize();
+    let header = header.with_signature(keys().sign_prehashed(&hash, Some(CONTEXT)).to_bytes());
+    (header, [&header.encode()[..], &code].concat())
+}
+
+/// An image and its header.
+type Image = (Header, Vec<u8>);
+
+/// A and B, and the flash of a node that runs A: signing takes longer than all the rest.
+static START: LazyLock<([Image; 2], MockFlash)> = LazyLock::new(|| {
+    let images = [image(1, 300), image(2, 420)];
+    let flash = installed(&images[0].1);
+    (images, flash)
+});
+
+struct Node {
+    updater: Updater<MockFlash>,
+    images: &'static [Image; 2],
+    /// Bytes of B that have been sent.
+    sent: usize,
+}
+
+impl Node {
+    fn new() -> Node {
+        let (images, flash) = &*START;
+        Node { updater: Updater::new(flash.clone(), target(), Status::GOOD), images, sent: 0 }
+    }
+
+    fn take(&mut self, step: &Step) {
+        match *step {
+            Step::Poll { times } => (0..times).for_each(|_| {
+                self.updater.poll();
+            }),
+            Step::PollAll => poll_all(&mut self.updater),
+            Step::Restart => self.restart(),
+            Step::Cut { after, weak } => {
+                let weak = Weak::ALL[usize::from(weak) % Weak::ALL.len()];
+                self.updater.flash().cut_after(after.into(), weak);
+            }
+            // A refusal is an answer to the master, and no more.
+            ref command => drop(self.command(command)),
+        }
+        if self.updater.flash().is_down() {
+            self.restart();
+        }
+    }
+
+    fn command(&mut self, step: &Step) -> Result<(), Refusal> {
+        match *step {
+            Step::Clear => self.updater.clear(),
+            Step::Begin { size } => {
+                self.sent = 0;
+                self.updater.begin(size.map(u32::from))
+            }
+            Step::Receive(bytes) => self.updater.receive(bytes),
+            Step::ReceiveImage { len, flip } => {
+                let piece = self.piece(len, flip);
+                self.updater.receive(&piece)
+            }
+            Step::Finish => self.updater.finish(),
+            Step::Install => self.updater.install(),
+            _ => Ok(()),
+        }
+    }
+
+    fn piece(&mut self, len: u16, flip: Option<(u16, u8)>) -> Vec<u8> {
+        let rest = &self.images[1].1[self.sent..];
+        let mut piece = rest[..usize::from(len).min(rest.len())].to_vec();
+        self.sent += piece.len();
+        if let Some((at, by)) = flip
+            && !piece.is_empty()
+        {
+            let at = usize::from(at) % piece.len();
+            piece[at] ^= by;
+        }
+        piece
+    }
+
+    /// Power off and on: what the bootloader does, and what must come of it.
+    fn restart(&mut self) {
+        let mut flash = self.updater.flash().clone();
+        flash.power_up();
+        if boot(&mut flash, &target(), Start::default()) == Decision::Copy {
+            let mut updater = Updater::new(flash, target(), Status::GOOD);
+            updater.install().expect("a checked image waits");
+            poll_all(&mut updater);
+            flash = updater.flash().clone();
+        }
+        let decision = boot(&mut flash, &target(), Start::default());
+        let bytes = flash.bytes();
+        let started = self.images.iter().find(|(header, _)| decision == Decision::Start(*header));
+        let (_, image) = started.unwrap_or_else(|| panic!("neither A nor B starts: {decision:?}"));
+        assert_eq!(&bytes[APPLICATION..APPLICATION + image.len()], image, "all of it");
+        self.updater = Updater::new(flash, target(), Status::GOOD);
+    }
+}
+
+fn poll_all(updater: &mut Updater<MockFlash>) {
+    let mut polls = 0..POLLS;
+    while updater.poll() != Next::Nothing {
+        assert!(polls.next().is_some(), "it does not end");
+    }
+}
+
+/// The flash after a whole update, as a master does it.
+fn installed(image: &[u8]) -> MockFlash {
+    let mut updater = Updater::new(MockFlash::new(&SECTORS, 1), target(), Status::GOOD);
+    updater.clear().expect("it is idle");
+    poll_all(&mut updater);
+    updater.begin(u32::try_from(image.len()).ok()).expect("it is clear");
+    updater.receive(image).expect("it fits");
+    updater.finish().expect("it is whole");
+    poll_all(&mut updater);
+    updater.install().expect("it is signed");
+    poll_all(&mut updater);
+    updater.flash().clone()
+}

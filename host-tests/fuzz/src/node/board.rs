@@ -1,0 +1,275 @@
+//! The node on a board: what the firmware's tasks do around it.
+
+use canopen::dictionary::Object;
+use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+use eds::DEVICES;
+use node::{BitRate, Measurement, Parcel, Personality, Protocol, RawEncoder, Request, Setup, Start, State};
+use storage::{DeviceRecord, Pages, Store, View};
+
+use super::flash::{Flash, PAGE};
+use super::step::{Step, raw};
+
+const PAGES: Pages = Pages::new(0, PAGE);
+/// As the firmware's transmit queue.
+const ROOM: usize = 32;
+/// More requests than a call can leave.
+const REQUESTS: usize = 16;
+
+/// A transmit queue of limited room.
+#[derive(Debug, Default)]
+pub(super) struct Queue {
+    waiting: Vec<Frame>,
+    is_congested: bool,
+}
+
+impl Transmit for Queue {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        if self.room() == 0 {
+            return Err(QueueFull);
+        }
+        self.waiting.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        ROOM - self.waiting.len()
+    }
+}
+
+/// A board.
+#[derive(Debug)]
+pub(super) struct Board {
+    unless_stored: Setup,
+    pub(super) personality: Personality,
+    pub(super) protocol: Protocol,
+    measurement: Measurement,
+    flash: Flash,
+    store: Option<Store<Flash>>,
+    pub(super) out: Queue,
+    pub(super) now: Instant,
+    pub(super) due: Instant,
+    filters: [Vec<u16>; 2],
+    /// Whether it has started since the last step.
+    pub(super) has_started: bool,
+}
+
+impl Board {
+    pub(super) fn new(personality: Personality) -> Board {
+        let unless_stored = Setup {
+            personality,
+            node_id: NodeId::new(0x21),
+            bit_rate: BitRate::FASTEST,
+            program_id: 0x0BAD_CAFE,
+            serial_number: 0x1234_5678,
+            hardware_version: "fuzz",
+            software_version: "0",
+        };
+        let mut board = Board {
+            unless_stored,
+            personality,
+            protocol: Protocol::new(&unless_stored),
+            measurement: Measurement::new(Start::First),
+            flash: Flash::erased(),
+            store: None,
+            out: Queue::default(),
+            now: Instant(0),
+            due: Instant(0),
+            filters: [vec![], vec![]],
+            has_started: false,
+        };
+        board.power_on(Start::First);
+        board.settle();
+        board.sent();
+        board
+    }
+
+    /// As the firmware's start. A power cut in it is a start of its own.
+    fn power_on(&mut self, kept: Start) {
+        self.out.waiting.clear();
+        self.store = None;
+        while self.store.is_none() {
+            self.flash.power_up();
+            let mut view = View::open(self.flash.clone(), PAGES).expect("there is power");
+            let record = view.device().expect("there is power");
+            let setup = record.map_or(self.unless_stored, |record| stored(record, &self.unless_stored));
+            self.personality = setup.personality;
+            self.protocol = Protocol::new(&setup);
+            self.protocol.load(&mut view);
+            self.store = Store::prepare(view).ok();
+        }
+        self.measurement = Measurement::new(kept);
+        self.measurement.apply(&self.protocol.prepare());
+        self.start();
+    }
+
+    fn start(&mut self) {
+        self.out.waiting.clear();
+        self.protocol.start(self.now, &mut self.out);
+        self.has_started = true;
+    }
+
+    /// The rows of the personality that runs.
+    pub(super) fn rows(&self) -> &'static [Object] {
+        let device = DEVICES.iter().find(|device| device.personality == self.personality);
+        device.expect("every personality has a sheet").rows
+    }
+
+    pub(super) fn row(&self, place: u16) -> &'static Object {
+        let rows = self.rows();
+        &rows[usize::from(place) % rows.len()]
+    }
+
+    /// The own node-ID, by the identifier of the SDO server.
+    pub(super) fn node_id(&self) -> Option<u16> {
+        self.protocol.service_ids().find(|id| (0x601..=0x67F).contains(id)).map(|id| id - 0x600)
+    }
+
+    pub(super) fn state(&self) -> State {
+        self.protocol.state()
+    }
+
+    /// The frames that have left.
+    pub(super) fn sent(&mut self) -> Vec<Frame> {
+        if self.out.is_congested { vec![] } else { std::mem::take(&mut self.out.waiting) }
+    }
+
+    /// Does one step and all that follows from it at this instant.
+    pub(super) fn take(&mut self, step: &Step) {
+        self.has_started = false;
+        match *step {
+            Step::Sdo(data) => self.sdo(data),
+            Step::Read { row } => self.sdo(upload(self.row(row))),
+            Step::Write { row, value } => self.sdo(download(self.row(row), value)),
+            Step::Nmt { command, to_all } => self.nmt(command, to_all),
+            Step::Process { place, len, remote, data } => {
+                self.receive(pick(&self.filters[0], place), len, remote, data);
+            }
+            Step::Service { place, data } => self.receive(pick(&self.filters[1], place), 8, false, data),
+            Step::Frame { id, len, remote, data } => self.receive(id, len, remote, data),
+            Step::Lss(data) => self.receive(0x7E5, 8, false, data),
+            Step::Sample { pressure, supply, temperature, vrefint, encoder } => {
+                self.sample(&raw(pressure, supply, temperature, vrefint), encoder);
+            }
+            Step::Bus(report) => self.protocol.bus_event(report.into(), self.now, &mut self.out),
+            Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
+            Step::Wait(time) => self.now = self.now + Duration(time.into()),
+            Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
+            Step::PowerCycle => self.power_on(Start::Kept(self.measurement.kept())),
+            Step::PowerCut { after } => self.flash.cut_after(after),
+        }
+        self.settle();
+    }
+
+    fn nmt(&mut self, command: u8, to_all: bool) {
+        let commands = [0x01, 0x02, 0x80, 0x81, 0x82];
+        let node = if to_all { 0 } else { self.node_id().unwrap_or(0) };
+        let data = [commands[usize::from(command) % commands.len()], node.to_le_bytes()[0], 0, 0, 0, 0, 0, 0];
+        self.receive(0, 2, false, data);
+    }
+
+    pub(super) fn sdo(&mut self, data: [u8; 8]) {
+        if let Some(node_id) = self.node_id() {
+            self.receive(0x600 + node_id, 8, false, data);
+        }
+    }
+
+    fn receive(&mut self, id: u16, len: u8, remote: bool, data: [u8; 8]) {
+        let len = len % 9;
+        let id = id & 0x7FF;
+        let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data[..usize::from(len)]) };
+        let frame = frame.expect("an identifier of 11 bits and at most eight bytes");
+        if self.filters[0].contains(&id) {
+            self.protocol.on_process_frame(&frame, self.now, &mut self.out);
+        }
+        if self.filters[1].contains(&id) {
+            self.protocol.on_service_frame(&frame, self.now, &mut self.out);
+        }
+    }
+
+    fn sample(&mut self, raw: &node::RawSample, encoder: u16) {
+        self.now = self.now + Duration::from_millis(1);
+        if let Some(parameters) = self.protocol.take_parameters() {
+            self.measurement.apply(&parameters);
+        }
+        let shaft = RawEncoder { counter: encoder, ..RawEncoder::default() };
+        let snapshot = self.measurement.sample(raw, &shaft);
+        self.protocol.publish(&snapshot, self.now, &mut self.out);
+    }
+
+    /// Polls and fulfils until there is nothing left to do now.
+    pub(super) fn settle(&mut self) {
+        self.fulfil();
+        for _ in 0..REQUESTS {
+            self.due = self.poll();
+            self.fulfil();
+            if self.due > self.now {
+                return;
+            }
+        }
+        panic!("what is due at {:?} stays due", self.now);
+    }
+
+    fn poll(&mut self) -> Instant {
+        let process = self.protocol.poll_process(self.now, &mut self.out);
+        process.min(self.protocol.poll_services(self.now, &mut self.out))
+    }
+
+    fn fulfil(&mut self) {
+        for _ in 0..REQUESTS {
+            let Some(request) = self.protocol.take_request() else { return };
+            match request {
+                Request::ResetNode | Request::Bootloader => {
+                    self.power_on(Start::Kept(self.measurement.kept()));
+                }
+                Request::ResetCommunication => self.start(),
+                Request::Filters => {
+                    self.filters =
+                        [self.protocol.process_ids().collect(), self.protocol.service_ids().collect()];
+                }
+                Request::BitRate(_) => (),
+                Request::Store => self.deliver(),
+            }
+        }
+        panic!("the requests have no end");
+    }
+
+    fn deliver(&mut self) {
+        let mut parcel = Parcel::new();
+        let Some(store) = self.store.as_mut().filter(|_| self.protocol.pack(&mut parcel)) else { return };
+        let result = parcel.deliver(store);
+        if self.flash.is_down() {
+            return self.power_on(Start::First);
+        }
+        self.protocol.finish(&parcel, result, self.now, &mut self.out);
+    }
+}
+
+/// As the firmware takes what is stored of the device.
+fn stored(record: DeviceRecord, unless_stored: &Setup) -> Setup {
+    Setup {
+        personality: Personality::numbered(record.personality()).expect("one that was stored"),
+        node_id: NodeId::new(record.node_id()),
+        bit_rate: BitRate::from_kbit(record.bit_rate_kbit()).expect("one that was stored"),
+        ..*unless_stored
+    }
+}
+
+fn pick(ids: &[u16], place: u8) -> u16 {
+    if ids.is_empty() { 0 } else { ids[usize::from(place) % ids.len()] }
+}
+
+/// The request of an upload.
+pub(super) fn upload(row: &Object) -> [u8; 8] {
+    request(0x40, row, [0; 4])
+}
+
+/// The request of an expedited download of as many bytes as the object has, or of four.
+pub(super) fn download(row: &Object, value: [u8; 4]) -> [u8; 8] {
+    let unused = 4 - row.kind.size().clamp(1, 4);
+    request(0x23 | unused << 2, row, value)
+}
+
+fn request(command: u8, row: &Object, [a, b, c, d]: [u8; 4]) -> [u8; 8] {
+    let [low, high] = row.index.to_le_bytes();
+    [command, low, high, row.sub, a, b, c, d]
+}

@@ -1,0 +1,94 @@
+//! The table of the 290 pre-defined PDOs of CiA 417-3-1, tables/lift417.csv, in the corrected reading.
+
+const TABLE: &str = include_str!("../tables/lift417.csv");
+
+/// What the table says of a PDO.
+#[derive(Clone, Debug)]
+pub struct Pdo {
+    /// It is a TPDO.
+    pub is_produced: bool,
+    /// Its number.
+    pub number: u16,
+    /// Index of the communication parameter.
+    pub communication: u16,
+    /// Index of the mapping parameter.
+    pub mapping: u16,
+    /// CAN-ID; the node-ID is to be added to it where `is_relative`.
+    pub base: u32,
+    /// The CAN-ID depends on the node-ID.
+    pub is_relative: bool,
+    /// Index, sub-index and bits; none for a multiplexed PDO.
+    pub objects: Vec<(u16, u8, u8)>,
+}
+
+impl Pdo {
+    /// The CAN-ID in a node.
+    #[must_use]
+    pub fn cob_id(&self, node_id: u8) -> u32 {
+        self.base + if self.is_relative { node_id.into() } else { 0 }
+    }
+
+    /// The entries of its mapping parameter.
+    #[must_use]
+    pub fn entries(&self) -> Vec<u32> {
+        let entry = |&(index, sub, bits): &(u16, u8, u8)| {
+            u32::from(index) << 16 | u32::from(sub) << 8 | u32::from(bits)
+        };
+        self.objects.iter().map(entry).collect()
+    }
+
+    /// The number of mapped objects; 255 for a multiplexed PDO.
+    #[must_use]
+    pub fn count(&self) -> u8 {
+        if self.objects.is_empty() { 0xFF } else { u8::try_from(self.objects.len()).expect("at most 64") }
+    }
+
+    /// Whether the node in personality lift has it: its own units produce these and consume those.
+    #[must_use]
+    pub fn is_of_the_node(&self) -> bool {
+        match self.is_produced {
+            true => matches!(self.number, 2 | 130 | 258 | 263 | 264 | 385 | 386),
+            false => matches!(self.number, 2..=8 | 257),
+        }
+    }
+}
+
+/// All of them.
+pub fn pdos() -> impl Iterator<Item = Pdo> {
+    TABLE.lines().skip(1).map(parse)
+}
+
+fn parse(line: &str) -> Pdo {
+    let cells: Vec<&str> = line.split(',').collect();
+    let [direction, number, communication, mapping, cob_id, kind, inhibit, timer, objects] = cells[..] else {
+        panic!("{line}")
+    };
+    assert_eq!([kind, inhibit, timer], ["0xFF", "0", "0"], "every pre-defined PDO has type FFh and no times");
+    let base = cob_id.strip_suffix("+node-id");
+    Pdo {
+        is_produced: direction == "TPDO",
+        number: number.parse().expect("a number"),
+        communication: index(communication),
+        mapping: index(mapping),
+        base: hex(base.unwrap_or(cob_id)),
+        is_relative: base.is_some(),
+        objects: if objects == "multiplexed" { vec![] } else { objects.split(';').map(object).collect() },
+    }
+}
+
+fn hex(text: &str) -> u32 {
+    u32::from_str_radix(text.trim_start_matches("0x"), 16).expect("hexadecimal digits")
+}
+
+fn index(text: &str) -> u16 {
+    hex(text).try_into().expect("an index")
+}
+
+fn object(text: &str) -> (u16, u8, u8) {
+    let [index, sub, bits] = text.split(':').map(hex).collect::<Vec<_>>()[..] else { panic!("{text}") };
+    (
+        index.try_into().expect("an index"),
+        sub.try_into().expect("a sub-index"),
+        bits.try_into().expect("bits"),
+    )
+}

@@ -1,0 +1,218 @@
+//! The node in personality lift, by what it says on the bus.
+
+use std::collections::BTreeSet;
+
+use canopen::Frame;
+use canopen::pdo::{Address, Mpdo};
+use canopen::sdo::Multiplexer;
+use host_tests::bench::{Bench, ID, raw};
+use host_tests::lift417::{Pdo, pdos};
+use host_tests::tables::table;
+use node::{Personality, RawSample};
+use profiles::lift::load::OVERLOAD;
+
+const NO_OBJECT: u32 = 0x0602_0000;
+const INVALID_VALUE: u32 = 0x0609_0030;
+
+fn lift() -> Bench {
+    Bench::booted_as(Personality::Lift)
+}
+
+/// In Operational, with a first sample and nothing left of what it has sent on the way.
+fn operational() -> Bench {
+    let mut bench = lift();
+    bench.sample(&empty_car());
+    bench.nmt(1);
+    (0..200).for_each(|_| bench.sample(&empty_car()));
+    bench.take();
+    bench
+}
+
+/// 0 kg by the default calibration.
+fn empty_car() -> RawSample {
+    raw(0.0, 298.15)
+}
+
+fn number(bench: &mut Bench, index: u16, sub: u8) -> u32 {
+    let bytes = bench.read(index, sub).unwrap();
+    bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
+}
+
+fn position(bench: &mut Bench, counter: u16) -> Vec<(u16, Vec<u8>)> {
+    bench.encoder.counter = counter;
+    bench.sample(&empty_car());
+    bench.take().into_iter().filter(|(id, _)| *id == 0x18C).collect()
+}
+
+/// What is different by default: producers forbid remote frames, and units 2 to 4 are not there.
+fn cob_id(pdo: &Pdo) -> u32 {
+    let flags = match (pdo.is_produced, pdo.number) {
+        (false, _) | (true, 2) => 0,
+        (true, 264 | 385 | 386) => 0xC000_0000,
+        (true, _) => 0x4000_0000,
+    };
+    pdo.cob_id(ID) | flags
+}
+
+/// All 290 rows. What the node has of them is as the table says; what it has not is not there under another number either.
+#[test]
+fn every_pdo_of_the_table_is_in_the_node_or_is_not_there() {
+    let mut bench = lift();
+    let mut count = 0;
+    for pdo in pdos() {
+        let (communication, mapping) = (pdo.communication, pdo.mapping);
+        if !pdo.is_of_the_node() {
+            assert_eq!(bench.read(communication, 1), Err(NO_OBJECT), "{pdo:?}");
+            assert_eq!(bench.read(mapping, 0), Err(NO_OBJECT), "{pdo:?}");
+            continue;
+        }
+        assert_eq!(number(&mut bench, communication, 1), cob_id(&pdo), "{pdo:?}");
+        assert_eq!([2, 5].map(|sub| number(&mut bench, communication, sub)), [255, 0]);
+        assert_eq!(bench.read(communication, 3).is_ok(), pdo.is_produced);
+        assert_eq!(number(&mut bench, mapping, 0), pdo.count().into());
+        for (sub, entry) in (1..).zip(pdo.entries()) {
+            assert_eq!(number(&mut bench, mapping, sub), entry, "{pdo:?}");
+        }
+        count += 1;
+    }
+    assert_eq!(count, 7 + 8);
+}
+
+/// The profile's CAN-IDs lie inside the pre-defined connection set of CiA 301, so the node has nothing of that set.
+#[test]
+fn there_is_no_other_pdo() {
+    let known: BTreeSet<u16> = pdos().flat_map(|pdo| [pdo.communication, pdo.mapping]).collect();
+    let mut bench = lift();
+    for index in (0x1400..=0x1BFF).filter(|index| !known.contains(index)) {
+        assert_eq!(bench.read(index, 0), Err(NO_OBJECT), "{index:X}h");
+    }
+}
+
+#[test]
+fn can_ids_do_not_change_but_flags_do() {
+    let mut bench = lift();
+    for other in [0x4000_018D_u32, 0x4000_0180, 0x181 + u32::from(ID)] {
+        assert_eq!(bench.write(0x1906, 1, &other.to_le_bytes()), Err(INVALID_VALUE), "{other:X}h");
+    }
+    for flags in [0xC000_0000, 0x8000_0000, 0, 0x4000_0000_u32] {
+        assert_eq!(bench.write(0x1906, 1, &(flags | 0x18C).to_le_bytes()), Ok(()), "{flags:X}h");
+    }
+}
+
+/// Each of them in its TPDO, and what is in none in a multiplexed one. A TPDO that is off keeps what is its.
+#[test]
+fn every_object_that_can_be_mapped_is_sent_on_entering_operational() {
+    let mut bench = lift();
+    bench.sample(&empty_car());
+    bench.take();
+    bench.nmt(1);
+    let frames = bench.take();
+    let mut sent: BTreeSet<(u16, u8)> = frames
+        .iter()
+        .filter(|(id, _)| *id == 0x500 + u16::from(ID))
+        .map(|(_, data)| Mpdo::parse(data[..].try_into().unwrap()).unwrap().at)
+        .map(|at| (at.index, at.sub))
+        .collect();
+    let on =
+        pdos().filter(|pdo| pdo.is_produced && frames.iter().any(|(id, _)| u32::from(*id) == pdo.cob_id(ID)));
+    sent.extend(on.flat_map(|pdo| pdo.objects).map(|(index, sub, _)| (index, sub)));
+    let off = [(0x6383, 2), (0x6383, 3), (0x6383, 4)];
+    let rows = table(Personality::Lift).into_iter().filter(|row| row.mapping == "tpdo");
+    let expected: BTreeSet<_> = rows.map(|row| (row.index, row.sub)).filter(|at| !off.contains(at)).collect();
+    assert_eq!(sent, expected);
+}
+
+/// The rule of the profile for type 255.
+#[test]
+fn a_change_is_sent_at_once_or_with_the_event_timer_only() {
+    let mut bench = operational();
+    assert_eq!(position(&mut bench, 2048), [(0x18C, vec![100, 0, 0, 0])]);
+    assert_eq!(position(&mut bench, 2048), [], "no change");
+    bench.write(0x1906, 5, &20_u16.to_le_bytes()).unwrap();
+    bench.take();
+    let frames: Vec<_> = (1..=100).flat_map(|step| position(&mut bench, 2048 + step * 41)).collect();
+    assert_eq!(frames.len(), 5, "100 changes in 100 ms");
+}
+
+/// 5006h is told, and the PDO with it: the node stays in Operational.
+#[test]
+fn a_broken_load_sensor_is_an_overload_that_is_sent() {
+    let mut bench = operational();
+    bench.write(0x6483, 4, &600_u16.to_le_bytes()).unwrap();
+    bench.sample(&empty_car());
+    bench.take();
+    bench.sample(&RawSample { pressure: 0, ..empty_car() });
+    let frames = bench.take();
+    assert!(frames.contains(&(0x188, vec![OVERLOAD, 0xFF, 0xFF])), "{frames:X?}");
+    let emergency = frames.iter().find(|(id, _)| *id == 0x80 + u16::from(ID)).unwrap();
+    assert_eq!(emergency.1[..2], [0x06, 0x50]);
+    assert_eq!(number(&mut bench, 0x2313, 2), 1);
+}
+
+#[test]
+fn each_button_sends_its_words() {
+    let mut bench = operational();
+    for (sub, word) in (1..).zip([0x11_u8, 0x12, 0x21, 0x22]) {
+        bench.write(0x2320, sub, &[word, 0, 0, 0, 0, 1]).unwrap();
+    }
+    let mut press = |buttons| {
+        bench.buttons = buttons;
+        (0..3).for_each(|_| bench.sample(&empty_car()));
+        let frames = bench.take().into_iter().filter(|(id, _)| *id == 0x480 + u16::from(ID));
+        frames.map(|(_, data)| (data.len(), data[0])).collect::<Vec<_>>()
+    };
+    assert_eq!(press([false, false]), [(6, 0x11)]);
+    assert_eq!(press([true, true]), [(6, 0x12), (6, 0x22)], "one after the other");
+    assert_eq!(press([false, true]), [(6, 0x11)]);
+    assert_eq!(press([false, false]), [(6, 0x21)]);
+}
+
+#[test]
+fn lamps_follow_the_virtual_output_a_multiplexed_pdo_and_a_client() {
+    let mut bench = operational();
+    for (sub, word) in (1..).zip([0x10_u8, 0x11, 0x20, 0x21]) {
+        bench.write(0x2321, sub, &[word, 0, 0, 0, 0, 1]).unwrap();
+    }
+    let output = |bench: &mut Bench, word| {
+        bench.receive(&Frame::new(0x400, &[word, 0, 0, 0, 0, 1]).unwrap());
+        bench.protocol.lamps()
+    };
+    assert_eq!(output(&mut bench, 0x11), [true, false]);
+    assert_eq!(output(&mut bench, 0x21), [true, true]);
+    assert_eq!(output(&mut bench, 0x77), [true, true], "another panel's");
+    assert_eq!(output(&mut bench, 0x10), [false, true]);
+    let at = Multiplexer { index: 0x2322, sub: 1 };
+    let lamp = Mpdo { address: Address::Destination(None), at, data: [1, 0, 0, 0] };
+    bench.receive(&Frame::new(0x503, &lamp.encode()).unwrap());
+    assert_eq!(bench.protocol.lamps(), [true, true]);
+    bench.write(0x6011, 0, &[0x20, 0, 0, 0, 0, 1]).unwrap();
+    assert_eq!(bench.protocol.lamps(), [true, false]);
+}
+
+#[test]
+fn a_position_outlives_a_power_cut_in_which_the_car_has_not_moved() {
+    let mut bench = operational();
+    position(&mut bench, 40_000);
+    let (position, bench) = (number(&mut bench, 0x6383, 1), bench);
+    let mut bench = bench.power_cycled();
+    // The counter of the board starts at 0.
+    bench.encoder.counter = 0;
+    bench.sample(&empty_car());
+    assert_eq!(number(&mut bench, 0x6383, 1), position);
+}
+
+/// What one has stored is the other's: it is that of the input.
+#[test]
+fn the_calibration_is_that_of_the_transmitter() {
+    let mut bench = lift();
+    bench.write(0x2203, 0, b"cali").unwrap();
+    bench.write(0x2200, 2, &4.0e6_f32.to_le_bytes()).unwrap();
+    bench.write(0x2204, 0, b"save").unwrap();
+    bench.write(0x2000, 0, &[Personality::Pressure.number()]).unwrap();
+    let mut bench = bench.power_cycled();
+    assert_eq!(bench.read(0x2200, 2), Ok(4.0e6_f32.to_le_bytes().to_vec()));
+    bench.write(0x2000, 0, &[Personality::Lift.number()]).unwrap();
+    let mut bench = bench.power_cycled();
+    (0..200).for_each(|_| bench.sample(&raw(1.0e5, 298.15)));
+    assert_eq!(number(&mut bench, 0x6480, 1), 400, "10 % of 40 bar, and 100 kg a bar");
+}

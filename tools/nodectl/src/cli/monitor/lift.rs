@@ -1,0 +1,65 @@
+//! `nodectl monitor --lift`: a line for each value in a pre-defined PDO of a lift, whoever sends it.
+
+use std::fmt;
+
+use canopen::sdo::Multiplexer;
+use canopen::{Duration, Instant};
+use serde::Serialize;
+
+use crate::cli::read::place;
+use crate::cli::record::seconds_between;
+use crate::cli::{Failure, Session};
+use crate::lift::{Lift, Reading};
+use crate::value::Value;
+
+/// How long a wait for a frame lasts before the next one begins.
+const PATIENCE: Duration = Duration::from_millis(1000);
+
+/// A value on a line.
+#[derive(Serialize)]
+struct Line {
+    time: f64,
+    can_id: u16,
+    pdo: &'static str,
+    /// `null` where the CAN-ID does not tell it.
+    producer: Option<u8>,
+    #[serde(rename = "object", serialize_with = "place")]
+    at: Multiplexer,
+    name: String,
+    value: Value,
+}
+
+/// Prints so many values.
+pub(super) fn print_lines(session: &mut Session, count: usize) -> Result<(), Failure> {
+    let (lift, mut start, mut left) = (Lift::default(), None, count);
+    while left > 0 {
+        let until = session.network.now() + PATIENCE;
+        let Some(received) = session.network.receive(until)? else { continue };
+        for reading in lift.readings(&received.frame).into_iter().take(left) {
+            let start = *start.get_or_insert(received.at);
+            session.print(&line(received.frame.id(), reading, start, received.at))?;
+            left -= 1;
+        }
+    }
+    Ok(())
+}
+
+fn line(can_id: u16, reading: Reading, start: Instant, now: Instant) -> Line {
+    let Reading { pdo, producer, at, name, value } = reading;
+    Line { time: seconds_between(start, now), can_id, pdo, producer, at, name, value }
+}
+
+impl fmt::Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Line { time, can_id, pdo, producer, at, name, value } = self;
+        write!(f, "{time:10.6} {can_id:03X}h {pdo}")?;
+        if let Some(producer) = producer {
+            write!(f, " of node {producer}")?;
+        }
+        // An object that nobody knows has an address all the same.
+        match name.as_str() {
+            "" => write!(f, ": {:04X}h:{} = {value}", at.index, at.sub),
+            name => write!(f, ": {name} = {value}"),
+        }
+    }
+}
