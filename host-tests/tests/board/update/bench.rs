@@ -63,6 +63,13 @@ impl Bench {
         self.world.machine(0)
     }
 
+    /// How long something takes, in seconds.
+    pub(super) fn time(&mut self, what: impl FnOnce(&mut Bench)) -> f64 {
+        let before = self.world.now();
+        what(self);
+        self.world.now().since(before).as_secs_f64()
+    }
+
     pub(super) fn power_cycle(&mut self) {
         let now = self.world.now();
         self.machine().power_off();
@@ -131,11 +138,16 @@ impl Bench {
         self.identification_of_running()
     }
 
+    /// Whether a program runs and says so.
+    pub(super) fn is_running(&mut self) -> bool {
+        self.read(CONTROL) == Ok(vec![1])
+    }
+
     /// The identification of the program once it runs, within ten seconds.
     pub(super) fn identification_of_running(&mut self) -> u32 {
         for _ in 0..100 {
             self.run(Time::from_millis(100));
-            if self.read(CONTROL) == Ok(vec![1]) {
+            if self.is_running() {
                 return self.word(IDENTIFICATION);
             }
         }
@@ -203,8 +215,12 @@ pub(super) fn version_b(length: usize) -> Image {
 
 /// Code that was never meant to run, in an image that is good but for the change.
 pub(super) fn signed(code: Vec<u8>, change: impl FnOnce(&mut Description)) -> Image {
-    let mut about =
-        Description { product: product::PRODUCT, hardware: product::HARDWARE, version: VERSION_B, counter: 0 };
+    let mut about = Description {
+        product: product::PRODUCT,
+        hardware: product::HARDWARE,
+        version: VERSION_B,
+        counter: 0,
+    };
     change(&mut about);
     Image::sign(about, code, &sign::key::development()).unwrap()
 }

@@ -72,14 +72,20 @@ fn boards(count: u8) -> Shared {
 }
 
 /// `nodectl update`, forced, as A is the older version.
-fn run(world: &Shared, nodes: &[NodeId], image: &sign::image::Image, watcher: &mut dyn Watcher) -> Vec<Outcome> {
+fn run(
+    world: &Shared,
+    nodes: &[NodeId],
+    image: &sign::image::Image,
+    watcher: &mut dyn Watcher,
+) -> Vec<Outcome> {
     let master = Master::join(&mut world.borrow_mut());
     let port = master.port;
     let mut adapter = Some(Adapter { world: Rc::clone(world), master });
     let open = move || Ok(Box::new(adapter.take().expect("the bus is opened once")) as Box<dyn Bus>);
     let mut network = Network::open(open).unwrap();
     let image = Image::parse(image.to_bytes()).unwrap();
-    let options = Options { sdo: sdo::Options::default(), patience: Duration::from_millis(20_000), force: true };
+    let options =
+        Options { sdo: sdo::Options::default(), patience: Duration::from_millis(20_000), force: true };
     let results = update(&mut network, nodes, &image, &options, watcher);
     world.borrow_mut().close_port(port);
     let outcome = |(node, result): (NodeId, Result<Outcome, Error>)| {
