@@ -13,6 +13,7 @@ mod sim;
 mod steps;
 mod target;
 mod test;
+mod timing;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -53,6 +54,8 @@ enum Command {
     Fuzz(fuzz::Flags),
     /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
     Bench(bench::Options),
+    /// Print what each task of the firmware takes at worst, and when it ends at the latest
+    Timing,
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
     Test {
         /// Run only the steps whose name contains this text
@@ -70,6 +73,7 @@ fn main() -> ExitCode {
         Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
+        Command::Timing => timing::print().map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {

@@ -7,7 +7,6 @@ use canopen::dictionary::Group;
 use canopen::sdo::Abort;
 use canopen::{Instant, Job, Selection, Transmit};
 use embedded_storage::nor_flash::ReadNorFlash;
-use heapless::Vec;
 use storage::View;
 
 impl Protocol {
@@ -17,36 +16,22 @@ impl Protocol {
         profile.stored.load(layout(profile.setup.personality), view);
     }
 
-    /// Packs the job that `Request::Store` announced, with the values of this moment. `false` when there is none.
+    /// Takes the job that `Request::Store` announced, with the values of this moment. `false` when there is none. The
+    /// values are only copied: to pack them takes half a millisecond, in which nobody should have to wait for the protocol.
     pub fn pack(&mut self, parcel: &mut Parcel) -> bool {
+        let profile = self.device.application();
         parcel.job = self.job.take();
-        parcel.layout = layout(self.device.application().setup.personality);
+        parcel.personality = profile.setup.personality;
+        parcel.node_id = self.device.node_id();
         match parcel.job {
             None => return false,
-            Some(Job::Save(selection)) => {
-                self.pack_group(Group::Communication, selection, &mut parcel.communication);
-                self.pack_group(Group::Application, selection, &mut parcel.application);
-                self.pack_group(Group::Calibration, selection, &mut parcel.calibration);
-            }
-            Some(Job::Restore(_)) => {
-                parcel.communication.clear();
-                parcel.application.clear();
-                parcel.calibration.clear();
-            }
+            Some(Job::Save(_)) => parcel.image = *self.device.image(),
+            Some(Job::Restore(_)) => {}
             Some(job @ (Job::Configure(_) | Job::Set(_))) => {
-                parcel.device = self.device.application().configured.after(job).encode();
+                parcel.device = profile.configured.after(job).encode();
             }
         }
         true
-    }
-
-    fn pack_group<const N: usize>(&self, group: Group, selection: Selection, out: &mut Vec<u8, N>) {
-        out.clear();
-        if selection.contains(group) {
-            let dictionary = self.device.application().definition().dictionary;
-            // The buffers are as large as the largest dictionary needs: `profile` computes them from the tables.
-            let _ = dictionary.pack(group, self.device.node_id(), self.device.image(), out);
-        }
     }
 
     /// The job of the parcel is done or has failed: the next reset finds what is stored now, and the client is answered.

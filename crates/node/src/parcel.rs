@@ -1,10 +1,11 @@
 //! What travels to the parameter store: a copy of the values, so that nothing is locked while they are written.
 
-use crate::profile::{APPLICATION_SIZE, CALIBRATION_SIZE, COMMUNICATION_SIZE};
-use crate::stored::CALIBRATION_LAYOUT;
-use canopen::Job;
+use crate::Personality;
+use crate::profile::{APPLICATION_SIZE, CALIBRATION_SIZE, COMMUNICATION_SIZE, IMAGE_SIZE};
+use crate::stored::{CALIBRATION_LAYOUT, layout};
 use canopen::dictionary;
 use canopen::sdo::Abort;
+use canopen::{Job, NodeId, Selection};
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
 use storage::{Change, DeviceRecord, Error, Group, Store};
@@ -23,8 +24,10 @@ const SAVED: [(Group, dictionary::Group); GROUPS] = [
 #[derive(Debug)]
 pub struct Parcel {
     pub(crate) job: Option<Job>,
-    /// Of the packed values, but for the calibration.
-    pub(crate) layout: u16,
+    pub(crate) personality: Personality,
+    pub(crate) node_id: Option<NodeId>,
+    /// The values of all objects.
+    pub(crate) image: [u8; IMAGE_SIZE],
     pub(crate) device: [u8; DeviceRecord::LEN],
     pub(crate) communication: Vec<u8, COMMUNICATION_SIZE>,
     pub(crate) application: Vec<u8, APPLICATION_SIZE>,
@@ -37,7 +40,9 @@ impl Parcel {
     pub const fn new() -> Parcel {
         Parcel {
             job: None,
-            layout: 0,
+            personality: Personality::Pressure,
+            node_id: None,
+            image: [0; IMAGE_SIZE],
             device: [0; DeviceRecord::LEN],
             communication: Vec::new(),
             application: Vec::new(),
@@ -50,7 +55,8 @@ impl Parcel {
     /// # Errors
     /// What to tell the client: `Hardware` when the flash has failed, `DeviceState` when there is no room left until the
     /// node is restarted.
-    pub fn deliver<F: NorFlash>(&self, store: &mut Store<F>) -> Result<(), Abort> {
+    pub fn deliver<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
+        self.pack();
         let changes: Vec<Change<'_>, GROUPS> = match self.job {
             None => Vec::new(),
             Some(Job::Configure(_) | Job::Set(_)) => some([Some(self.change(Group::Device))]),
@@ -67,11 +73,24 @@ impl Parcel {
         })
     }
 
+    /// Packs what is saved; of what is restored there is nothing to pack.
+    fn pack(&mut self) {
+        self.communication.clear();
+        self.application.clear();
+        self.calibration.clear();
+        if let Some(Job::Save(selection)) = self.job {
+            let values = Values { personality: self.personality, node_id: self.node_id, image: &self.image };
+            values.pack(dictionary::Group::Communication, selection, &mut self.communication);
+            values.pack(dictionary::Group::Application, selection, &mut self.application);
+            values.pack(dictionary::Group::Calibration, selection, &mut self.calibration);
+        }
+    }
+
     fn change(&self, group: Group) -> Change<'_> {
         match group {
             Group::Calibration => set(group, CALIBRATION_LAYOUT, &self.calibration),
-            Group::Application => set(group, self.layout, &self.application),
-            Group::Communication => set(group, self.layout, &self.communication),
+            Group::Application => set(group, layout(self.personality), &self.application),
+            Group::Communication => set(group, layout(self.personality), &self.communication),
             Group::Device => set(group, DeviceRecord::VERSION, &self.device),
         }
     }
@@ -80,6 +99,23 @@ impl Parcel {
 impl Default for Parcel {
     fn default() -> Parcel {
         Parcel::new()
+    }
+}
+
+/// What is packed.
+struct Values<'a> {
+    personality: Personality,
+    node_id: Option<NodeId>,
+    image: &'a [u8],
+}
+
+impl Values<'_> {
+    fn pack<const N: usize>(&self, group: dictionary::Group, selection: Selection, out: &mut Vec<u8, N>) {
+        if selection.contains(group) {
+            let dictionary = self.personality.definition().dictionary;
+            // The buffers are as large as the largest dictionary needs: `profile` computes them from the tables.
+            let _ = dictionary.pack(group, self.node_id, self.image, out);
+        }
     }
 }
 

@@ -155,6 +155,11 @@ impl<P: Peripherals + 'static> Machine<P> {
         &self.cpu.get_data().stats
     }
 
+    /// Forgets the worst activation and latency of every exception: what comes now is judged by itself.
+    pub fn forget_worst(&mut self) {
+        self.cpu.get_data_mut().stats.forget_worst();
+    }
+
     /// Counts how often each block of code runs, from now on or no longer.
     pub fn set_profiling(&mut self, on: bool) {
         self.cpu.get_data_mut().profile.is_on = on;

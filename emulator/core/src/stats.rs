@@ -92,6 +92,14 @@ impl Stats {
         &self.exceptions[usize::from(exception.0)]
     }
 
+    pub(crate) fn forget_worst(&mut self) {
+        for activity in &mut self.exceptions {
+            activity.worst_instructions = 0;
+            activity.worst_cycles = 0;
+            activity.worst_latency = Time::ZERO;
+        }
+    }
+
     pub(crate) fn ran(&mut self, instructions: u32, cycles: u32) {
         self.instructions += u64::from(instructions);
         self.cycles += u64::from(cycles);

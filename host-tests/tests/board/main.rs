@@ -7,4 +7,5 @@ mod faults;
 mod measuring;
 mod running;
 mod support;
+mod timing;
 mod update;

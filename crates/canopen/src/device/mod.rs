@@ -142,7 +142,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// The values of all objects.
     #[must_use]
-    pub fn image(&self) -> &[u8] {
+    pub fn image(&self) -> &[u8; N] {
         &self.core.image
     }
 

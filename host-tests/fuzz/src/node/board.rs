@@ -3,7 +3,9 @@
 use canopen::dictionary::Object;
 use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
 use eds::DEVICES;
-use node::{BitRate, Measurement, Parcel, Personality, Protocol, RawEncoder, Request, Setup, Start, State};
+use node::{
+    BitRate, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample, Request, Setup, Start, State,
+};
 use storage::{DeviceRecord, Pages, Store, View};
 
 use super::flash::{Flash, PAGE};
@@ -102,6 +104,10 @@ impl Board {
         self.start();
     }
 
+    fn kept(&self) -> Start {
+        self.measurement.kept().map_or(Start::First, Start::Kept)
+    }
+
     fn start(&mut self) {
         self.out.waiting.clear();
         self.protocol.start(self.now, &mut self.out);
@@ -147,14 +153,14 @@ impl Board {
             Step::Service { place, data } => self.receive(pick(&self.filters[1], place), 8, false, data),
             Step::Frame { id, len, remote, data } => self.receive(id, len, remote, data),
             Step::Lss(data) => self.receive(0x7E5, 8, false, data),
-            Step::Sample { pressure, supply, temperature, vrefint, encoder } => {
-                self.sample(&raw(pressure, supply, temperature, vrefint), encoder);
+            Step::Sample { pressure, supply, temperature, vrefint, encoder, buttons } => {
+                self.sample(&raw(pressure, supply, temperature, vrefint), encoder, buttons);
             }
             Step::Bus(report) => self.protocol.bus_event(report.into(), self.now, &mut self.out),
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
             Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
-            Step::PowerCycle => self.power_on(Start::Kept(self.measurement.kept())),
+            Step::PowerCycle => self.power_on(self.kept()),
             Step::PowerCut { after } => self.flash.cut_after(after),
         }
         self.settle();
@@ -186,13 +192,13 @@ impl Board {
         }
     }
 
-    fn sample(&mut self, raw: &node::RawSample, encoder: u16) {
+    fn sample(&mut self, raw: &RawSample, encoder: u16, buttons: [bool; 2]) {
         self.now = self.now + Duration::from_millis(1);
         if let Some(parameters) = self.protocol.take_parameters() {
             self.measurement.apply(&parameters);
         }
         let shaft = RawEncoder { counter: encoder, ..RawEncoder::default() };
-        let snapshot = self.measurement.sample(raw, &shaft);
+        let snapshot = self.measurement.sample(raw, &shaft, buttons);
         self.protocol.publish(&snapshot, self.now, &mut self.out);
     }
 
@@ -219,7 +225,7 @@ impl Board {
             let Some(request) = self.protocol.take_request() else { return };
             match request {
                 Request::ResetNode | Request::Bootloader => {
-                    self.power_on(Start::Kept(self.measurement.kept()));
+                    self.power_on(self.kept());
                 }
                 Request::ResetCommunication => self.start(),
                 Request::Filters => {

@@ -23,7 +23,7 @@ pub(super) enum Step {
     /// An LSS request.
     Lss([u8; 8]),
     /// A millisecond with other readings.
-    Sample { pressure: u32, supply: u32, temperature: u32, vrefint: u32, encoder: u16 },
+    Sample { pressure: u32, supply: u32, temperature: u32, vrefint: u32, encoder: u16, buttons: [bool; 2] },
     /// A report of the CAN controller.
     Bus(Report),
     /// The next deadline comes.

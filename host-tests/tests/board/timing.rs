@@ -1,0 +1,188 @@
+//! The response-time analysis of the tasks: what each took at worst on the emulated board, and how late it can end.
+//!
+//! A task of priority p ends at the latest after R = B + C + sum over the tasks of higher priority of ceil(R / T) C,
+//! for the C and the least time between two activations T of each (Audsley and others, 1993). C is the worst that was
+//! measured in a busy run. B is what a task of lower priority can hold it up: a word that the flash programs, at the
+//! longest that the data sheet allows, and the longest time from its interrupt to its first instruction in that run.
+//! In the latter are the locks of RTIC; tasks of higher priority are, too, and so count twice.
+
+use canbus::Time;
+use emulator::Exception;
+use sim::world::World;
+
+use crate::support::{Master, SECOND, START_ALL, SYNC, world};
+
+/// HCLK in cycles per microsecond.
+const CYCLES: f64 = 144.0;
+/// The core stands still while the flash programs a word: the longest time of RM0390's data sheet, table 49, in us.
+const FLASH: f64 = 100.0;
+/// The shortest frame and the shortest of eight bytes at 1 Mbit/s, with the intermission, in us.
+const SHORTEST_FRAME: f64 = 47.0;
+const FULL_FRAME: f64 = 111.0;
+/// 1010h:1, save all parameters.
+const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
+/// How long the busy run takes.
+const SPAN: u64 = 3000;
+
+/// What is known of a task before it is measured.
+struct Task {
+    name: &'static str,
+    priority: u8,
+    irqs: &'static [u8],
+    /// Least time between two activations, in us.
+    period: f64,
+    /// When it must have ended after it was asked for, in us.
+    deadline: f64,
+    /// What the deadline is.
+    reason: &'static str,
+}
+
+/// The tasks of the firmware, the most urgent first (docs/architecture.md).
+const TASKS: [Task; 6] = [
+    Task {
+        name: "receive",
+        priority: 6,
+        irqs: &[20, 21],
+        period: SHORTEST_FRAME,
+        deadline: 3.0 * SHORTEST_FRAME,
+        reason: "the FIFO holds three frames",
+    },
+    Task {
+        name: "sample",
+        priority: 5,
+        irqs: &[56],
+        period: 1000.0,
+        deadline: 1000.0,
+        reason: "the DMA controller fills the other half",
+    },
+    Task {
+        name: "transmit",
+        priority: 4,
+        irqs: &[19],
+        period: SHORTEST_FRAME,
+        deadline: 1000.0,
+        reason: "three frames wait in the mailboxes meanwhile",
+    },
+    Task {
+        name: "process",
+        priority: 3,
+        irqs: &[28],
+        period: FULL_FRAME,
+        deadline: 1000.0,
+        reason: "a PDO is at most a millisecond late",
+    },
+    Task {
+        name: "serve",
+        priority: 2,
+        irqs: &[22],
+        period: 1000.0,
+        deadline: 20_000.0,
+        reason: "a client waits for its answer",
+    },
+    Task {
+        name: "keep",
+        priority: 1,
+        irqs: &[49],
+        period: 1_000_000.0,
+        deadline: 1_000_000.0,
+        reason: "the client of a save waits a second",
+    },
+];
+
+/// What was measured of a task, in us and instructions.
+struct Measured {
+    entries: u64,
+    instructions: u64,
+    worst: f64,
+    latency: f64,
+}
+
+fn measure(world: &mut World, task: &Task) -> Measured {
+    let stats = world.machine(0).stats();
+    let all = || task.irqs.iter().map(|&irq| stats.of(Exception::irq(irq)));
+    let cycles = all().map(|activity| activity.worst_cycles).max().unwrap_or(0);
+    Measured {
+        entries: all().map(|activity| activity.entries).sum(),
+        instructions: all().map(|activity| activity.worst_instructions).max().unwrap_or(0),
+        worst: cycles as f64 / CYCLES,
+        latency: all().map(|activity| activity.worst_latency.as_secs_f64() * 1e6).fold(0.0, f64::max),
+    }
+}
+
+/// R of the task at this place, or `None` when it has no end before the deadline.
+fn response(tasks: &[(Task, Measured)], place: usize) -> Option<f64> {
+    let (task, own) = &tasks[place];
+    let blocking = FLASH + own.latency;
+    let mut response = blocking + own.worst;
+    loop {
+        let others = tasks[..place].iter();
+        let preempted: f64 = others.map(|(higher, its)| (response / higher.period).ceil() * its.worst).sum();
+        let next = blocking + own.worst + preempted;
+        if next > task.deadline {
+            return None;
+        }
+        if next <= response {
+            return Some(response);
+        }
+        response = next;
+    }
+}
+
+/// As much as the bus can carry: every TPDO with every SYNC, RPDOs, SDO transfers, a save, and frames of others.
+fn busy_run() -> World {
+    let mut world = world("--node 1:combined --bitrate 1000 --load 100");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    for tpdo in 0..4 {
+        master.ask(&mut world, 1, &[0x2F, tpdo, 0x18, 2, 1, 0, 0, 0]);
+    }
+    master.send(&mut world, START_ALL.0, &START_ALL.1);
+    world.run_until(world.now() + SECOND);
+    world.machine(0).forget_worst();
+    for millisecond in 0..SPAN {
+        if millisecond == SPAN / 2 {
+            master.send(&mut world, 0x601, &SAVE);
+        }
+        master.send(&mut world, SYNC, &[]);
+        master.send(&mut world, 0x201, &[millisecond as u8; 8]);
+        let long = millisecond % 4 == 0;
+        let upload = if long {
+            [0x40, 0x08, 0x10, 0, 0, 0, 0, 0]
+        } else {
+            [0x60 | ((millisecond as u8 & 1) << 4), 0, 0, 0, 0, 0, 0, 0]
+        };
+        master.send(&mut world, 0x601, &upload);
+        world.run_until(world.now() + Time::from_millis(1));
+    }
+    world
+}
+
+#[test]
+fn every_task_ends_before_its_deadline() {
+    let mut world = busy_run();
+    let tasks: Vec<(Task, Measured)> =
+        TASKS.into_iter().map(|task| (measure(&mut world, &task), task)).map(|(m, task)| (task, m)).collect();
+    println!(
+        "| task | priority | runs | worst, instructions | worst, us | begins late, us | period, us | response, us | deadline, us | why |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    for place in 0..tasks.len() {
+        let (task, own) = &tasks[place];
+        let response = response(&tasks, place);
+        println!(
+            "| {} | {} | {} | {} | {:.1} | {:.1} | {:.0} | {} | {:.0} | {} |",
+            task.name,
+            task.priority,
+            own.entries,
+            own.instructions,
+            own.worst,
+            own.latency,
+            task.period,
+            response.map_or("late".into(), |response| format!("{response:.1}")),
+            task.deadline,
+            task.reason
+        );
+        assert!(own.entries > 0, "{} has hardly run", task.name);
+    }
+    assert!((0..tasks.len()).all(|place| response(&tasks, place).is_some()), "a task can be late");
+}
