@@ -11,6 +11,12 @@ use crate::support::SECOND;
 
 /// Where B leaves its mark when it runs: its own address, in RAM that the bootloader does not use.
 const MARK: u32 = 0x2001_0000;
+/// Never comes.
+const NO_CUT: u64 = u64::MAX >> 1;
+/// The operations of a copy: two sectors, the program, the mark that it is done.
+const COPY: u64 = 2 + 133 + 1;
+/// Of so many cuts in the copy, two are followed by another one.
+const SECOND_CUTS: u64 = 7;
 /// The longest that a recovery takes: two erases, and a start.
 const PATIENCE: u32 = 200;
 
@@ -66,14 +72,17 @@ impl Victim {
         bench.machine().peripherals_mut().flash_mut().operations() - before
     }
 
-    /// Switches the power on, with another cut in the recovery if there is to be one, and waits for what runs in the end.
-    fn recover(&mut self, second: Option<u64>) -> Option<Runs> {
-        if let Some(second) = second {
-            self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(second);
-            self.bench.power_cycle();
-            self.bench.run(SECOND * 2);
-        }
-        self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(u64::MAX >> 1);
+    /// Switches the power on, with another cut in the recovery. Whether it came to that operation.
+    fn cut_again(&mut self, second: u64) -> bool {
+        self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(second);
+        self.bench.power_cycle();
+        self.bench.run(SECOND * 2);
+        self.bench.machine().next_event() == Time::NEVER
+    }
+
+    /// Switches the power on for good, and waits for what runs in the end.
+    fn recover(&mut self) -> Option<Runs> {
+        self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(NO_CUT);
         self.bench.power_cycle();
         self.wait()
     }
@@ -111,29 +120,30 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
 
 /// Cuts at every operation whose number has this rest by two, so that two threads share the work.
 fn cut_everywhere(rest: u64) {
-    const SECOND_CUTS: u64 = 7;
     let mut victim = Victim::new();
-    let all = victim.update(u64::MAX >> 1);
-    assert_eq!(victim.recover(None), Some(Runs::B), "without a cut");
+    let all = victim.update(NO_CUT);
+    assert_eq!(victim.recover(), Some(Runs::B), "without a cut");
     let (mut runs, mut twice) = ([0; 2], 0);
     victim.restore();
     for cut in (1..=all).filter(|cut| cut % 2 == rest) {
         victim.update(cut);
-        let second = (cut % SECOND_CUTS < 2).then(|| 1 + cut * 37 % 140);
-        twice += usize::from(second.is_some());
-        let Some(found) = victim.recover(second) else { panic!("cut {cut} of {all}, then {second:?}") };
+        let second = 1 + cut * 37 % COPY;
+        if cut > all / 2 && cut % SECOND_CUTS < 2 {
+            twice += usize::from(victim.cut_again(second));
+        }
+        let Some(found) = victim.recover() else { panic!("cut {cut} of {all}, perhaps then {second}") };
         runs[found as usize] += 1;
         if found == Runs::B {
             victim.restore();
         }
     }
     println!(
-        "{} cuts of {all} operations, {twice} of them with a second one: {} times A, {} times B",
+        "{} cuts in an update of {all} operations, {twice} of them with a second one: {} times A, {} times B",
         runs[0] + runs[1],
         runs[0],
         runs[1]
     );
-    assert!(runs[0] > 60 && runs[1] > 60);
+    assert!(runs[0] > 60 && runs[1] > 60 && twice > 10);
 }
 
 #[test]
