@@ -2,9 +2,8 @@
 
 use canbus::Time;
 use chip::Peripherals;
-use sim::world::World;
 
-use crate::support::{SECOND, run, world};
+use crate::support::{SECOND, comes_back, run, running};
 
 /// The first word of RAM, below which the stack must not grow.
 const RAM: u32 = 0x2000_0000;
@@ -18,27 +17,6 @@ const UNEXPECTED_RESET: u16 = 0x6101;
 /// Stack pointer and program counter.
 const SP: u8 = 13;
 const PC: u8 = 15;
-
-/// A node that has run for a second, its log taken.
-fn running() -> World {
-    let mut world = world("--bitrate 1000");
-    world.run_until(SECOND);
-    world.take_log();
-    world
-}
-
-/// What the node says when it runs on for a second, in which it must boot once more and measure again.
-fn comes_back(world: &mut World) -> String {
-    let before = world.summary(1.0, 0);
-    let after = run(world, SECOND);
-    let (before, after) = (&before.nodes[0], &after.nodes[0]);
-    let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
-    let log = log.join("\n");
-    assert_eq!(after.heard.boot_ups, before.heard.boot_ups + 1, "it boots once more: {log}");
-    assert!(after.sampling.samples > before.sampling.samples + 600, "it measures again: {log}");
-    assert!(after.heard.process_value.is_some(), "it sends again: {log}");
-    log
-}
 
 #[test]
 fn a_stack_overflow_ends_in_a_recorded_reset() {

@@ -1,5 +1,7 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
 
+mod bus_faults;
+mod chip_faults;
 mod configuring;
 mod differential;
 mod encoder;

@@ -51,6 +51,27 @@ pub(crate) fn world(flags: &str) -> World {
     sim::setup::world(&options).unwrap()
 }
 
+/// A node that has run for a second, its log taken.
+pub(crate) fn running() -> World {
+    let mut world = world("--bitrate 1000");
+    world.run_until(SECOND);
+    world.take_log();
+    world
+}
+
+/// What the node says when it runs on for a second, in which it must boot once more and measure again.
+pub(crate) fn comes_back(world: &mut World) -> String {
+    let before = world.summary(1.0, 0);
+    let after = run(world, SECOND);
+    let (before, after) = (&before.nodes[0], &after.nodes[0]);
+    let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
+    let log = log.join("\n");
+    assert_eq!(after.heard.boot_ups, before.heard.boot_ups + 1, "it boots once more: {log}");
+    assert!(after.sampling.samples > before.sampling.samples + 600, "it measures again: {log}");
+    assert!(after.heard.process_value.is_some(), "it sends again: {log}");
+    log
+}
+
 pub(crate) fn frame(id: u16, bytes: &[u8]) -> Frame {
     Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
 }

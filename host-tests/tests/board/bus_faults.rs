@@ -1,0 +1,96 @@
+//! Others on the bus fail, or there is too much on it.
+
+use canbus::{Fault, Position, SeenBy, Time};
+use chip::Peripherals;
+
+use crate::support::{Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, run, running, world};
+
+/// Interrupt enable of CAN1 (RM0390, 30.9.2).
+const CAN1_IER: u32 = 0x4000_6414;
+/// EMCY codes (CiA 301, table 26).
+const OVERRUN: u16 = 0x8110;
+const PASSIVE: u16 = 0x8120;
+/// Errors in a row that make a transmitter passive, and that switch it off: 8 each, above 127 and 255.
+const ENOUGH_TO_BE_PASSIVE: u64 = 17;
+
+/// The EMCY codes that a node sends while this happens.
+fn emergencies(world: &mut sim::world::World, master: &Master, span: Time) -> Vec<u16> {
+    master.heard(world, 0x081);
+    world.run_until(world.now() + span);
+    let heard = master.heard(world, 0x081);
+    heard.iter().map(|frame| u16::from_le_bytes([frame.bytes()[0], frame.bytes()[1]])).collect()
+}
+
+/// The receive interrupts are held up for 20 ms: what the FIFO cannot hold is lost, and is told.
+#[test]
+fn frames_that_the_fifo_loses_are_told() {
+    let mut world = running();
+    let master = Master::join(&mut world);
+    let now = world.machine(0).now();
+    let enabled = world.machine(0).peripherals_mut().read(CAN1_IER, 4, now).unwrap();
+    world.machine(0).peripherals_mut().write(CAN1_IER, 4, 0, now).unwrap();
+    for _ in 0..10 {
+        master.send(&mut world, SDO_REQUEST, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    }
+    world.run_until(world.now() + Time::from_millis(20));
+    let now = world.machine(0).now();
+    world.machine(0).peripherals_mut().write(CAN1_IER, 4, enabled, now).unwrap();
+    let codes = emergencies(&mut world, &master, SECOND);
+    assert!(codes.contains(&OVERRUN), "{codes:04X?}");
+    assert_eq!(codes.last(), Some(&0), "and that it is over: {codes:04X?}");
+    master.send(&mut world, SDO_REQUEST, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    world.run_until(world.now() + Time::from_millis(20));
+    assert_eq!(master.heard(&mut world, SDO_RESPONSE).len(), 1, "it answers again");
+}
+
+/// The next frames are destroyed, too few for bus-off.
+#[test]
+fn an_error_passive_node_tells_it() {
+    let mut world = running();
+    let master = Master::join(&mut world);
+    let next = world.bus().frames();
+    for frame in next..next + ENOUGH_TO_BE_PASSIVE {
+        let fault = Fault { frame, position: Position::Bit(30), seen_by: SeenBy::Everyone };
+        world.bus().faults.schedule(fault);
+    }
+    let codes = emergencies(&mut world, &master, SECOND * 5);
+    assert_eq!(codes.first(), Some(&PASSIVE), "{codes:04X?}");
+    let after = run(&mut world, SECOND);
+    assert_eq!(after.nodes[0].heard.boot_ups, 1, "{after}");
+}
+
+/// Somebody with another bit rate destroys what is on the bus until it is bus-off itself; the node outlives it.
+#[test]
+fn a_participant_with_a_wrong_bit_rate_is_outlived() {
+    let mut world = running();
+    let stranger = Master::join_at(&mut world, 500_000);
+    for _ in 0..20 {
+        stranger.send(&mut world, 0x123, &[0x55; 8]);
+    }
+    let during = run(&mut world, SECOND * 2);
+    assert!(during.bus.errors > 20, "{during}");
+    world.close_port(stranger.port);
+    let before = run(&mut world, SECOND * 5).nodes[0].heard.clone();
+    let after = run(&mut world, SECOND * 5);
+    assert_eq!(after.nodes[0].heard.heartbeats - before.heartbeats, 5, "{after}");
+    assert_eq!(after.nodes[0].heard.boot_ups, 1, "{after}");
+    assert!(after.nodes[0].incidents.is_empty(), "{after}");
+}
+
+/// A babbling node leaves no gap on the bus for half a minute: what the node wants to send waits, and nothing is lost but
+/// the time.
+#[test]
+fn a_node_on_a_full_bus_keeps_measuring() {
+    let mut world = world("--bitrate 1000 --load 100");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    master.send(&mut world, START_ALL.0, &START_ALL.1);
+    let before = run(&mut world, SECOND).nodes[0].clone();
+    let after = run(&mut world, SECOND * 30);
+    let node = &after.nodes[0];
+    assert!(after.bus.load > 0.99, "{after}");
+    assert_eq!(node.sampling.samples - before.sampling.samples, 30_000, "{after}");
+    assert_eq!(node.heard.heartbeats - before.heard.heartbeats, 30, "{after}");
+    assert_eq!((node.receiving.lost, node.heard.emcys), (0, 0), "{after}");
+    assert!(node.incidents.is_empty(), "{after}");
+}

@@ -1,0 +1,167 @@
+//! The chip fails: a clock, the converter, an interrupt, the flash, the power. The node comes back, or says what is lost.
+
+use canbus::Time;
+use chip::Peripherals;
+use sim::world::World;
+
+use crate::support::{Master, SECOND, comes_back, run, running, world};
+
+/// Timer 2, the time base: its counter (RM0390, 17.4.10) and its interrupt.
+const TIM2_CNT: u32 = 0x4000_0024;
+const TIM2: u32 = 28;
+/// The application's vector table (memory.x), and an instruction that never ends.
+const VECTORS: u32 = 0x0801_0200;
+const BRANCH_TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
+/// Control register 2 of the converter: 0 switches it off (RM0390, 13.13.3).
+const ADC1_CR2: u32 = 0x4001_2008;
+/// The parameter pages (memory.x).
+const PAGE: u32 = 0x0800_8000;
+const PAGE_SIZE: u32 = 0x4000;
+const HSE: u64 = 8_000_000;
+/// SDO abort code for a failure of the hardware (CiA 301, table 22).
+const HARDWARE: u32 = 0x0606_0000;
+
+fn poke(world: &mut World, register: u32, value: u32) {
+    let now = world.machine(0).now();
+    world.machine(0).peripherals_mut().write(register, 4, value, now).unwrap();
+}
+
+#[test]
+fn a_dead_converter_is_ended_by_the_watchdog() {
+    let mut world = running();
+    poke(&mut world, ADC1_CR2, 0);
+    let log = comes_back(&mut world);
+    assert!(log.contains("reset by independent watchdog"), "{log}");
+}
+
+/// A handler that never ends, as that of an interrupt that nobody can clear: everything below it starves.
+#[test]
+fn an_interrupt_without_end_is_ended_by_the_watchdog() {
+    let mut world = running();
+    let mut vector = [0; 4];
+    world.machine(0).read(VECTORS + 4 * (16 + TIM2), &mut vector).unwrap();
+    let handler = u32::from_le_bytes(vector) & !1;
+    let mut code = [0; 2];
+    world.machine(0).read(handler, &mut code).unwrap();
+    world.machine(0).write(handler, &BRANCH_TO_ITSELF).unwrap();
+    run(&mut world, SECOND);
+    world.machine(0).write(handler, &code).unwrap();
+    let after = run(&mut world, SECOND * 4);
+    let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
+    assert!(log.concat().contains("reset by independent watchdog"), "{log:?}");
+    assert!(after.nodes[0].heard.boot_ups == 2 && after.nodes[0].heard.heartbeats > 1, "{after}");
+}
+
+/// Without the crystal the node never gets on the bus, and the watchdog has it try again and again.
+#[test]
+fn a_node_without_its_clock_is_silent_and_comes_back_with_it() {
+    let mut world = running();
+    world.machine(0).peripherals_mut().set_hse(None);
+    let now = world.now();
+    world.machine(0).power_on(now);
+    let silent = run(&mut world, SECOND * 5).nodes[0].clone();
+    assert_eq!(silent.heard.boot_ups, 1, "the one before");
+    assert!(!silent.incidents.is_empty(), "the watchdog has reset it");
+    world.machine(0).peripherals_mut().set_hse(Some(HSE));
+    let after = run(&mut world, SECOND * 5);
+    assert_eq!(after.nodes[0].heard.boot_ups, 2, "{after}");
+    assert!(after.nodes[0].heard.heartbeats > silent.heard.heartbeats, "{after}");
+}
+
+/// The 32-bit counter of microseconds comes to its half and to its end, as it does every 71 minutes.
+#[test]
+fn the_time_goes_on_where_its_counter_wraps() {
+    let mut world = running();
+    let master = Master::join(&mut world);
+    for before in [0x7FFF_0000, 0xFFFF_0000] {
+        poke(&mut world, TIM2_CNT, before);
+        // The counter has jumped over the deadlines that were set, which time never does: two frames have them set again.
+        master.send(&mut world, 0x000, &[0x80, 1]);
+        master.send(&mut world, 0x601, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]);
+        run(&mut world, SECOND);
+        let before = run(&mut world, SECOND).nodes[0].clone();
+        let after = run(&mut world, SECOND * 5).nodes[0].clone();
+        assert_eq!(after.heard.heartbeats - before.heard.heartbeats, 5, "one a second");
+        assert_eq!(after.sampling.samples - before.sampling.samples, 5000);
+        assert!(after.incidents.is_empty() && after.heard.boot_ups == 1, "{:?}", after.incidents);
+    }
+}
+
+/// The power fails in each phase of a save: the node has what was saved before or what was saved now.
+#[test]
+fn a_save_that_the_power_cuts_is_made_or_not_made() {
+    const OLD: [u8; 4] = [1, 2, 3, 4];
+    const NEW: [u8; 4] = [5, 6, 7, 8];
+    /// Every operation is cut in the tests of the store itself.
+    const STRIDE: u64 = 5;
+    let mut found = [0, 0];
+    let mut operation = 0;
+    loop {
+        let mut world = world("--bitrate 1000");
+        let master = Master::join(&mut world);
+        world.run_until(SECOND);
+        store(&mut world, &master, OLD);
+        let flash = world.machine(0).peripherals_mut().flash_mut();
+        flash.cut_power_at_operation(operation);
+        write(&mut world, &master, NEW);
+        master.send(&mut world, 0x601, &SAVE);
+        world.run_until(world.now() + Time::from_millis(100));
+        let is_saved = !master.heard(&mut world, 0x581).is_empty();
+        let now = world.now();
+        world.machine(0).power_on(now);
+        world.run_until(now + SECOND);
+        let answer = master.ask(&mut world, 1, &[0x40, 0, 0x40, 1, 0, 0, 0, 0]);
+        match &answer[4..] {
+            value if value == OLD => found[0] += 1,
+            value if value == NEW => found[1] += 1,
+            other => panic!("cut at operation {operation}: {other:?}"),
+        }
+        if is_saved {
+            break;
+        }
+        operation += STRIDE;
+    }
+    println!(
+        "cut at {} operations of a save: {found:?} with what was saved before and now",
+        operation / STRIDE
+    );
+    assert!(found[0] > 8 && found[1] > 0, "{found:?}");
+}
+
+/// 1010h:1.
+const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
+
+fn write(world: &mut World, master: &Master, [a, b, c, d]: [u8; 4]) {
+    assert_eq!(master.ask(world, 1, &[0x23, 0, 0x40, 1, a, b, c, d])[0], 0x60);
+}
+
+fn store(world: &mut World, master: &Master, value: [u8; 4]) {
+    write(world, master, value);
+    assert_eq!(master.ask(world, 1, &SAVE)[0], 0x60);
+}
+
+/// Cells that do not take what is programmed: the client is told, and what was saved before stays.
+#[test]
+fn a_flash_that_does_not_take_a_save_is_told() {
+    let mut world = world("--bitrate 1000");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    store(&mut world, &master, [1, 2, 3, 4]);
+    for page in [PAGE, PAGE + PAGE_SIZE] {
+        let mut bytes = vec![0; PAGE_SIZE as usize];
+        let machine = world.machine(0);
+        machine.read(page, &mut bytes).unwrap();
+        let used = bytes.iter().rposition(|&byte| byte != 0xFF).map_or(0, |last| last / 4 * 4 + 4);
+        // Bits that stay 0 whatever is erased; the first words after the last save.
+        bytes[used + 8..used + 64].fill(0xA5);
+        machine.write(page, &bytes).unwrap();
+    }
+    write(&mut world, &master, [5, 6, 7, 8]);
+    let answer = master.ask(&mut world, 1, &SAVE);
+    let code = u32::from_le_bytes(answer[4..].try_into().unwrap());
+    assert_eq!((answer[0], code), (0x80, HARDWARE), "{answer:02x?}");
+    let now = world.now();
+    world.machine(0).power_on(now);
+    world.run_until(now + SECOND * 2);
+    assert_eq!(master.ask(&mut world, 1, &[0x40, 0, 0x40, 1, 0, 0, 0, 0])[4..], [1, 2, 3, 4]);
+}
