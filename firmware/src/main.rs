@@ -41,6 +41,11 @@ const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 /// Pended by whoever has put a frame into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
 
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    bsp::crash::panicked(info.location())
+}
+
 defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
 
 #[rtic::app(device = bsp::pac, peripherals = true)]

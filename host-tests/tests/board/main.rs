@@ -12,3 +12,4 @@ mod measuring;
 mod running;
 mod support;
 mod timing;
+mod update;

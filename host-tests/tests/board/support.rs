@@ -36,6 +36,11 @@ fn images() -> PathBuf {
     dir
 }
 
+/// The ELF file of the application.
+pub(crate) fn firmware() -> Vec<u8> {
+    std::fs::read(images().join("firmware")).unwrap()
+}
+
 /// A world as `cargo sim` with these flags has it, without its sockets.
 pub(crate) fn world(flags: &str) -> World {
     let dir = images();

@@ -127,15 +127,6 @@ impl Board {
     }
 }
 
-/// The LED alone, with the clock as it is after a reset: the bootloader needs no more.
-pub fn led(device: Peripherals) -> Led {
-    let mut rcc = device.RCC.constrain();
-    Led::new(device.GPIOA.split(&mut rcc).pa5)
-}
-
-/// Frequency of the core after a reset, in hertz (HSI).
-pub const RESET_CLOCK_HZ: u32 = 16_000_000;
-
 /// Reads and clears the flags, so that the next reset tells its own cause only.
 fn reset_cause(rcc: &RCC) -> ResetCause {
     let cause = ResetCause::from_csr(rcc.csr().read().bits());
@@ -144,7 +135,7 @@ fn reset_cause(rcc: &RCC) -> ResetCause {
 }
 
 /// Keeps the debug port clocked while the core sleeps: RTT is read then.
-fn keep_debugger(debug: &DBGMCU) {
+pub(super) fn keep_debugger(debug: &DBGMCU) {
     debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 }
 

@@ -160,6 +160,38 @@ impl Transmitter {
     pub fn acknowledge(&mut self) {
         self.0.clear_interrupt_flags();
     }
+
+    /// Whether all mailboxes are empty: everything that was sent is on the wire.
+    pub fn is_idle(&self) -> bool {
+        let status = registers().tsr().read();
+        status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
+    }
+}
+
+/// TIxR: the place of the identifier, a remote frame, and the request to transmit (RM0390, 30.9.3).
+const STID: u32 = 21;
+const RTR: u32 = 1 << 1;
+const TXRQ: u32 = 1 << 0;
+
+impl Transmitter {
+    /// Puts a frame into the first mailbox, if that is free. For whoever uses no other: frames keep their order then.
+    pub fn put(&mut self, frame: &Frame) -> bool {
+        if registers().tsr().read().tme0().bit_is_clear() {
+            return false;
+        }
+        let mailbox = registers().tx(0);
+        let data = frame.data().iter().rev().fold(0, |word: u64, byte| word << 8 | u64::from(*byte));
+        let [low, high] = [data as u32, (data >> 32) as u32];
+        let remote = if frame.is_remote() { RTR } else { 0 };
+        // SAFETY: DLC, data and identifier take any value.
+        unsafe {
+            mailbox.tdtr().write(|w| w.bits(frame.len() as u32));
+            mailbox.tdlr().write(|w| w.bits(low));
+            mailbox.tdhr().write(|w| w.bits(high));
+            mailbox.tir().write(|w| w.bits(u32::from(frame.id()) << STID | remote | TXRQ));
+        }
+        true
+    }
 }
 
 impl Mailboxes for Transmitter {

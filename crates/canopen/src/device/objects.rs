@@ -7,6 +7,8 @@ use crate::sdo::{Abort, Multiplexer, Objects, Readable, Writable};
 use crate::{Duration, Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
+    const BLOCK_UPLOAD: bool = !A::SERVICES_ONLY;
+
     fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort> {
         let entry = self.entry(at)?;
         if !entry.attributes.access.is_readable() {
@@ -14,9 +16,10 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         }
         let stream = stream_of(&entry);
         let bytes = match (entry.rule(), stream) {
+            (_, Some(stream)) => self.content(stream)?,
+            _ if A::SERVICES_ONLY => stored(&entry, &self.image),
             (Rule::ErrorCount, _) => core::slice::from_ref(self.emcy.history().count()),
             (Rule::ErrorEntry, _) => self.emcy.history().error(at.sub).ok_or(Abort::NoData)?,
-            (_, Some(stream)) => self.content(stream)?,
             _ => stored(&entry, &self.image),
         };
         Ok(Readable { bytes, stream })
@@ -102,6 +105,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// Whether the rule of the entry allows the value.
     fn admit(&mut self, entry: &Entry, value: u32, bytes: &[u8]) -> Result<(), Abort> {
         match entry.rule() {
+            Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
+            _ if A::SERVICES_ONLY => Ok(()),
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
             Rule::SyncCobId => sync::check_cob_id(value),
             Rule::SyncOverflow => sync::check_overflow(value, self.number(0x1006, 0)),
@@ -117,7 +122,6 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::PdoInhibit | Rule::PdoSyncStart if self.pdo_is_valid(entry) => Err(Abort::InvalidValue),
             Rule::PdoCount => self.admit_pdo_count(entry, value),
             Rule::PdoSlot => self.admit_pdo_slot(entry, value),
-            Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
             _ => Ok(()),
         }
     }
@@ -128,13 +132,14 @@ impl<A: Application, const N: usize> Core<A, N> {
         match entry.rule() {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
+            Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
+            _ if A::SERVICES_ONLY => (),
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
             }
             Rule::EmcyInhibit => self.emcy.set_inhibit(Duration::from_inhibit(value)),
             Rule::EmcyCobId => self.emcy.configure(value),
-            Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine => self.configure_pdos(now),
             Rule::PdoCobId

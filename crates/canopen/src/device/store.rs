@@ -131,6 +131,9 @@ impl<A: Application, const N: usize> Device<A, N> {
         now: Instant,
         out: &mut impl Transmit,
     ) {
+        if A::SERVICES_ONLY {
+            return self.respond_lss(Slave::stored(false), now, out);
+        }
         match self.core.jobs.begin(Job::Configure(configuration)) {
             Ok(()) => self.core.jobs.lss_waits = true,
             Err(_) => self.respond_lss(Slave::stored(false), now, out),
@@ -184,6 +187,9 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Takes what is stored of a group; where that is damaged or does not fit, the defaults stay as a whole.
     pub(super) fn load_stored(&mut self, group: Group) {
+        if A::SERVICES_ONLY {
+            return;
+        }
         let Stored { packed, is_sound } = self.application.stored(group);
         let fits =
             self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();

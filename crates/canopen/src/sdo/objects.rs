@@ -25,6 +25,10 @@ pub(crate) enum Writable {
 
 /// The dictionary with its values and rules.
 pub(crate) trait Objects {
+    /// Whether there is anything worth an upload in blocks. Without, the code for it is left out of the image, and a client
+    /// takes segments.
+    const BLOCK_UPLOAD: bool = true;
+
     /// The value of an entry.
     fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort>;
     /// How the entry can be written, if it can be at all.

@@ -120,7 +120,7 @@ impl Server {
         response.filter(|_| frame == previous && (is_begin || changes && !self.wants_block_segments()))
     }
 
-    fn dispatch(&mut self, frame: [u8; 8], objects: &mut impl Objects, now: Instant) -> Answer {
+    fn dispatch<O: Objects>(&mut self, frame: [u8; 8], objects: &mut O, now: Instant) -> Answer {
         let is_repeated = frame == self.previous.0;
         match Request::parse(frame).ok_or(Abort::Command)? {
             Request::Upload(at) => self.upload(at, objects),
@@ -133,6 +133,7 @@ impl Server {
             }
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
+            _ if !O::BLOCK_UPLOAD => Err(Abort::Command),
             Request::BlockUpload { at, block_size, threshold, .. } => {
                 self.block_upload(at, block_size, threshold, objects)
             }
