@@ -1,6 +1,6 @@
 //! The objects of the bootloader: communication (CiA 301) and the program (CiA 302-3).
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Object, Rule, Type};
 
 /// Number of the rule of 1F50h:1, program data.
 pub(crate) const DATA: u8 = 0;
@@ -41,11 +41,7 @@ const OBJECTS: [Object; 19] = [
     fixed(0x1F57, 1, "Program 1 flash status", Type::Unsigned32),
 ];
 
-static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
-static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
-const _: () = dictionary::check(&OBJECTS);
-
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-pub(crate) static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+pub(crate) static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);

@@ -3,7 +3,7 @@
 //!
 //! | priority | task | why there |
 //! |---|---|---|
-//! | 2 | `receive_process`, `receive_services` | a FIFO of three places fills in 141 us at 1 Mbit/s |
+//! | 2 | `receive` | a FIFO of three places fills in 141 us at 1 Mbit/s |
 //! | 1 | `wake` | the time base: ends the sleep of `idle` |
 //! | 0 | `idle` | everything else, in steps of a few milliseconds at most; the signature alone takes longer |
 #![no_std]
@@ -42,15 +42,13 @@ mod app {
 
     #[local]
     struct Local {
-        receiver_process: Receiver,
-        receiver_services: Receiver,
+        receiver: Receiver,
         time: TimeInterrupt,
         run: Run,
     }
 
     #[init(local = [
-        process_queue: ReceiveQueue = ReceiveQueue::new(),
-        services_queue: ReceiveQueue<BLOCK> = ReceiveQueue::new(),
+        queue: ReceiveQueue<BLOCK> = ReceiveQueue::new(),
         lost: Losses = Losses::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
@@ -64,18 +62,17 @@ mod app {
         };
         let bus = loader.rest.start();
         let lost: &'static Losses = cx.local.lost;
-        let (receiver_process, process_frames) = Receiver::new(0, cx.local.process_queue, lost);
-        let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
+        let (receiver, frames) = Receiver::new(1, cx.local.queue, lost);
         let run = Run {
             session: Session::new(reason, note, loader.flash, bus.can),
-            frames: [process_frames, service_frames],
+            frames,
             queue: Outbox::new(),
             transmitter: bus.transmitter,
             alarm: bus.alarm,
             watchdog: loader.watchdog,
             led: bus.led,
         };
-        (Shared {}, Local { receiver_process, receiver_services, time: bus.time, run })
+        (Shared {}, Local { receiver, time: bus.time, run })
     }
 
     #[idle(local = [run])]
@@ -83,14 +80,9 @@ mod app {
         cx.local.run.forever()
     }
 
-    #[task(binds = CAN1_RX0, priority = 2, local = [receiver_process])]
-    fn receive_process(cx: receive_process::Context) {
-        cx.local.receiver_process.drain();
-    }
-
-    #[task(binds = CAN1_RX1, priority = 2, local = [receiver_services])]
-    fn receive_services(cx: receive_services::Context) {
-        cx.local.receiver_services.drain();
+    #[task(binds = CAN1_RX1, priority = 2, local = [receiver])]
+    fn receive(cx: receive::Context) {
+        cx.local.receiver.drain();
     }
 
     #[task(binds = TIM2, priority = 1, local = [time])]

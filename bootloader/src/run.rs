@@ -1,7 +1,6 @@
 //! The one loop of the bootloader.
 
 use bsp::can::Transmitter;
-use bsp::filters::Fifo;
 use bsp::led::Led;
 use bsp::{Alarm, Clock, Frames, StartUpWatchdog};
 use canopen::{Duration, Instant};
@@ -16,8 +15,7 @@ const TRANSMIT_POLL: Duration = Duration::from_millis(1);
 /// What the loop owns.
 pub(crate) struct Run {
     pub(crate) session: Session,
-    /// Of FIFO 0 and 1.
-    pub(crate) frames: [Frames; 2],
+    pub(crate) frames: Frames,
     pub(crate) queue: Outbox,
     pub(crate) transmitter: Transmitter,
     pub(crate) alarm: Alarm,
@@ -44,22 +42,20 @@ impl Run {
     }
 
     fn receive(&mut self) {
-        for (fifo, frames) in [Fifo::Process, Fifo::Services].into_iter().zip(&mut self.frames) {
-            while let Some(received) = frames.dequeue() {
-                self.session.take(fifo, &received, &mut self.queue);
-                self.queue.pump(&mut self.transmitter);
-            }
+        while let Some(received) = self.frames.dequeue() {
+            self.session.take(&received, &mut self.queue);
+            self.queue.pump(&mut self.transmitter);
         }
     }
 
     /// Sleeps until then, or until a frame comes. Interrupts that are masked still end the sleep; what comes between the
-    /// look at the queues and the sleep is not slept over.
+    /// look at the queue and the sleep is not slept over.
     fn sleep(&mut self, until: Instant) {
         let soon = Clock::now() + TRANSMIT_POLL;
         let until = if self.queue.is_empty() { until } else { until.min(soon) };
         cortex_m::interrupt::free(|_| {
             self.alarm.set(until);
-            if self.frames.iter().all(|frames| !frames.ready()) {
+            if !self.frames.ready() {
                 cortex_m::asm::wfi();
             }
         });

@@ -4,10 +4,10 @@ use bsp::back_off::BackOff;
 use bsp::bit_timing::BitTiming;
 use bsp::bus_state::BusState;
 use bsp::can::Controller;
-use bsp::filters::{self, Banks, Fifo};
+use bsp::filters::{Bank, Fifo, Pair};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
-use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
+use canopen::{Action, Device, Duration, Instant, NodeId};
 use update::{Next, Phase, Updater};
 
 use crate::dictionary::{DICTIONARY, IMAGE_SIZE};
@@ -19,6 +19,11 @@ use crate::target::TARGET;
 /// Where a node without an application is found, whatever it was before.
 const NODE_ID: Option<NodeId> = NodeId::new(126);
 const KBIT: u16 = 250;
+
+/// CAN-IDs of what it hears (CiA 301, 7.3.3; CiA 305).
+const NMT: u16 = 0x000;
+const SDO_REQUEST: u16 = 0x600;
+const LSS_REQUEST: u16 = 0x7E5;
 
 /// The loop comes by at least this often: a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -81,19 +86,17 @@ impl Session {
         if self.is_silent {
             return;
         }
-        self.can.start(self.timing, &Banks::new());
+        self.can.start(self.timing, &[]);
         self.device.start(Clock::now(), out);
         self.note();
         self.filter();
     }
 
-    /// A frame of FIFO 0 or 1 has come.
-    pub(crate) fn take(&mut self, fifo: Fifo, received: &Received, out: &mut Outbox) {
+    /// A frame has come: each of the two takes what is its own.
+    pub(crate) fn take(&mut self, received: &Received, out: &mut Outbox) {
         let Received { frame, at } = received;
-        match fifo {
-            Fifo::Process => self.device.on_process_frame(frame, *at, out),
-            Fifo::Services => self.device.on_service_frame(frame, *at, out),
-        }
+        self.device.on_process_frame(frame, *at, out);
+        self.device.on_service_frame(frame, *at, out);
         self.publish();
         self.fulfil(out);
     }
@@ -153,7 +156,7 @@ impl Session {
                 Action::Identifiers => self.filter(),
                 Action::BitRate(bit_rate) => {
                     self.timing = BitTiming::of(bit_rate.kbit()).unwrap_or(self.timing);
-                    self.can.start(self.timing, &Banks::new());
+                    self.can.start(self.timing, &[]);
                     self.note();
                     self.filter();
                 }
@@ -186,8 +189,11 @@ impl Session {
         }
     }
 
+    /// NMT, SDO and LSS, all of them to FIFO 1: there is nothing else, and a client waits for its answers.
     fn filter(&mut self) {
-        let (nmt, services) = ([CanId::NMT], self.device.service_ids());
-        self.can.set_filters(&filters::pack(nmt.into_iter().map(CanId::get), services.map(CanId::get)));
+        let server = self.device.node_id().map_or(LSS_REQUEST, |id| SDO_REQUEST + u16::from(id.get()));
+        let passing = [[NMT, LSS_REQUEST], [server; 2]];
+        let banks = passing.map(|ids| Bank { fifo: Fifo::Services, pairs: ids.map(Pair::exactly) });
+        self.can.set_filters(&banks);
     }
 }

@@ -53,7 +53,7 @@ impl Controller {
 
     /// Goes on the bus, again when it was there: drops what is in the mailboxes and takes new timing and filters. Error
     /// counters start from zero. It does not wait for the bus: one that is stuck must not keep the node from starting.
-    pub fn start(&mut self, timing: BitTiming, banks: &Banks) {
+    pub fn start(&mut self, timing: BitTiming, banks: &[Bank]) {
         self.join(timing, banks, false);
     }
 
@@ -62,7 +62,7 @@ impl Controller {
         self.join(timing, &filters::everything(), true);
     }
 
-    fn join(&mut self, timing: BitTiming, banks: &Banks, silent: bool) {
+    fn join(&mut self, timing: BitTiming, banks: &[Bank], silent: bool) {
         registers().tsr().write(|w| w.abrq0().set_bit().abrq1().set_bit().abrq2().set_bit());
         self.can.modify_config().set_bit_timing(timing.btr()).set_silent(silent).leave_disabled();
         self.set_filters(banks);
@@ -103,7 +103,7 @@ impl Controller {
     }
 
     /// Replaces the filters. Frames that end meanwhile, a few microseconds, are not received.
-    pub fn set_filters(&mut self, banks: &Banks) {
+    pub fn set_filters(&mut self, banks: &[Bank]) {
         let mut filters = self.can.modify_filters();
         filters.set_split(BANKS as u8).clear();
         for (index, bank) in (0..).zip(banks) {

@@ -7,7 +7,7 @@ use crate::sdo::{Abort, Multiplexer, Objects, Readable, Writable};
 use crate::{Duration, Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
-    const BLOCK_UPLOAD: bool = !A::SERVICES_ONLY;
+    const IS_SMALL: bool = A::SERVICES_ONLY;
 
     fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort> {
         let entry = self.entry(at)?;

@@ -206,6 +206,20 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Takes the values of what is to be reset: the defaults, then what is stored.
     fn load(&mut self) {
+        if A::SERVICES_ONLY {
+            // Nothing of it is stored, and nothing depends on the node-ID.
+            self.image
+                .iter_mut()
+                .zip(self.dictionary.defaults())
+                .for_each(|(value, default)| *value = *default);
+        } else {
+            self.load_parameters();
+        }
+        self.application.initialise(&mut self.image);
+        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
+    }
+
+    fn load_parameters(&mut self) {
         let everything = self.pending.reset == Reset::Node;
         self.load_defaults(|entry| everything || entry.index() < 0x2000);
         self.load_stored(Group::Communication);
@@ -213,8 +227,6 @@ impl<A: Application, const N: usize> Core<A, N> {
             self.load_stored(Group::Application);
             self.load_stored(Group::Calibration);
         }
-        self.application.initialise(&mut self.image);
-        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
     }
 
     pub(super) fn load_defaults(&mut self, is_meant: impl Fn(&Entry) -> bool) {

@@ -25,9 +25,9 @@ pub(crate) enum Writable {
 
 /// The dictionary with its values and rules.
 pub(crate) trait Objects {
-    /// Whether there is anything worth an upload in blocks. Without, the code for it is left out of the image, and a client
-    /// takes segments.
-    const BLOCK_UPLOAD: bool = true;
+    /// Whether the image is short of room: then it has no upload in blocks, and a client takes segments, and no shortcuts
+    /// that only save time.
+    const IS_SMALL: bool = false;
 
     /// The value of an entry.
     fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort>;

@@ -69,14 +69,14 @@ impl Server {
 
     /// Takes a segment within a block, which has no answer but an abort; `None` for any other frame, which is for
     /// [`answer`](Server::answer). The deadline is not earlier afterwards.
-    pub(crate) fn take_expected(
+    pub(crate) fn take_expected<O: Objects>(
         &mut self,
         frame: [u8; 8],
-        objects: &mut impl Objects,
+        objects: &mut O,
         now: Instant,
     ) -> Option<Result<(), Response>> {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return None };
-        if !receiver.expects(frame) {
+        if O::IS_SMALL || !receiver.expects(frame) {
             return None;
         }
         self.active = now;
@@ -85,14 +85,14 @@ impl Server {
     }
 
     /// Answers a request.
-    pub(crate) fn answer(
+    pub(crate) fn answer<O: Objects>(
         &mut self,
         frame: [u8; 8],
-        objects: &mut impl Objects,
+        objects: &mut O,
         now: Instant,
     ) -> Option<Response> {
         // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
-        if matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
+        if !O::IS_SMALL && matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
             let answer = self.dispatch(frame, objects, now);
             let answer = self.hold(answer, objects);
             return self.settle(answer, now);
@@ -133,7 +133,7 @@ impl Server {
             }
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
-            _ if !O::BLOCK_UPLOAD => Err(Abort::Command),
+            _ if O::IS_SMALL => Err(Abort::Command),
             Request::BlockUpload { at, block_size, threshold, .. } => {
                 self.block_upload(at, block_size, threshold, objects)
             }
