@@ -1,8 +1,9 @@
-//! Links the image into its region of memory.x.
+//! Links the image into its region of memory.x, to run from RAM.
 
 #[path = "../crates/bsp/link.rs"]
 mod link;
 
 fn main() {
-    link::image("BOOTLOADER");
+    println!("cargo:rerun-if-changed=bootloader.x");
+    link::image("BOOTLOADER", "bootloader.x");
 }

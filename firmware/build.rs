@@ -4,5 +4,6 @@
 mod link;
 
 fn main() {
-    link::image("APPLICATION");
+    link::image("APPLICATION", "link.x");
+    println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
 }

@@ -3,21 +3,23 @@
 use std::path::Path;
 use std::{env, fs};
 
-/// Writes the `image.x` that memory.x includes, and tells the linker about both. `region` is where the image lies.
-pub(crate) fn image(region: &str) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+/// Writes the `image.x` that memory.x includes, and tells the linker about both. `region` is where the image lies; `script`
+/// is that of cortex-m-rt, or one in the directory of the image.
+pub(crate) fn image(region: &str, script: &str) {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = here.join("..");
     let common = root.join("crates/bsp/image.x");
-    let script = fs::read_to_string(&common).expect("a linker script of the project");
-    let script = format!("REGION_ALIAS(\"FLASH\", {region});\n\n{script}");
+    let text = fs::read_to_string(&common).expect("a linker script of the project");
+    let text = format!("REGION_ALIAS(\"FLASH\", {region});\n\n{text}");
     let out = env::var("OUT_DIR").expect("cargo sets it");
-    fs::write(Path::new(&out).join("image.x"), script).expect("cargo's directory can be written");
+    fs::write(Path::new(&out).join("image.x"), text).expect("cargo's directory can be written");
     for path in [common, root.join("memory.x"), root.join("crates/bsp/link.rs")] {
         println!("cargo:rerun-if-changed={}", path.display());
     }
-    for directory in [Path::new(&out), &root] {
+    for directory in [Path::new(&out), &root, here] {
         println!("cargo:rustc-link-search={}", directory.display());
     }
-    for argument in ["-Tlink.x", "-Tdefmt.x", "--nmagic"] {
+    for argument in [&format!("-T{script}"), "--nmagic"] {
         println!("cargo:rustc-link-arg-bins={argument}");
     }
 }

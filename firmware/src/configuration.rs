@@ -107,6 +107,6 @@ pub(crate) fn calibration() -> FactoryCalibration {
 
 /// The front end's sums as the measurement takes them.
 pub(crate) fn raw_sample(sums: &Sums, factory: FactoryCalibration) -> RawSample {
-    let [pressure, supply, temperature, vrefint] = sums.channels;
-    RawSample { pressure, supply, temperature, vrefint, thermistor: 0, count: Sums::COUNT, factory }
+    let [pressure, supply, thermistor, temperature, vrefint] = sums.channels;
+    RawSample { pressure, supply, temperature, vrefint, thermistor, count: Sums::COUNT, factory }
 }

@@ -8,7 +8,6 @@
 //! | 4 | `transmit` | the mailboxes hold three frames; locking the queue delays no sample |
 //! | 3 | `process` | SYNC, RPDO, TPDO: never behind an SDO transfer |
 //! | 2 | `serve` | SDO, NMT, heartbeat, EMCY, errors of the bus |
-//! | 2 | `remember` | the position to battery-backed memory, not behind a save: half a turn may pass in 5 ms |
 //! | 1 | `keep` | stores parameters: whatever it waits for, nobody waits for it |
 //! | 0 | `idle` | sleeps |
 //!
@@ -21,6 +20,7 @@ mod bit_rate;
 mod bus;
 mod configuration;
 mod keeper;
+mod latest;
 mod process;
 mod remembering;
 mod services;
@@ -36,12 +36,15 @@ const PROCESS: Interrupt = Interrupt::TIM2;
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
 /// Pended by whoever has something to store. The interrupt is that of a peripheral which the board does not use.
 const KEEPER: Interrupt = Interrupt::SDIO;
-/// Pended when there is another position to remember. The interrupt is that of a peripheral which the board does not use.
-const REMEMBER: Interrupt = Interrupt::TAMP_STAMP;
 /// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
 const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 /// Pended by whoever has put a frame into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    bsp::crash::panicked(info.location())
+}
 
 defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
 
@@ -57,26 +60,24 @@ mod app {
     use bsp::{
         BackupMemory, Board, Buttons, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog,
     };
-    use node::{EncoderBoard, FactoryCalibration, Kept, Measurement, Parameters, Parcel, Protocol, Snapshot};
+    use node::{EncoderBoard, FactoryCalibration, Measurement, Parameters, Parcel, Protocol};
 
     use crate::bit_rate::Rate;
     use crate::keeper::Keeper;
+    use crate::latest::Latest;
     use crate::process::Process;
     use crate::services::{Findings, Services};
     use crate::shaft::Shaft;
     use crate::shared::Shared as _;
-    use crate::{FIRST_SAMPLE, PROCESS, REMEMBER, SERVICES, configuration, remembering};
+    use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, remembering};
 
     #[shared]
     struct Shared {
         protocol: &'static mut Protocol,
         transmit: TransmitQueue,
-        /// The latest, until the process data task has taken it.
-        snapshot: Option<Snapshot>,
+        snapshot: Latest,
         /// New ones, until the sampling task has taken them.
         parameters: Option<Parameters>,
-        /// The latest, until it is in battery-backed memory.
-        kept: Option<Kept>,
         watchdog: Watchdog,
     }
 
@@ -109,7 +110,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.device);
         let (protocol, setup, store) = configuration::load(board.parameters, cx.local.protocol);
-        let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new()));
+        let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
@@ -123,9 +124,8 @@ mod app {
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
-            snapshot: None,
+            snapshot: Latest::default(),
             parameters,
-            kept: None,
             watchdog: board.watchdog.supervise(),
         };
         let mut local = Local {
@@ -175,26 +175,26 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, buttons, measurement, factory],
-           shared = [snapshot, parameters, kept, &watchdog])]
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, buttons, measurement, factory, backup],
+           shared = [snapshot, parameters, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(sums) = cx.local.sampling.take() else { return };
         match cx.local.sampling.lost() {
             0 => {}
             lost => defmt::error!("{=u32} milliseconds were not collected in time", lost),
         }
-        if let Some(parameters) = cx.shared.parameters.lock(Option::take) {
-            cx.local.measurement.apply(&parameters);
-            cx.local.shaft.apply(&parameters);
-        }
+        let (measurement, shaft) = (&mut *cx.local.measurement, cx.local.shaft);
+        cx.shared.parameters.lock(|parameters| {
+            if let Some(new) = parameters {
+                measurement.apply(new);
+                shaft.apply(new);
+                *parameters = None;
+            }
+        });
         let raw = configuration::raw_sample(&sums, *cx.local.factory);
-        let (shaft, pressed) = (cx.local.shaft.read(&sums), cx.local.buttons.sample());
-        let snapshot = cx.local.measurement.sample(&raw, &shaft, pressed);
-        if let Some(now) = cx.local.measurement.kept() {
-            cx.shared.kept.lock(|kept| *kept = Some(now));
-            rtic::pend(REMEMBER);
-        }
-        cx.shared.snapshot.lock(|latest| *latest = Some(snapshot));
+        let (encoder, pressed) = (shaft.read(&sums), cx.local.buttons.sample());
+        cx.shared.snapshot.lock(|latest| measurement.update(&raw, &encoder, pressed, latest.renew()));
+        measurement.keep(|words| cx.local.backup.write(words));
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
     }
@@ -211,7 +211,7 @@ mod app {
         if services_due {
             rtic::pend(SERVICES);
         }
-        let snapshot = cx.shared.snapshot.lock(Option::take);
+        let snapshot = cx.shared.snapshot.lock(Latest::take);
         cx.local.process.run(snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
     }
 
@@ -224,13 +224,6 @@ mod app {
             cx.shared.parameters.lock(|parameters| *parameters = Some(new));
         }
         cx.shared.watchdog.progress(Part::Services);
-    }
-
-    #[task(binds = TAMP_STAMP, priority = 2, local = [backup], shared = [kept])]
-    fn remember(mut cx: remember::Context) {
-        if let Some(kept) = cx.shared.kept.lock(Option::take) {
-            remembering::keep(cx.local.backup, &kept);
-        }
     }
 
     #[task(binds = SDIO, priority = 1, local = [keeper], shared = [protocol, transmit])]

@@ -1,10 +1,7 @@
-//! The position through a loss of power: from the measurement to the memory that a battery keeps, and back at the start.
+//! The position through a loss of power: back from the memory that a battery keeps.
 
-use bsp::BackupMemory;
-use bsp::kept::{CAPACITY, Found};
+use bsp::kept::Found;
 use node::{Kept, Start};
-
-const _: () = assert!(Kept::SIZE <= CAPACITY);
 
 /// What the encoder goes on from.
 ///
@@ -13,17 +10,10 @@ const _: () = assert!(Kept::SIZE <= CAPACITY);
 pub(crate) fn start(found: &Found) -> Start {
     match found {
         Found::Nothing => Start::First,
-        Found::Kept(bytes) => {
-            bytes.first_chunk().map_or(Start::Damaged, |kept| Start::Kept(Kept::from_bytes(kept)))
-        }
+        Found::Kept(words) => Start::Kept(Kept::from_words(words)),
         Found::Damaged => {
             defmt::error!("what was kept of the encoder is damaged");
             Start::Damaged
         }
     }
-}
-
-/// Keeps the latest.
-pub(crate) fn keep(memory: &mut BackupMemory, kept: &Kept) {
-    memory.write(&kept.to_bytes());
 }

@@ -4,11 +4,12 @@ use bsp::back_off::BackOff;
 use bsp::bus_state::{BusState, BusWatch};
 use bsp::can::Controller;
 use bsp::filters::{self, Banks};
+use bsp::handover::Handover;
 use bsp::led::Led;
 use bsp::losses::Losses;
-use bsp::{Alarm, Clock, Frames};
+use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
-use node::{BusEvent, Fault, Request};
+use node::{BusEvent, Fault, NodeId, Request};
 
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
@@ -17,6 +18,9 @@ use crate::{KEEPER, PROCESS};
 
 /// The task runs at least this often: the watchdog wants a sign of life, and a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
+
+/// So long after its start the application is well: crashes before that add up, and the bootloader stays after three.
+const CONFIRMATION: Instant = Instant(10_000_000);
 
 /// What the task owns.
 pub(crate) struct Services {
@@ -71,6 +75,9 @@ impl Services {
         let now = Clock::now();
         let next = node.call(|protocol, out| protocol.poll_services(now, out));
         self.fulfil(node);
+        if now >= CONFIRMATION {
+            retained::set_trial(retained::trial().confirmed());
+        }
         self.led.set(blink(now));
         self.alarm.set(next.min(now + PERIOD).min(self.back_off.due()));
     }
@@ -126,7 +133,10 @@ impl Services {
                     self.rate = Rate::of(bit_rate);
                     self.go_on_bus(node);
                 }
-                Request::Bootloader => restart(),
+                Request::Bootloader => {
+                    self.hand_over(node, true);
+                    restart()
+                }
                 Request::Store => rtic::pend(KEEPER),
             }
         }
@@ -152,8 +162,16 @@ impl Services {
         };
         defmt::info!("on the bus at {=u16} kbit/s", timing.kbit());
         self.can.start(timing, &Banks::new());
+        self.hand_over(node, false);
         self.filter(node);
         true
+    }
+
+    /// Leaves word for the bootloader where the node is on the bus.
+    fn hand_over(&self, node: &mut impl Shared, stay: bool) {
+        let Rate::Known(timing) = self.rate else { return };
+        let node_id = node.call(|protocol, _| protocol.node_id());
+        retained::hand_over(&Handover { node_id: node_id.map(NodeId::get), timing, stay });
     }
 
     fn report_findings(&mut self, node: &mut impl Shared) {

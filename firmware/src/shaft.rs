@@ -7,6 +7,8 @@ use node::{EncoderBoard, Parameters, RawEncoder, SsiFrame};
 pub(crate) struct Shaft {
     encoder: Encoder,
     ssi: Ssi,
+    /// Whether the personality has sensors of positions at all.
+    is_used: bool,
     /// Bits of the word to be read over SSI; `None` when no sensor has one.
     length: Option<u32>,
     board: EncoderBoard,
@@ -14,11 +16,12 @@ pub(crate) struct Shaft {
 
 impl Shaft {
     pub(crate) fn new(encoder: Encoder, ssi: Ssi, board: EncoderBoard) -> Shaft {
-        Shaft { encoder, ssi, length: None, board }
+        Shaft { encoder, ssi, is_used: false, length: None, board }
     }
 
     /// Looks which sensors there are.
     pub(crate) fn apply(&mut self, parameters: &Parameters) {
+        self.is_used = parameters.sensors().is_some();
         let absolute = |channel: &node::EncoderChannel| channel.kind.is_some_and(|kind| kind.is_absolute());
         let sensors = parameters.sensors().filter(|sensors| sensors.channels.iter().any(absolute));
         self.length = sensors.map(|sensors| sensors.format.length());
@@ -27,6 +30,9 @@ impl Shaft {
     /// What belongs to the millisecond of these sums. A word of SSI is that of the last millisecond, and the next one is
     /// started.
     pub(crate) fn read(&mut self, sums: &Sums) -> RawEncoder {
+        if !self.is_used {
+            return RawEncoder::default();
+        }
         let Counted { counter, index } = self.encoder.take(sums);
         let ssi = self.ssi.take().map(|word| SsiFrame { bits: word.bits, clocks: word.clocks });
         self.length.into_iter().for_each(|length| self.ssi.start(length));

@@ -111,7 +111,7 @@ pub fn empty_store() -> Flash {
 
 /// Stores at once what the node asks to be stored.
 pub fn deliver(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
-    let mut parcel = Parcel::new();
+    let mut parcel = Parcel::new(Personality::default());
     if protocol.pack(&mut parcel) {
         let result = parcel.deliver(store);
         protocol.finish(&parcel, result, now, out);

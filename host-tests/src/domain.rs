@@ -31,9 +31,7 @@ const ROWS: &[Object] = &[
     parameter(WORD, Type::Unsigned32),
 ];
 const SIZE: usize = dictionary::image_size(ROWS);
-const ENTRIES: [Entry; ROWS.len()] = dictionary::compile(&dictionary::gather::<{ ROWS.len() }>(&[ROWS]));
-const DEFAULTS: [u8; SIZE] = dictionary::default_image(ROWS);
-const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 /// The content of the domain. A download replaces it when it is complete.
 #[derive(Debug, Default)]

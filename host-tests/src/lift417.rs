@@ -1,5 +1,7 @@
 //! The table of the 290 pre-defined PDOs of CiA 417-3-1, tables/lift417.csv, in the corrected reading.
 
+use crate::tables::Row;
+
 const TABLE: &str = include_str!("../tables/lift417.csv");
 
 /// What the table says of a PDO.
@@ -43,6 +45,17 @@ impl Pdo {
         if self.objects.is_empty() { 0xFF } else { u8::try_from(self.objects.len()).expect("at most 64") }
     }
 
+    /// The flags of its COB-ID by default in that node: producers forbid remote frames, but for the multiplexed PDO, and
+    /// units 2 to 4 are off.
+    #[must_use]
+    pub fn flags(&self) -> u32 {
+        match (self.is_produced, self.number) {
+            (false, _) | (true, 2) => 0,
+            (true, 264 | 385 | 386) => 0xC000_0000,
+            (true, _) => 0x4000_0000,
+        }
+    }
+
     /// Whether the node in personality lift has it: its own units produce these and consume those.
     #[must_use]
     pub fn is_of_the_node(&self) -> bool {
@@ -51,6 +64,60 @@ impl Pdo {
             false => matches!(self.number, 2..=8 | 257),
         }
     }
+}
+
+/// The PDO objects of the node: nothing of them can be changed but flags, type and times.
+pub fn rows() -> impl Iterator<Item = Row> {
+    pdos().filter(Pdo::is_of_the_node).flat_map(|pdo| [communication(&pdo), mapping(&pdo)].concat())
+}
+
+fn communication(pdo: &Pdo) -> Vec<Row> {
+    let row = |sub, name, kind, access, default| Row {
+        index: pdo.communication,
+        sub,
+        name,
+        kind,
+        access,
+        default,
+        mapping: "no",
+    };
+    let has_sync_start = pdo.is_produced && pdo.number != 2;
+    let highest = if has_sync_start { "6" } else { "5" };
+    let mut rows = vec![
+        row(0, name(pdo, "communication"), "UNSIGNED8", "ro", highest),
+        row(1, "COB-ID", "UNSIGNED32", "rw", cob_id(pdo)),
+        row(2, "Transmission type", "UNSIGNED8", "rw", "255"),
+        row(5, "Event timer", "UNSIGNED16", "rw", "0"),
+    ];
+    rows.extend(pdo.is_produced.then(|| row(3, "Inhibit time", "UNSIGNED16", "rw", "0")));
+    rows.extend(has_sync_start.then(|| row(6, "SYNC start value", "UNSIGNED8", "rw", "0")));
+    rows
+}
+
+fn cob_id(pdo: &Pdo) -> &'static str {
+    let relative = if pdo.is_relative { "$NODEID+" } else { "" };
+    format!("{relative}{:#X}", pdo.base | pdo.flags()).leak()
+}
+
+fn mapping(pdo: &Pdo) -> Vec<Row> {
+    let row = |sub, name, kind, default: String| Row {
+        index: pdo.mapping,
+        sub,
+        name,
+        kind,
+        access: "const",
+        default: default.leak(),
+        mapping: "no",
+    };
+    let entries = (1..).zip(pdo.entries());
+    let mapped = entries.map(|(sub, entry)| row(sub, "Mapped object", "UNSIGNED32", format!("{entry:#X}")));
+    let count = row(0, name(pdo, "mapping"), "UNSIGNED8", pdo.count().to_string());
+    std::iter::once(count).chain(mapped).collect()
+}
+
+fn name(pdo: &Pdo, what: &str) -> &'static str {
+    let direction = if pdo.is_produced { "TPDO" } else { "RPDO" };
+    format!("{direction} {} {what} parameter", pdo.number).leak()
 }
 
 /// All of them.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use node::{Personality, REVISION, Setup, VENDOR_ID};
 
 use crate::bench::{ID, setup};
-use crate::lift417::{self, Pdo};
+use crate::lift417;
 
 /// The CMP 8271: its communication segment, its own objects and CiA 404.
 const TRANSMITTER: &str = include_str!("../tables/cia404.csv");
@@ -142,73 +142,6 @@ fn is_pdo(row: &Row) -> bool {
     (0x1400..=0x1BFF).contains(&row.index)
 }
 
-/// The PDO objects of the lift: nothing of them can be changed but flags, type and times.
-fn lift_pdos() -> impl Iterator<Item = Row> {
-    lift417::pdos().filter(Pdo::is_of_the_node).flat_map(|pdo| {
-        let mut rows = lift_communication(&pdo);
-        rows.extend(lift_mapping(&pdo));
-        rows
-    })
-}
-
-fn lift_communication(pdo: &Pdo) -> Vec<Row> {
-    let highest = if pdo.is_produced && pdo.number != 2 { "6" } else { "5" };
-    let row = |sub, name, kind, access, default| Row {
-        index: pdo.communication,
-        sub,
-        name,
-        kind,
-        access,
-        default,
-        mapping: "no",
-    };
-    let mut rows = vec![
-        row(0, lift_name(pdo, "communication"), "UNSIGNED8", "ro", highest),
-        row(1, "COB-ID", "UNSIGNED32", "rw", lift_cob_id(pdo)),
-        row(2, "Transmission type", "UNSIGNED8", "rw", "255"),
-        row(5, "Event timer", "UNSIGNED16", "rw", "0"),
-    ];
-    if pdo.is_produced {
-        rows.push(row(3, "Inhibit time", "UNSIGNED16", "rw", "0"));
-    }
-    if highest == "6" {
-        rows.push(row(6, "SYNC start value", "UNSIGNED8", "rw", "0"));
-    }
-    rows
-}
-
-/// Producers have bit 30 set, but for the multiplexed PDO; units 2 to 4 are off.
-fn lift_cob_id(pdo: &Pdo) -> &'static str {
-    let flags = match (pdo.is_produced, pdo.number) {
-        (false, _) | (_, 2) => 0,
-        (_, 264 | 385 | 386) => 0xC000_0000,
-        _ => 0x4000_0000,
-    };
-    let value = format!("{:#X}", pdo.base | flags);
-    if pdo.is_relative { format!("$NODEID+{value}").leak() } else { value.leak() }
-}
-
-fn lift_mapping(pdo: &Pdo) -> Vec<Row> {
-    let row = |sub, name, kind, default: String| Row {
-        index: pdo.mapping,
-        sub,
-        name,
-        kind,
-        access: "const",
-        default: default.leak(),
-        mapping: "no",
-    };
-    let entries = (1..).zip(pdo.entries());
-    let mapped = entries.map(|(sub, entry)| row(sub, "Mapped object", "UNSIGNED32", format!("{entry:#X}")));
-    let count = row(0, lift_name(pdo, "mapping"), "UNSIGNED8", pdo.count().to_string());
-    std::iter::once(count).chain(mapped).collect()
-}
-
-fn lift_name(pdo: &Pdo, what: &str) -> &'static str {
-    let direction = if pdo.is_produced { "TPDO" } else { "RPDO" };
-    format!("{direction} {} {what} parameter", pdo.number).leak()
-}
-
 /// Every entry that the documents give a node of this personality.
 #[must_use]
 pub fn table(personality: Personality) -> Vec<Row> {
@@ -228,7 +161,7 @@ pub fn table(personality: Personality) -> Vec<Row> {
             let device = transmitter.filter(|row| row.index < 0x2000 && !is_transmitter(row));
             let common = device.chain(common).filter(|row| !is_pdo(row));
             let sensors = rows(SENSORS).filter(|row| row.index < 0x2107);
-            common.chain(sensors).chain(rows(CALIBRATION)).chain(lift_pdos()).chain(rows(LIFT)).collect()
+            common.chain(sensors).chain(rows(CALIBRATION)).chain(lift417::rows()).chain(rows(LIFT)).collect()
         }
     };
     // What comes later is more special.

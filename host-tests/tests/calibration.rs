@@ -66,7 +66,7 @@ fn the_lock_opens_with_its_key_until_the_node_is_reset() {
 #[test]
 fn what_is_no_calibration_is_refused_and_leaves_the_old_one() {
     let mut bench = unlocked(Personality::Pressure);
-    let bad: [(u16, u8, f32); 11] = [
+    let bad: [(u16, u8, f32); 12] = [
         (0x2200, 1, 1_000_000.0), // no range
         (0x2200, 2, -1.0),        // falls
         (0x2200, 6, 0.0),         // no span
@@ -78,6 +78,7 @@ fn what_is_no_calibration_is_refused_and_leaves_the_old_one() {
         (0x2201, 2, 0.0),         // the temperature never changes
         (0x2201, 5, -0.0002),     // a thermistor of the other kind
         (0x2201, 7, 0.0),         // no resistor
+        (0x2201, 8, 0.99),        // always broken
     ];
     for (index, sub, value) in bad {
         let before = bench.read(index, sub);
@@ -116,10 +117,12 @@ fn a_parameter_selects_the_thermistor() {
     bench.write(0x2201, 1, &[1]).unwrap();
     // A quarter of the supply: a third of 10 kohm, with beta 3950 K at 1/(1/298.15 - ln 3 / 3950) K.
     assert!(is_close(measured(&mut bench, &warm, 2), 325.109, 0.001), "{}", real(&mut bench, 0x6100, 2));
-    let open = RawSample { thermistor: 16 * 4095, ..warm };
-    assert!(is_close(measured(&mut bench, &open, 2), 0.0, 0.0));
-    assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 3, 0, 0, 0]), "temperature rail");
-    assert_eq!(bench.read(0x6150, 2).unwrap()[0] & 1, 1);
+    for thermistor in [0, 16 * 30, 16 * 4070, 16 * 4095] {
+        let broken = RawSample { thermistor, ..warm };
+        assert!(is_close(measured(&mut bench, &broken, 2), 0.0, 0.0), "{thermistor}");
+        assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 3, 0, 0, 0]), "temperature rail");
+        assert_eq!(bench.read(0x6150, 2).unwrap()[0] & 1, 1);
+    }
 }
 
 #[test]

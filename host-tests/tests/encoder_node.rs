@@ -52,15 +52,23 @@ fn emergencies(bench: &mut Bench) -> Vec<(u16, u8, u8)> {
 }
 
 #[test]
-fn tpdo1_carries_the_position_on_entering_operational() {
+fn tpdo1_carries_the_position_on_entering_operational_and_then_by_its_timer_alone() {
     let mut bench = booted();
     turn_to(&mut bench, 0);
     turn_to(&mut bench, 1234);
     bench.take();
     bench.nmt(1);
     assert_eq!(positions(&mut bench, TPDO1), [1234]);
+    turn_to(&mut bench, 1300);
     wait(&mut bench, 10);
-    assert_eq!(positions(&mut bench, TPDO1), [], "nothing has changed");
+    assert_eq!(positions(&mut bench, TPDO1), [], "the cyclic timer is 0");
+    bench.nmt(0x80);
+    bench.nmt(1);
+    assert_eq!(positions(&mut bench, TPDO1), [1300]);
+    bench.write(0x6200, 0, &10_u16.to_le_bytes()).unwrap();
+    bench.take();
+    wait(&mut bench, 20);
+    assert_eq!(positions(&mut bench, TPDO1), [1300, 1300], "whether it changes or not");
 }
 
 #[test]
@@ -78,6 +86,9 @@ fn a_node_that_starts_by_itself_sends_no_position_that_it_has_not_measured() {
 #[test]
 fn a_shaft_that_turns_is_seen_in_the_same_millisecond_in_both_directions() {
     let mut bench = operational();
+    // Sent with every change.
+    bench.write(0x1800, 2, &[255]).unwrap();
+    bench.take();
     let revolution = 4096 * 4096;
     for (counter, position) in [(100, 100), (250, 250), (100, 100), (65_500, revolution - 36)] {
         turn_to(&mut bench, counter);
@@ -131,6 +142,7 @@ fn the_cyclic_timer_is_saved_with_the_communication_parameters() {
 #[test]
 fn a_preset_is_the_next_position_and_outlives_a_loss_of_power() {
     let mut bench = operational();
+    bench.write(0x1800, 2, &[255]).unwrap();
     turn_to(&mut bench, 1000);
     bench.take();
     bench.write(0x6003, 0, &77_u32.to_le_bytes()).unwrap();

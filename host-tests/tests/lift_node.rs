@@ -6,7 +6,7 @@ use canopen::Frame;
 use canopen::pdo::{Address, Mpdo};
 use canopen::sdo::Multiplexer;
 use host_tests::bench::{Bench, ID, raw};
-use host_tests::lift417::{Pdo, pdos};
+use host_tests::lift417::pdos;
 use host_tests::tables::table;
 use node::{Personality, RawSample};
 use profiles::lift::load::OVERLOAD;
@@ -44,16 +44,6 @@ fn position(bench: &mut Bench, counter: u16) -> Vec<(u16, Vec<u8>)> {
     bench.take().into_iter().filter(|(id, _)| *id == 0x18C).collect()
 }
 
-/// What is different by default: producers forbid remote frames, and units 2 to 4 are not there.
-fn cob_id(pdo: &Pdo) -> u32 {
-    let flags = match (pdo.is_produced, pdo.number) {
-        (false, _) | (true, 2) => 0,
-        (true, 264 | 385 | 386) => 0xC000_0000,
-        (true, _) => 0x4000_0000,
-    };
-    pdo.cob_id(ID) | flags
-}
-
 /// All 290 rows. What the node has of them is as the table says; what it has not is not there under another number either.
 #[test]
 fn every_pdo_of_the_table_is_in_the_node_or_is_not_there() {
@@ -66,7 +56,7 @@ fn every_pdo_of_the_table_is_in_the_node_or_is_not_there() {
             assert_eq!(bench.read(mapping, 0), Err(NO_OBJECT), "{pdo:?}");
             continue;
         }
-        assert_eq!(number(&mut bench, communication, 1), cob_id(&pdo), "{pdo:?}");
+        assert_eq!(number(&mut bench, communication, 1), pdo.cob_id(ID) | pdo.flags(), "{pdo:?}");
         assert_eq!([2, 5].map(|sub| number(&mut bench, communication, sub)), [255, 0]);
         assert_eq!(bench.read(communication, 3).is_ok(), pdo.is_produced);
         assert_eq!(number(&mut bench, mapping, 0), pdo.count().into());

@@ -1,7 +1,7 @@
 //! Each of the 290 PDOs of the table, produced and consumed by a device of the stack: at its number, with its CAN-ID, and
 //! laid out as the table says.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Tables, Type};
 use canopen::sdo::Abort;
 use canopen::{Application, Device, Duration, Frame, Instant, NodeId};
 use host_tests::bench::Queue;
@@ -85,9 +85,9 @@ fn device(row: &Pdo) -> (&'static Dictionary, Device<NoRules, SIZE>) {
     rows.extend(filled.take(missing));
     rows.sort_by_key(Object::key);
     let rows: [Object; ROWS] = rows.try_into().unwrap();
-    let entries: &'static [Entry; ROWS] = Box::leak(Box::new(dictionary::compile(&rows)));
+    let tables: &'static Tables<ROWS, ROWS, ROWS> = Box::leak(Box::new(dictionary::compile(&rows)));
     let defaults: &'static [u8; SIZE] = Box::leak(Box::new(dictionary::default_image(&rows)));
-    let dictionary: &'static Dictionary = Box::leak(Box::new(Dictionary::new(entries, defaults)));
+    let dictionary: &'static Dictionary = Box::leak(Box::new(Dictionary::new(tables, defaults)));
     (dictionary, Device::new(dictionary, NodeId::new(ID), NoRules))
 }
 

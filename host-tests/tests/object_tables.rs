@@ -5,11 +5,9 @@ use std::collections::BTreeSet;
 
 use canopen::dictionary::{Access, Object, Type};
 use host_tests::bench::{Bench, ID};
+use host_tests::lift417;
 use host_tests::tables::{Row, table};
 use node::{Personality, combined, encoder, lift, pressure};
-
-/// The multiplexed one, the virtual input, the load and the positions.
-const TPDOS_OF_THE_LIFT: [u16; 7] = [2, 130, 258, 263, 264, 385, 386];
 
 const ACCESS: u32 = 0x0601_0000;
 const NOT_MAPPABLE: u32 = 0x0604_0041;
@@ -41,7 +39,8 @@ fn without_tpdos(personality: Personality) -> Bench {
     let mut bench = Bench::booted_as(personality);
     match personality {
         Personality::Lift => {
-            TPDOS_OF_THE_LIFT.into_iter().for_each(|number| bench.switch_tpdo_off(number - 1))
+            let own = lift417::pdos().filter(|pdo| pdo.is_produced && pdo.is_of_the_node());
+            own.for_each(|pdo| bench.switch_tpdo_off(pdo.number - 1));
         }
         _ => (0..4).for_each(|number| bench.disable_tpdo(number)),
     }

@@ -88,7 +88,7 @@ fn a_store_that_fails_is_told_and_changes_nothing() {
     bench.protocol.on_service_frame(&frame, now, &mut bench.out);
     assert_eq!(bench.take(), [], "the answer waits");
     while bench.protocol.take_request().is_some_and(|request| request != Request::Store) {}
-    let mut parcel = Parcel::new();
+    let mut parcel = Parcel::new(Personality::default());
     assert!(bench.protocol.pack(&mut parcel));
     bench.protocol.finish(&parcel, Err(Abort::Hardware), now, &mut bench.out);
     assert_eq!(bench.take(), [(0x580 + u16::from(ID), vec![0x80, 0, 0x20, 0, 0, 0, 6, 6])]);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
-use crate::command::{run, target_dir};
+use crate::command::{cargo, run, target_dir};
 use crate::target::{TRIPLE, Toolchain};
 
 /// Where the ELF files lie.
@@ -18,7 +18,8 @@ pub(crate) fn build_node(toolchain: &Toolchain) -> Result<()> {
     for name in ["firmware", "bootloader"] {
         ensure!(dir().join(name).exists(), "cargo built no {name} in {}", dir().display());
     }
-    Ok(())
+    // Signed with the development key: what a programmer writes and `nodectl update` takes.
+    run(cargo().args(["run", "--quiet", "-p", "sign", "--", "image"]).arg(dir().join("firmware")))
 }
 
 /// Builds everything that the tests run on the emulated core.

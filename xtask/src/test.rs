@@ -92,11 +92,19 @@ fn no_panic() -> Result<()> {
 fn test_python() -> Result<()> {
     native::ensure_tshark()?;
     let sim = sim::build()?;
+    let tools = ["nodectl", "sign"];
+    run(cargo()
+        .args(["build", "--quiet", "--profile", "sim"])
+        .args(tools.iter().flat_map(|tool| ["-p", tool])))?;
+    let [nodectl, sign] =
+        tools.map(|tool| sim.with_file_name(format!("{tool}{}", std::env::consts::EXE_SUFFIX)));
     let python = python::ensure()?;
     run(with_images(&mut Command::new(python))
         .args(["-m", "pytest", "-q", "host-tests/python"])
         .current_dir(root())
-        .env("SIM_COMMAND", sim))
+        .env("SIM_COMMAND", sim)
+        .env("NODECTL_COMMAND", nodectl)
+        .env("SIGN_COMMAND", sign))
 }
 
 /// Tells tests where the ELF files are.

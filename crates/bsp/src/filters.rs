@@ -29,7 +29,9 @@ pub struct Pair {
 impl Pair {
     const ANY: Pair = Pair { id: 0, mask: 0 };
 
-    fn exactly(id: u16) -> Pair {
+    /// One identifier, data and remote frames.
+    #[must_use]
+    pub const fn exactly(id: u16) -> Pair {
         Pair { id: id & 0x7FF, mask: 0x7FF }
     }
 }
@@ -58,7 +60,6 @@ pub fn pack(process: impl Iterator<Item = u16>, services: impl Iterator<Item = u
     banks
 }
 
-/// Adds banks for `ids`; false when there is no bank left.
 /// One bank that passes every base frame to FIFO 1.
 #[must_use]
 pub fn everything() -> Banks {
@@ -67,6 +68,7 @@ pub fn everything() -> Banks {
 
 const EVERYTHING: Bank = Bank { fifo: Fifo::Services, pairs: [Pair::ANY; 2] };
 
+/// Adds banks for `ids`; false when there is no bank left.
 fn fill(banks: &mut Banks, fifo: Fifo, mut ids: impl Iterator<Item = u16>) -> bool {
     while let Some(first) = ids.next() {
         let second = ids.next().unwrap_or(first);

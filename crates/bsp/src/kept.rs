@@ -1,26 +1,28 @@
-//! A few bytes in memory that a battery keeps, written again and again, while the power may go at any moment.
+//! A few words in memory that a battery keeps, written again and again, while the power may go at any moment.
 //!
 //! There are two copies, each with a sequence number and a CRC, and the older one is overwritten. So a write that is cut
 //! short damages what was of no more use, and the other copy is one write old.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use crate::checksum::CRC;
+/// Words that a copy holds.
+pub const CAPACITY: usize = 18;
 
-/// Bytes that a copy holds.
-pub const CAPACITY: usize = 72;
+/// What is to be kept.
+pub type Content = [u32; CAPACITY];
 
-/// Mark, sequence number, content, CRC, of which all but the content are a word each.
-const SIZE: usize = 12 + CAPACITY;
-const WORDS: usize = SIZE / 4;
 /// Tells a damaged copy from memory that never held one.
 const MARK: u32 = 0x4B45_5054;
 
-/// A copy.
-type Sealed = [u8; SIZE];
-
 /// The place of a copy in memory.
-pub type Slot = [AtomicU32; WORDS];
+#[derive(Debug)]
+#[repr(C)]
+pub struct Slot {
+    mark: AtomicU32,
+    sequence: AtomicU32,
+    content: [AtomicU32; CAPACITY],
+    checksum: AtomicU32,
+}
 
 /// The places of both.
 pub type Slots = [Slot; 2];
@@ -30,44 +32,83 @@ pub type Slots = [Slot; 2];
 pub enum Found {
     /// No trace of a copy: nothing was ever written, or the battery was empty.
     Nothing,
-    /// What was written last, filled up with zeros.
-    Kept([u8; CAPACITY]),
+    /// What was written last.
+    Kept(Content),
     /// A copy was there, and none is good.
     Damaged,
 }
 
+/// A CRC of 32 bits over words, the sequence number first.
+pub trait Checksum {
+    /// Begins with this word.
+    fn start(&mut self, word: u32);
+    /// Goes on with this one.
+    fn add(&mut self, word: u32);
+    /// The CRC of all of them.
+    fn value(&self) -> u32;
+}
+
 /// Writes the copies in turn.
-pub struct Keeper<'a> {
+pub struct Keeper<'a, C> {
     slots: &'a Slots,
+    checksum: C,
     /// Of the latest copy; its lowest bit tells which one that is.
     sequence: u32,
 }
 
-impl<'a> Keeper<'a> {
+impl<'a, C: Checksum> Keeper<'a, C> {
     /// Finds the newer good copy. The next write goes over the other one.
-    pub fn open(slots: &'a Slots) -> (Keeper<'a>, Found) {
-        let good = [0, 1].map(|n| read(&slots[n]).filter(|sealed| sequence(sealed) as usize % 2 == n));
+    pub fn open(slots: &'a Slots, mut checksum: C) -> (Keeper<'a, C>, Found) {
+        let [first, second] = slots.each_ref().map(|slot| slot.read(&mut checksum));
+        let good = [first.filter(|copy| copy.0 % 2 == 0), second.filter(|copy| copy.0 % 2 == 1)];
         let newer = match good {
-            [Some(first), Some(second)] if is_later(sequence(&first), sequence(&second)) => Some(first),
+            [Some(first), Some(second)] if is_later(first.0, second.0) => Some(first),
             [first, second] => second.or(first),
         };
-        let had_one = slots.iter().any(|slot| slot[0].load(Ordering::Relaxed) == MARK);
-        let found = match newer {
-            Some(sealed) => Found::Kept(content(&sealed)),
-            None if had_one => Found::Damaged,
-            None => Found::Nothing,
+        let had_one = slots.iter().any(Slot::has_mark);
+        let (sequence, found) = match newer {
+            Some((sequence, content)) => (sequence, Found::Kept(content)),
+            None => (0, if had_one { Found::Damaged } else { Found::Nothing }),
         };
-        (Keeper { slots, sequence: newer.map_or(0, |sealed| sequence(&sealed)) }, found)
+        (Keeper { slots, checksum, sequence }, found)
     }
 
-    /// Keeps `bytes`; those beyond [`CAPACITY`] are left out.
-    pub fn write(&mut self, bytes: &[u8]) {
+    /// Keeps this.
+    pub fn write(&mut self, content: &Content) {
         self.sequence = self.sequence.wrapping_add(1);
-        let slot = &self.slots[self.sequence as usize % 2];
-        // The mark comes last: where a first write is cut short there was nothing, and not something that is damaged.
-        for (to, from) in slot.iter().zip(seal(self.sequence, bytes).as_chunks().0).rev() {
-            to.store(u32::from_le_bytes(*from), Ordering::Relaxed);
+        let [even, odd] = self.slots;
+        let slot = if self.sequence.is_multiple_of(2) { even } else { odd };
+        slot.write(self.sequence, content, &mut self.checksum);
+    }
+}
+
+impl Slot {
+    fn has_mark(&self) -> bool {
+        self.mark.load(Ordering::Relaxed) == MARK
+    }
+
+    /// The sequence number and the content of a copy that is good.
+    fn read(&self, checksum: &mut impl Checksum) -> Option<(u32, Content)> {
+        let sequence = self.sequence.load(Ordering::Relaxed);
+        let content = self.content.each_ref().map(|word| word.load(Ordering::Relaxed));
+        checksum.start(sequence);
+        for word in &content {
+            checksum.add(*word);
         }
+        let is_good = self.has_mark() && self.checksum.load(Ordering::Relaxed) == checksum.value();
+        is_good.then_some((sequence, content))
+    }
+
+    /// The mark comes last: where a first write is cut short there was nothing, and not something that is damaged.
+    fn write(&self, sequence: u32, content: &Content, checksum: &mut impl Checksum) {
+        self.sequence.store(sequence, Ordering::Relaxed);
+        checksum.start(sequence);
+        for (to, from) in self.content.iter().zip(content) {
+            to.store(*from, Ordering::Relaxed);
+            checksum.add(*from);
+        }
+        self.checksum.store(checksum.value(), Ordering::Relaxed);
+        self.mark.store(MARK, Ordering::Release);
     }
 }
 
@@ -76,63 +117,75 @@ fn is_later(sequence: u32, than: u32) -> bool {
     sequence.wrapping_sub(than) < 1 << 31
 }
 
-fn seal(sequence: u32, bytes: &[u8]) -> Sealed {
-    let mut sealed = [0; SIZE];
-    let length = bytes.len().min(CAPACITY);
-    sealed[..4].copy_from_slice(&MARK.to_le_bytes());
-    sealed[4..8].copy_from_slice(&sequence.to_le_bytes());
-    sealed[8..8 + length].copy_from_slice(&bytes[..length]);
-    let sum = checksum(&sealed);
-    sealed[SIZE - 4..].copy_from_slice(&sum);
-    sealed
-}
-
-/// A copy that is good.
-fn read(slot: &Slot) -> Option<Sealed> {
-    let mut sealed = [0; SIZE];
-    let words = slot.iter().map(|word| word.load(Ordering::Relaxed).to_le_bytes());
-    sealed.as_chunks_mut().0.iter_mut().zip(words).for_each(|(to, from)| *to = from);
-    (sealed[..4] == MARK.to_le_bytes() && sealed[SIZE - 4..] == checksum(&sealed)).then_some(sealed)
-}
-
-fn sequence(sealed: &Sealed) -> u32 {
-    let [_, _, _, _, a, b, c, d, ..] = *sealed;
-    u32::from_le_bytes([a, b, c, d])
-}
-
-fn content(sealed: &Sealed) -> [u8; CAPACITY] {
-    let mut content = [0; CAPACITY];
-    content.copy_from_slice(&sealed[8..8 + CAPACITY]);
-    content
-}
-
-/// CRC-32 of everything before it.
-fn checksum(sealed: &Sealed) -> [u8; 4] {
-    CRC.checksum(&sealed[..SIZE - 4]).to_le_bytes()
-}
-
 #[cfg(test)]
 mod tests {
+    use crc::{CRC_32_MPEG_2, Crc, Digest};
+
     use super::*;
 
-    fn memory(word: u32) -> Slots {
-        core::array::from_fn(|_| core::array::from_fn(|_| AtomicU32::new(word)))
+    /// Words of a copy.
+    const WORDS: usize = CAPACITY + 3;
+
+    static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_MPEG_2);
+
+    /// What the unit of the chip computes.
+    struct Software(Digest<'static, u32>);
+
+    impl Checksum for Software {
+        fn start(&mut self, word: u32) {
+            self.0 = CRC.digest();
+            self.add(word);
+        }
+
+        fn add(&mut self, word: u32) {
+            self.0.update(&word.to_be_bytes());
+        }
+
+        fn value(&self) -> u32 {
+            self.0.clone().finalize()
+        }
     }
 
-    fn found(copies: &Slots) -> Found {
-        Keeper::open(copies).1
+    impl Slot {
+        fn filled(word: u32) -> Slot {
+            let place = || AtomicU32::new(word);
+            Slot {
+                mark: place(),
+                sequence: place(),
+                content: core::array::from_fn(|_| place()),
+                checksum: place(),
+            }
+        }
+
+        /// In the order of a write.
+        fn words(&self) -> impl Iterator<Item = &AtomicU32> {
+            let inner = [&self.sequence].into_iter().chain(&self.content);
+            inner.chain([&self.checksum, &self.mark])
+        }
+    }
+
+    fn memory(word: u32) -> Slots {
+        core::array::from_fn(|_| Slot::filled(word))
+    }
+
+    fn open(slots: &Slots) -> (Keeper<'_, Software>, Found) {
+        Keeper::open(slots, Software(CRC.digest()))
+    }
+
+    fn found(slots: &Slots) -> Found {
+        open(slots).1
     }
 
     /// What `write` with this number keeps.
-    fn bytes(number: u8) -> [u8; CAPACITY] {
-        core::array::from_fn(|n| number.wrapping_mul(31).wrapping_add(n.to_le_bytes()[0]))
+    fn content(number: u32) -> Content {
+        core::array::from_fn(|n| number.wrapping_mul(0x9E37_79B9).rotate_left(u32::try_from(n).unwrap()))
     }
 
-    fn written(writes: u8) -> Slots {
-        let copies = memory(0xA5A5_A5A5);
-        let mut keeper = Keeper::open(&copies).0;
-        (1..=writes).for_each(|number| keeper.write(&bytes(number)));
-        copies
+    fn written(writes: u32) -> Slots {
+        let slots = memory(0xA5A5_A5A5);
+        let mut keeper = open(&slots).0;
+        (1..=writes).for_each(|number| keeper.write(&content(number)));
+        slots
     }
 
     #[test]
@@ -145,64 +198,53 @@ mod tests {
     #[test]
     fn the_latest_is_found_and_goes_on() {
         for writes in 1..=5 {
-            let copies = written(writes);
-            let (mut keeper, found) = Keeper::open(&copies);
-            assert_eq!(found, Found::Kept(bytes(writes)));
-            keeper.write(&bytes(100));
-            assert_eq!(Keeper::open(&copies).1, Found::Kept(bytes(100)));
+            let slots = written(writes);
+            let (mut keeper, found) = open(&slots);
+            assert_eq!(found, Found::Kept(content(writes)));
+            keeper.write(&content(100));
+            assert_eq!(open(&slots).1, Found::Kept(content(100)));
         }
     }
 
     #[test]
     fn the_sequence_may_wrap() {
-        let copies = memory(0);
-        let mut keeper = Keeper { slots: &copies, sequence: u32::MAX - 3 };
+        let slots = memory(0);
+        let mut keeper = Keeper { slots: &slots, checksum: Software(CRC.digest()), sequence: u32::MAX - 3 };
         for number in 0..8 {
-            keeper.write(&bytes(number));
-            assert_eq!(found(&copies), Found::Kept(bytes(number)));
+            keeper.write(&content(number));
+            assert_eq!(found(&slots), Found::Kept(content(number)));
         }
-    }
-
-    #[test]
-    fn fewer_bytes_are_filled_up_and_more_are_cut() {
-        let copies = memory(0);
-        let mut keeper = Keeper::open(&copies).0;
-        keeper.write(&[1, 2, 3, 4, 5]);
-        let mut expected = [0; CAPACITY];
-        expected[..5].copy_from_slice(&[1, 2, 3, 4, 5]);
-        assert_eq!(found(&copies), Found::Kept(expected));
-        keeper.write(&[7; CAPACITY + 1]);
-        assert_eq!(found(&copies), Found::Kept([7; CAPACITY]));
     }
 
     /// The power goes after any number of the words of a write, in the order in which they are written.
     #[test]
     fn a_write_that_is_cut_short_leaves_the_one_before() {
-        for writes in 0..4_u8 {
+        for writes in 0..4 {
+            let next = written(writes + 1);
             for done in 0..WORDS {
-                let copies = written(writes);
-                let sealed = seal(u32::from(writes) + 1, &bytes(writes + 1));
-                let target = &copies[(usize::from(writes) + 1) % 2];
-                for (to, from) in target.iter().zip(sealed.as_chunks().0).rev().take(done) {
-                    to.store(u32::from_le_bytes(*from), Ordering::Relaxed);
+                let slots = written(writes);
+                let target = (writes as usize + 1) % 2;
+                for (to, from) in slots[target].words().zip(next[target].words()).take(done) {
+                    to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
                 }
-                let expected = if writes == 0 { Found::Nothing } else { Found::Kept(bytes(writes)) };
+                let expected = if writes == 0 { Found::Nothing } else { Found::Kept(content(writes)) };
                 // From the second round on the mark is there already: without it the write is complete.
                 let is_whole = writes >= 2 && done == WORDS - 1;
-                let expected = if is_whole { Found::Kept(bytes(writes + 1)) } else { expected };
-                assert_eq!(found(&copies), expected, "{writes} writes and {done} words");
+                let expected = if is_whole { Found::Kept(content(writes + 1)) } else { expected };
+                assert_eq!(found(&slots), expected, "{writes} writes and {done} words");
             }
         }
     }
 
     #[test]
     fn any_flipped_bit_of_both_copies_is_damage() {
-        for bit in 32..WORDS * 32 {
-            let copies = written(2);
-            for copy in &copies {
-                copy[bit / 32].fetch_xor(1 << (bit % 32), Ordering::Relaxed);
+        // All but the mark, without which there is no copy.
+        for bit in 0..(WORDS - 1) * 32 {
+            let slots = written(2);
+            for slot in &slots {
+                slot.words().nth(bit / 32).unwrap().fetch_xor(1 << (bit % 32), Ordering::Relaxed);
             }
-            assert_eq!(found(&copies), Found::Damaged, "bit {bit}");
+            assert_eq!(found(&slots), Found::Damaged, "bit {bit}");
         }
     }
 }

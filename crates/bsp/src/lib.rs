@@ -1,8 +1,8 @@
 //! Board support: everything that touches a register of the STM32F4, and the only crate with `unsafe`.
 //!
-//! What is pure logic (bit timing, filter packing, the transmit queue, the extension of the counter, supervision, the
-//! crash record, what is kept through a loss of power) has modules of its own without hardware, which are built and tested on the host as well. The rest is
-//! built for the target only.
+//! What is pure logic (bit timing, filter packing, the transmit queue, the extension of the counter, oversampling,
+//! supervision, the crash record, what is kept through a loss of power) has modules of its own without hardware, which are
+//! built and tested on the host as well. The rest is built for the target only.
 #![no_std]
 // On the host, where only the modules without hardware are: values are cut to the width of a register everywhere else.
 #![cfg_attr(not(target_os = "none"), warn(clippy::pedantic))]
@@ -12,14 +12,17 @@ pub mod back_off;
 pub mod bit_rate_detection;
 pub mod bit_timing;
 pub mod bus_state;
+#[cfg(target_os = "none")]
 mod checksum;
 pub mod crash_record;
 pub mod debounce;
 pub mod extension;
 pub mod filters;
+pub mod handover;
 pub mod kept;
 pub mod losses;
 pub mod mailbox;
+pub mod oversampling;
 pub mod reset_cause;
 pub mod sectors;
 pub mod serial_number;

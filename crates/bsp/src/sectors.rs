@@ -1,7 +1,7 @@
 //! The sectors of the flash (RM0390, table 5): four of 16 KiB, one of 64 KiB, the rest 128 KiB.
 
 /// First address of the flash.
-const FLASH: u32 = 0x0800_0000;
+pub const FLASH: u32 = 0x0800_0000;
 const KIB: u32 = 1024;
 /// Of a part with 512 KiB; the larger ones go on in the same way.
 const SIZES: [u32; 8] = [16 * KIB, 16 * KIB, 16 * KIB, 16 * KIB, 64 * KIB, 128 * KIB, 128 * KIB, 128 * KIB];

@@ -6,7 +6,7 @@ pub struct CanId(u16);
 
 impl CanId {
     /// NMT commands (CiA 301, 7.3.5).
-    pub(crate) const NMT: CanId = CanId(0x000);
+    pub const NMT: CanId = CanId(0x000);
 
     /// `None` above 7FFh.
     #[must_use]

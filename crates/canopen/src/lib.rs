@@ -1,7 +1,7 @@
 //! Sans-IO CANopen (CiA 301, 305): frame and time in, frames and the next deadline out.
 //!
 //! [`Device`] is a whole CANopen device. It owns its protocols and the values of its object dictionary; what the
-//! dictionary contains is a table ([`dictionary`]), and what the device does beyond CANopen is its [`Application`].
+//! dictionary contains is a table ([`dictionary`](mod@dictionary)), and what the device does beyond CANopen is its [`Application`].
 //! Each message of the protocol has a type that can only be valid, with `parse` and `encode`.
 //!
 //! Nothing here reads a clock, blocks, allocates or panics, whatever arrives from the bus.

@@ -86,10 +86,7 @@ const ROWS: &[&[Object]] = &[
 const COUNT: usize = dictionary::count(ROWS);
 static TABLE: [Object; COUNT] = dictionary::gather(ROWS);
 const SIZE: usize = dictionary::image_size(&TABLE);
-const ENTRIES: [Entry; COUNT] = dictionary::compile(&TABLE);
-const DEFAULTS: [u8; SIZE] = dictionary::default_image(&TABLE);
-const _: () = dictionary::check(&TABLE);
-const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+const DICTIONARY: Dictionary = canopen::dictionary!(&TABLE);
 
 struct Nothing;
 

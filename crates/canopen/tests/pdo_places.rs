@@ -52,10 +52,7 @@ const PARTS: &[&[Object]] = &[
 ];
 static TABLE: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 const SIZE: usize = dictionary::image_size(&TABLE);
-const ENTRIES: [Entry; TABLE.len()] = dictionary::compile(&TABLE);
-const DEFAULTS: [u8; SIZE] = dictionary::default_image(&TABLE);
-const _: () = dictionary::check(&TABLE);
-const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+const DICTIONARY: Dictionary = canopen::dictionary!(&TABLE);
 
 struct Nothing;
 

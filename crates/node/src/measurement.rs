@@ -85,13 +85,40 @@ impl Measurement {
     /// Processes the sums of one millisecond, what was read of the position sensors at its end, and which buttons are
     /// pressed, debounced.
     pub fn sample(&mut self, raw: &RawSample, encoder: &RawEncoder, buttons: [bool; BUTTONS]) -> Snapshot {
-        Snapshot {
-            pressure: self.has_pressure.then(|| self.pressure.sample(raw)),
-            encoder: self.has_encoder.then(|| self.encoder.sample(encoder)),
-            lift: self
-                .has_lift
-                .then(|| self.lift.sample(&RawLift { encoder: *encoder, pressure: *raw, buttons })),
+        let mut snapshot = Snapshot::default();
+        self.update(raw, encoder, buttons, &mut snapshot);
+        snapshot
+    }
+
+    /// The same, with the snapshot where it is to be.
+    pub fn update(
+        &mut self,
+        raw: &RawSample,
+        encoder: &RawEncoder,
+        buttons: [bool; BUTTONS],
+        snapshot: &mut Snapshot,
+    ) {
+        if self.has_pressure {
+            self.pressure.update(raw, snapshot.pressure.get_or_insert_default());
+        } else {
+            snapshot.pressure = None;
         }
+        if self.has_encoder {
+            self.encoder.update(encoder, snapshot.encoder.get_or_insert_default());
+        } else {
+            snapshot.encoder = None;
+        }
+        if self.has_lift {
+            self.update_lift(&RawLift { encoder: *encoder, pressure: *raw, buttons }, snapshot);
+        } else {
+            snapshot.lift = None;
+        }
+    }
+
+    /// Out of the way of the others.
+    #[inline(never)]
+    fn update_lift(&mut self, raw: &RawLift, snapshot: &mut Snapshot) {
+        snapshot.lift = Some(self.lift.sample(raw));
     }
 
     /// What is to outlive a loss of power; `None` where no position is measured.
@@ -101,6 +128,15 @@ impl Measurement {
             (true, _) => Some(self.encoder.kept()),
             (_, true) => Some(self.lift.kept()),
             _ => None,
+        }
+    }
+
+    /// Hands on the same as it is to be stored: see [`Kept::to_words`]. Without a copy on the way, a thousand times a second.
+    pub fn keep(&self, store: impl FnOnce(&[u32; Kept::WORDS])) {
+        match (self.has_encoder, self.has_lift) {
+            (true, _) => store(&self.encoder.kept_words()),
+            (_, true) => store(&self.lift.kept().to_words()),
+            _ => {}
         }
     }
 }

@@ -35,12 +35,12 @@ pub struct Parcel {
 }
 
 impl Parcel {
-    /// An empty one.
+    /// An empty one, for a node of this personality. A constant of its size would lie in flash.
     #[must_use]
-    pub const fn new() -> Parcel {
+    pub fn new(personality: Personality) -> Parcel {
         Parcel {
             job: None,
-            personality: Personality::Pressure,
+            personality,
             node_id: None,
             image: [0; IMAGE_SIZE],
             device: [0; DeviceRecord::LEN],
@@ -93,12 +93,6 @@ impl Parcel {
             Group::Communication => set(group, layout(self.personality), &self.communication),
             Group::Device => set(group, DeviceRecord::VERSION, &self.device),
         }
-    }
-}
-
-impl Default for Parcel {
-    fn default() -> Parcel {
-        Parcel::new()
     }
 }
 

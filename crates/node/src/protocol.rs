@@ -4,7 +4,7 @@ use crate::faults::Conditions;
 use crate::profile::{IMAGE_SIZE, Profile};
 use crate::{Parameters, Request, Setup, Snapshot};
 use canopen::nmt::State;
-use canopen::{Action, CanId, Device, Frame, Instant, Job, Transmit};
+use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
 use profiles::lift::panel::LAMPS;
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call.
@@ -35,6 +35,12 @@ impl Protocol {
     /// and again for `Request::ResetCommunication`.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) {
         self.device.start(now, out);
+    }
+
+    /// The node-ID in use; `None` while it waits for LSS to give it one.
+    #[must_use]
+    pub fn node_id(&self) -> Option<NodeId> {
+        self.device.node_id()
     }
 
     /// The NMT state.

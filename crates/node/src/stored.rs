@@ -21,28 +21,29 @@ pub(crate) fn layout(personality: Personality) -> u16 {
 /// The calibration is that of the device, whatever its personality.
 pub(crate) const CALIBRATION_LAYOUT: u16 = FORM as u16;
 
-/// The packed values of one group.
+/// The packed values of one group. Nothing but zeros while there are none: no copy of that lies in flash.
 #[derive(Debug)]
 pub(crate) struct Kept<const N: usize> {
     pub(crate) packed: Vec<u8, N>,
-    pub(crate) is_sound: bool,
+    is_damaged: bool,
 }
 
 impl<const N: usize> Kept<N> {
-    const EMPTY: Kept<N> = Kept { packed: Vec::new(), is_sound: true };
+    const EMPTY: Kept<N> = Kept { packed: Vec::new(), is_damaged: false };
 
     fn load<F: ReadNorFlash>(&mut self, group: storage::Group, layout: u16, view: &mut View<F>) {
-        self.is_sound = read(group, layout, view, &mut self.packed) && view.health(group) == Health::Good;
+        let is_sound = read(group, layout, view, &mut self.packed) && view.health(group) == Health::Good;
+        self.is_damaged = !is_sound;
     }
 
     /// Takes what has just been stored.
     pub(crate) fn replace(&mut self, packed: &[u8]) {
         self.packed.clear();
-        self.is_sound = self.packed.extend_from_slice(packed).is_ok();
+        self.is_damaged = self.packed.extend_from_slice(packed).is_err();
     }
 
     pub(crate) fn get(&self) -> canopen::Stored<'_> {
-        canopen::Stored { packed: &self.packed, is_sound: self.is_sound }
+        canopen::Stored { packed: &self.packed, is_sound: !self.is_damaged }
     }
 }
 
@@ -67,8 +68,9 @@ impl Stored {
 
     /// 1F57h:1 as the running program gives it (CiA 302-3): 0, or in bits 1 to 7 code 3, format or CRC error.
     pub(crate) fn flash_status(&self) -> u32 {
-        let is_sound = self.communication.is_sound && self.application.is_sound && self.calibration.is_sound;
-        if is_sound { 0 } else { 3 << 1 }
+        let is_damaged =
+            self.communication.is_damaged || self.application.is_damaged || self.calibration.is_damaged;
+        if is_damaged { 3 << 1 } else { 0 }
     }
 
     pub(crate) fn get(&self, group: Group) -> canopen::Stored<'_> {

@@ -68,7 +68,7 @@ prop_compose! {
         (a, b, c, series) in (real(), real(), real(), real()),
     ) -> Calibration {
         let breaks = PressureCalibration::default();
-        let thermistor = Thermistor { a, b, c, series };
+        let thermistor = Thermistor { a, b, c, series, ..Thermistor::default() };
         Calibration {
             pressure: PressureCalibration { start, end, zero, span, reference, ..breaks },
             temperature: TemperatureCalibration { thermometer, factor, offset, thermistor },

@@ -26,7 +26,8 @@ pub(crate) const RECORD_HEAD: u32 = 2 * WORD;
 pub(crate) const KIND_VALUE: u8 = 1;
 pub(crate) const KIND_RESTORED: u8 = 2;
 
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// A reference, as the linker keeps one of equal constants of several crates, but every static: the table takes 1 KiB.
+static CRC: &Crc<u32> = &Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// A number beside its complement. A torn word has some zeros of the target missing, in one half or the other, so
 /// it is never another valid number; nor is a word with an odd count of flipped bits.

@@ -53,9 +53,9 @@ impl Stay {
     }
 }
 
-/// Decides at every start. It reads the application once for its CRC, 1.9 million instructions for the longest, so the
-/// clock should be fast by then; the signature was checked before the image came to where it is. It writes only where a commit was cut: a record that may read otherwise next time is revoked, so what
-/// this start decides holds for good.
+/// Decides at every start. It reads the application once for its CRC, so the clock should be fast by then; the signature
+/// was checked before the image came to where it is. It writes only where a commit was cut: a record that may read
+/// otherwise next time is revoked, so what this start decides holds for good.
 ///
 /// `flash` must not be busy.
 pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {

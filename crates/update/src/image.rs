@@ -2,10 +2,8 @@
 
 use core::ops::Range;
 
-use crc::Digest;
-
 use crate::area::Area;
-use crate::checksum;
+use crate::checksum::{self, Digest};
 use crate::flash::{Flash, read_step};
 use crate::header::{HEADER, HEADER_LEN, Header};
 use crate::key::KEY_LEN;
@@ -40,7 +38,7 @@ pub(crate) fn candidate<F: Flash>(flash: &mut F, target: &Target) -> Result<Head
 pub(crate) struct CrcCheck {
     expected: u32,
     rest: Range<u32>,
-    digest: Digest<'static, u32>,
+    digest: Digest,
 }
 
 impl CrcCheck {

@@ -54,6 +54,8 @@ pub struct Updater<F> {
     target: Target,
     state: State,
     status: Status,
+    /// Of the last download that was found good.
+    identification: Option<u32>,
 }
 
 enum State {
@@ -82,7 +84,7 @@ impl<F: Flash> Updater<F> {
     /// A machine with nothing to do. `status` is what 1F57h reads until something was done: [`Status::GOOD`], or that of
     /// [`crate::Stay`].
     pub fn new(flash: F, target: Target, status: Status) -> Updater<F> {
-        Updater { flash, target, state: State::Idle, status }
+        Updater { flash, target, state: State::Idle, status, identification: None }
     }
 
     /// The flash.
@@ -109,6 +111,11 @@ impl<F: Flash> Updater<F> {
         if self.is_busy() { Status::BUSY } else { self.status }
     }
 
+    /// What identifies the program that was downloaded and found good: the CRC of its code. `None` until then.
+    pub fn identification(&self) -> Option<u32> {
+        self.identification
+    }
+
     /// What the next poll will do.
     pub fn next(&self) -> Next {
         match &self.state {
@@ -126,6 +133,7 @@ impl<F: Flash> Updater<F> {
     /// [`Refusal::Unspecified`] while the machine is busy; [`Refusal::Write`].
     pub fn clear(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
+        self.identification = None;
         let outcome = self.record().revoke(&mut self.flash);
         let erase = Erase::new(self.target.layout.staging());
         self.settle(outcome.map(|()| State::Clearing(erase)))
@@ -267,6 +275,7 @@ impl<F: Flash> Updater<F> {
 
     /// The staged image is good.
     fn accept(&mut self, then: Then, header: Header) -> Result<State, Refusal> {
+        self.identification = Some(header.code_crc());
         match then {
             Then::Commit => self.record().write(&mut self.flash).map(|()| State::Committed),
             Then::Copy => {

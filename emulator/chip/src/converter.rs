@@ -97,6 +97,7 @@ impl Stm32f4 {
         match channel {
             0 => self.plant.pressure_input(at),
             1 => self.plant.supply_input(),
+            12 => self.plant.thermistor_input(at),
             REFERENCE if sensors => self.plant.reference_input(),
             _ if sensors && channel == self.variant.temperature_channel() => self.plant.temperature_input(at),
             _ => 0.0,

@@ -64,6 +64,8 @@ pub(crate) struct Core<P> {
     /// The emulator itself runs code, not the program.
     pub(crate) clearing_monitor: bool,
     pub(crate) without: Option<Mechanism>,
+    /// Flash is busy, and what runs does not come from it: loads from there are to be noticed.
+    pub(crate) flash_closed: bool,
     cyccnt: Option<Cyccnt>,
 }
 
@@ -95,6 +97,7 @@ impl<P: Peripherals> Core<P> {
             reset_requested: false,
             clearing_monitor: false,
             without: None,
+            flash_closed: false,
             cyccnt: None,
         }
     }

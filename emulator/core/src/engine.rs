@@ -17,6 +17,9 @@ const HIDDEN: u64 = 0x1F00_0000;
 /// `clrex; wfi`
 const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
 
+/// Whatever lies below is flash.
+const RAM: u32 = 0x2000_0000;
+
 /// YIELD and WFE.
 const HINTS: [u16; 2] = [0xBF10, 0xBF20];
 /// The upper byte of UDF.
@@ -56,7 +59,8 @@ fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32)
         return guard_hidden(cpu);
     }
     let core = cpu.get_data();
-    if core.halt.is_some() || core.needs_attention() || core.nvic.could_preempt() && preempts(cpu) {
+    let waits = core.flash_closed && address < u64::from(RAM);
+    if waits || core.halt.is_some() || core.needs_attention() || core.nvic.could_preempt() && preempts(cpu) {
         cpu.get_data_mut().halt.get_or_insert(Halt::Attention);
         let _ = cpu.emu_stop();
         return;
@@ -65,6 +69,17 @@ fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32)
     let core = cpu.get_data_mut();
     core.profile.visit(address as u32, size);
     core.spend(cost.instructions, cost.cycles);
+}
+
+/// Lets loads from flash fail while it is busy, or lets them through again.
+pub(crate) fn close_flash<P: Peripherals>(cpu: &mut Cpu<P>, model: &Model, closed: bool) {
+    if cpu.get_data().flash_closed != closed {
+        let protection = if closed { Prot::EXEC } else { Prot::READ | Prot::EXEC };
+        let _ = cpu.mem_protect(model.flash.start.into(), model.flash.len() as u64, protection);
+        // The library goes by what it has cached of the pages.
+        let _ = cpu.ctl_flush_tlb();
+        cpu.get_data_mut().flash_closed = closed;
+    }
 }
 
 /// The page of our own is not there for the program.
@@ -240,7 +255,7 @@ pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]
     if !cpu.get_data().lacks(Mechanism::Retranslation) {
         let end = u64::from(address) + bytes.len() as u64;
         cpu.ctl_remove_cache(address.into(), end)?;
-        let flash = address < 0x2000_0000;
+        let flash = address < RAM;
         if flash {
             cpu.get_data_mut().costs.forget();
         }

@@ -22,7 +22,7 @@
 //!   twelve cycles of an entry nests instead of going first.
 //! * A refused access to a peripheral is a precise bus fault with the right address, but with the program counter of
 //!   its block. Accesses to unmapped memory have the exact one.
-//! * While flash is busy only code fetches from it wait, not loads by a program in RAM.
+//! * Flash becomes busy with the end of the block that has stored to it. A load from busy flash in an IT block is done once more from the start of the block.
 //! * WFE is a hint that never sleeps; there is no MPU, no bit-band alias of RAM and no alias of flash at address 0.
 //! * The floating-point unit works whatever CPACR says.
 

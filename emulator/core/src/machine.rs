@@ -42,6 +42,8 @@ pub struct Machine<P: Peripherals + 'static> {
     sleeping: bool,
     locked: Option<u32>,
     stall: Time,
+    /// A load waits for flash: until then nothing else happens in the core.
+    loading: bool,
     incidents: Vec<(Time, Incident)>,
 }
 
@@ -60,6 +62,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             sleeping: false,
             locked: None,
             stall: Time::ZERO,
+            loading: false,
             incidents: vec![],
         })
     }
@@ -252,6 +255,10 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// One step of the core: an exception, sleep, or code.
     fn step(&mut self, until: Time) {
         let masks = engine::masks(&self.cpu);
+        if self.loading && self.now() < self.stall {
+            return self.pass_to(self.stall.min(until));
+        }
+        self.loading = false;
         let core = self.cpu.get_data();
         if self.locked.is_some() {
             return self.idle(until);
@@ -290,6 +297,8 @@ impl<P: Peripherals + 'static> Machine<P> {
     }
 
     fn run_code(&mut self) {
+        let closed = self.now() < self.stall && !self.cpu.get_data().lacks(Mechanism::FlashLoads);
+        engine::close_flash(&mut self.cpu, &self.model, closed);
         let core = self.cpu.get_data_mut();
         core.halt = None;
         core.unmapped = None;
@@ -301,6 +310,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),
             (_, Some(Halt::Undefined)) => self.take_fault(Fault::undefined(self.pc())),
             (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
+            (Err(uc_error::READ_PROT), None) if self.cpu.get_data().flash_closed => self.loading = true,
             (Err(error), None) => self.take_fault(self.fault_of(error)),
             (Ok(()), None) => self.sleeping = true,
         }
@@ -343,6 +353,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.sleeping = false;
         self.locked = None;
         self.stall = Time::ZERO;
+        self.loading = false;
         let vectors = self.model.flash.start;
         let (stack, entry) = (self.word(vectors).unwrap_or(0), self.word(vectors + 4).unwrap_or(0));
         self.reset_registers(stack, entry);

@@ -56,6 +56,11 @@ fn code_programmed_into_flash_runs() {
 }
 
 #[test]
+fn a_load_from_busy_flash_waits() {
+    shows("busy_flash", Mechanism::FlashLoads);
+}
+
+#[test]
 fn wfi_sleeps_until_the_next_tick() {
     shows("systick", Mechanism::Sleep);
 }

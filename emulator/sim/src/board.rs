@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use canbus::{Controller, Time};
 use chip::{Board as Wiring, Stm32f4, Variant};
 use emulator::{Machine, Model, Stop};
+use update::HEADER_LEN;
 
 use crate::figures;
 use crate::flash;
@@ -17,10 +18,15 @@ use crate::stimuli::Stimulus;
 use crate::summary::NodeSummary;
 use crate::traffic::Heard;
 
+/// Where the application's header is (memory.x).
+const HEADER_ADDRESS: u32 = 0x0801_0000;
+
 /// The ELF files that every board runs.
 pub struct Images {
     /// The application.
     pub(crate) firmware: Image,
+    /// Its header, signed with the development key.
+    pub(crate) header: Option<[u8; HEADER_LEN]>,
     /// What starts it, if anything does.
     pub(crate) bootloader: Option<Image>,
 }
@@ -66,6 +72,9 @@ impl Board {
         let bootloader = images.bootloader.as_ref().map(|image| load(&mut machine, image)).transpose()?;
         let bootloader_flash = bootloader.map_or(0, |bootloader| bootloader.flash_size);
         let firmware = load(&mut machine, &images.firmware)?;
+        if let Some(header) = &images.header {
+            machine.write(HEADER_ADDRESS, header).map_err(|_| anyhow::anyhow!("no flash for a header"))?;
+        }
         machine.power_on(Time::ZERO);
         Ok(Board {
             id,

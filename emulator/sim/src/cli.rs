@@ -69,9 +69,13 @@ pub struct Options {
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("pressure", text))]
     pub pressure: Vec<Targeted<Stimulus>>,
 
-    /// Temperature of the sensor in K, e.g. const:298.15.
+    /// Temperature of the chip in K, e.g. const:298.15.
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("temperature", text))]
     pub temperature: Vec<Targeted<Stimulus>>,
+
+    /// Temperature of the thermistor in K, e.g. const:298.15.
+    #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("thermistor", text))]
+    pub thermistor: Vec<Targeted<Stimulus>>,
 
     /// The encoder's shaft in revolutions, or its speed, e.g. const:0.25 or rpm:6000.
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("shaft", text))]
@@ -201,7 +205,7 @@ mod tests {
     #[test]
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
-             --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 \
+             --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
              --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);

@@ -23,12 +23,14 @@ pub fn bits_per_second(kbit: u16) -> u32 {
 pub fn world(options: &Options) -> Result<World> {
     let firmware = Image::load(&options.firmware)?;
     let bootloader = options.bootloader.as_deref().map(Image::load).transpose()?;
-    let images = Rc::new(Images { firmware, bootloader });
+    let header = bootloader.is_some().then(|| sign::product::development_image(&firmware.elf));
+    let header = header.transpose()?.map(|image| image.header.encode());
+    let images = Rc::new(Images { firmware, header, bootloader });
     let boards = options.nodes.iter().map(|node| board(node, options, &images));
     let boards = boards.collect::<Result<Vec<Board>>>()?;
     let mut world = World::new(boards, options.bitrate, options.load);
-    let Options { pressure, temperature, shaft, button, fault, .. } = options;
-    [pressure, temperature, shaft, button, fault]
+    let Options { pressure, temperature, thermistor, shaft, button, fault, .. } = options;
+    [pressure, temperature, thermistor, shaft, button, fault]
         .into_iter()
         .flatten()
         .for_each(|stimulus| world.apply(stimulus));

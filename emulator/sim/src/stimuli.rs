@@ -13,8 +13,10 @@ use crate::cli::board_number;
 pub enum Stimulus {
     /// In Pa.
     Pressure(Signal),
-    /// In K.
+    /// Of the chip, in K.
     Temperature(Signal),
+    /// Of the thermistor, in K.
+    Thermistor(Signal),
     /// In revolutions, or a speed.
     Shaft(Motion),
     /// A button is pressed or released.
@@ -24,7 +26,7 @@ pub enum Stimulus {
 }
 
 impl Stimulus {
-    /// Reads `[ID=]SPEC` of a kind: pressure, temperature, shaft, button or fault.
+    /// Reads `[ID=]SPEC` of a kind: pressure, temperature, thermistor, shaft, button or fault.
     ///
     /// # Errors
     /// One line that says what is wrong.
@@ -32,11 +34,12 @@ impl Stimulus {
         match kind {
             "pressure" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Pressure)),
             "temperature" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Temperature)),
+            "thermistor" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Thermistor)),
             "shaft" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Shaft)),
             "button" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Button)),
             "fault" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Fault)),
             _ => Err(format!(
-                "{kind:?} is no stimulus; there are pressure, temperature, shaft, button and fault"
+                "{kind:?} is no stimulus; there are pressure, temperature, thermistor, shaft, button and fault"
             )),
         }
     }
@@ -46,6 +49,7 @@ impl Stimulus {
         match self.clone() {
             Stimulus::Pressure(signal) => plant.set_pressure(signal, now),
             Stimulus::Temperature(signal) => plant.set_temperature(signal, now),
+            Stimulus::Thermistor(signal) => plant.set_thermistor(signal, now),
             Stimulus::Shaft(motion) => plant.set_shaft(motion, now),
             Stimulus::Button(push) => plant.push(push, now),
             Stimulus::Fault(fault) => plant.add_fault(fault),

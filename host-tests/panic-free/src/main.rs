@@ -7,7 +7,9 @@
 
 use canopen::{Frame, Instant, QueueFull, Transmit};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use node::{BusEvent, Fault, Measurement, Parcel, Protocol, RawEncoder, RawSample, Setup, Snapshot, Start};
+use node::{
+    BusEvent, Fault, Kept, Measurement, Parcel, Protocol, RawEncoder, RawSample, Setup, Snapshot, Start,
+};
 use storage::{Pages, Store, View};
 
 unsafe extern "C" {
@@ -127,7 +129,8 @@ extern "C" fn measure(
 /// What the encoder keeps, out and in again.
 #[unsafe(no_mangle)]
 extern "C" fn power_cycle(measurement: &mut Measurement) {
-    *measurement = Measurement::new(measurement.kept().map_or(Start::First, Start::Kept));
+    let kept = measurement.kept().map(|kept| Kept::from_words(&kept.to_words()));
+    *measurement = Measurement::new(kept.map_or(Start::First, Start::Kept));
 }
 
 /// Storing.

@@ -196,8 +196,8 @@ fn device_type(world: &mut World, master: &Master) -> Vec<u8> {
 
 #[test]
 fn a_node_is_what_it_is_told_to_be_on_the_command_line_and_then_by_sdo() {
-    let types = [0x0002_0194_u32, 0x0005_0196, 0xFFFF_0196].map(u32::to_le_bytes);
-    for (number, name) in ["pressure", "encoder", "combined"].into_iter().enumerate() {
+    let types = [0x0002_0194_u32, 0x0005_0196, 0xFFFF_0196, 0x0000_01A1].map(u32::to_le_bytes);
+    for (number, name) in ["pressure", "encoder", "combined", "lift"].into_iter().enumerate() {
         let mut world = world(&format!("--bitrate 1000 --node 1:{name}"));
         let master = Master::join(&mut world);
         world.run_until(SECOND);

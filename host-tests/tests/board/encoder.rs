@@ -4,7 +4,7 @@ use canbus::Time;
 use sim::stimuli::Stimulus;
 use sim::world::World;
 
-use crate::support::{Master, SECOND, START_ALL, SYNC, run, world};
+use crate::support::{Master, SECOND, START_ALL, SYNC, read, run, world, write};
 
 /// TPDO 2, which carries the position with every SYNC.
 const TPDO2: u16 = 0x281;
@@ -44,24 +44,6 @@ fn stimulate(world: &mut World, kind: &str, spec: &str) {
 
 fn wait(world: &mut World, millis: u64) {
     world.run_until(world.now() + Time::from_millis(millis));
-}
-
-fn request(command: u8, (index, sub): (u16, u8), value: u32) -> [u8; 8] {
-    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-    [command, low, high, sub, a, b, c, d]
-}
-
-fn read(world: &mut World, master: &Master, object: (u16, u8)) -> u32 {
-    let answer = master.ask(world, 1, &request(0x40, object, 0));
-    assert_eq!(answer[0] & 0xE3, 0x43, "{object:x?}: {answer:x?}");
-    let unused = usize::from(answer[0] >> 2 & 3);
-    answer[4..8 - unused].iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
-}
-
-/// Writes an object of `size` bytes.
-fn write(world: &mut World, master: &Master, object: (u16, u8), size: u8, value: u32) {
-    let answer = master.ask(world, 1, &request(0x23 | (4 - size) << 2, object, value));
-    assert_eq!(answer[0], 0x60, "{object:x?}: {answer:x?}");
 }
 
 /// Where the shaft is, in steps.
@@ -188,20 +170,6 @@ fn faults_of_the_absolute_encoder_are_told() {
         let position = f64::from(read(&mut world, &master, POSITION));
         assert_eq!(position, 2.25 * STEPS, "the last good one, at {at} ms");
     }
-}
-
-/// It is written after every sample, below the sampling.
-#[test]
-fn to_keep_the_position_costs_little() {
-    /// TAMP_STAMP, to which the firmware binds the task: interrupt 2.
-    const REMEMBER: usize = 16 + 2;
-    let (mut world, _) = start("--shaft rpm:6000");
-    let summary = run(&mut world, SECOND);
-    let stats = world.machine(0).stats().exceptions[REMEMBER];
-    let each = stats.instructions / stats.entries;
-    println!("{each} instructions to keep a position");
-    assert!(stats.entries.abs_diff(summary.nodes[0].sampling.samples) < 10, "{stats:?}");
-    assert!(each < 2000, "{stats:?}");
 }
 
 /// Switches the board off for a second, and on again.

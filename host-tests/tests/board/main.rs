@@ -3,10 +3,13 @@
 mod bus_faults;
 mod chip_faults;
 mod configuring;
+mod cost;
 mod differential;
 mod encoder;
 mod faults;
+mod lift;
 mod measuring;
 mod running;
 mod support;
 mod timing;
+mod update;

@@ -1,9 +1,10 @@
 //! What the sensors see arrives on the bus, and how old it is then.
 
 use canbus::Time;
+use sim::stimuli::Stimulus;
 use sim::world::World;
 
-use crate::support::{Master, SECOND, START_ALL, SYNC, TPDO1, world};
+use crate::support::{Master, SECOND, START_ALL, SYNC, TPDO1, read, world, write};
 
 /// A value is the mean of one millisecond, published at its end, and the next SYNC comes within another: so the pressure
 /// that it tells was there at some moment of the two milliseconds before the SYNC.
@@ -56,5 +57,62 @@ fn a_step_a_sine_and_a_ramp_arrive_at_most_one_sample_old() {
         println!("{flags}: {miss:.0} Pa off at most, while it moves by up to {moved:.0} Pa in two samples");
         assert!(miss <= RESOLUTION, "{flags}: {miss} Pa");
         assert!(moved > moves, "{flags}: a signal that stands still would show nothing: {moved} Pa");
+    }
+}
+
+const FIELD_VALUE: (u16, u8) = (0x6100, 2);
+const STATUS: (u16, u8) = (0x6150, 2);
+const FLAGS: (u16, u8) = (0x3000, 1);
+const THERMOMETER: (u16, u8) = (0x2201, 1);
+const LOCK: (u16, u8) = (0x2203, 0);
+
+/// The chip is at 300 K, the thermistor somewhere else: what is measured is that which the parameter selects.
+#[test]
+fn a_parameter_selects_the_sensor_of_the_chip_or_the_thermistor() {
+    let mut world = world("--bitrate 1000 --temperature const:300 --thermistor const:350");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    let measured = |world: &mut World| f32::from_bits(read(world, &master, FIELD_VALUE));
+    let chip = measured(&mut world);
+    assert!((chip - 300.0).abs() < 0.4, "{chip} K");
+    write(&mut world, &master, LOCK, 4, u32::from_le_bytes(*b"cali"));
+    write(&mut world, &master, THERMOMETER, 1, 1);
+    for kelvin in [350.0, 298.15, 240.0] {
+        let now = world.now();
+        world.apply(&Stimulus::parse("thermistor", &format!("const:{kelvin}")).unwrap());
+        world.run_until(now + Time::from_millis(5));
+        let thermistor = measured(&mut world);
+        // A step of the converter is 0.02 K at 25 degC, and 0.13 K at 240 K.
+        assert!((thermistor - kelvin).abs() < 0.15, "{thermistor} K for {kelvin} K");
+    }
+    let summary = world.summary(1.0, 0);
+    assert!(summary.nodes[0].unmodelled.is_empty() && summary.nodes[0].incidents.is_empty(), "{summary}");
+}
+
+#[test]
+fn a_broken_thermistor_is_told() {
+    const EMCY: u16 = 0x081;
+    let mut world = world("--bitrate 1000 --fault open-thermistor@2..3 --fault shorted-thermistor@4..5");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    write(&mut world, &master, LOCK, 4, u32::from_le_bytes(*b"cali"));
+    write(&mut world, &master, THERMOMETER, 1, 1);
+    for (millis, is_broken) in [(1500, false), (2500, true), (3500, false), (4500, true), (5500, false)] {
+        master.heard(&mut world, EMCY);
+        world.run_until(Time::from_millis(millis));
+        let codes: Vec<_> =
+            master.heard(&mut world, EMCY).iter().map(|frame| frame.bytes()[..2].to_vec()).collect();
+        let expected: &[[u8; 2]] = match (millis, is_broken) {
+            (1500, _) => &[],
+            // 8001h, and 0000h for a fault that has gone.
+            (_, true) => &[[0x01, 0x80]],
+            (_, false) => &[[0, 0]],
+        };
+        assert_eq!(codes, expected, "at {millis} ms");
+        assert_eq!(read(&mut world, &master, FLAGS), u32::from(is_broken) << 3, "at {millis} ms");
+        assert_eq!(read(&mut world, &master, STATUS) & 1, u32::from(is_broken), "at {millis} ms");
+        let kelvin = f32::from_bits(read(&mut world, &master, FIELD_VALUE));
+        let expected = if is_broken { 0.0 } else { 298.15 };
+        assert!((kelvin - expected).abs() < 0.05, "{kelvin} K at {millis} ms");
     }
 }

@@ -36,6 +36,11 @@ fn images() -> PathBuf {
     dir
 }
 
+/// The ELF file of the application.
+pub(crate) fn firmware() -> Vec<u8> {
+    std::fs::read(images().join("firmware")).unwrap()
+}
+
 /// A world as `cargo sim` with these flags has it, without its sockets.
 pub(crate) fn world(flags: &str) -> World {
     let dir = images();
@@ -69,6 +74,12 @@ pub(crate) fn comes_back(world: &mut World) -> String {
 
 pub(crate) fn frame(id: u16, bytes: &[u8]) -> Frame {
     Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
+}
+
+/// An SDO request for an object.
+fn request(command: u8, (index, sub): (u16, u8), value: u32) -> [u8; 8] {
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+    [command, low, high, sub, a, b, c, d]
 }
 
 /// A client on the bus, at 1 Mbit/s unless it says otherwise.
@@ -121,6 +132,20 @@ impl Master {
         let all = std::iter::from_fn(|| port.receive()).map(|stamped| stamped.frame);
         all.filter(|frame| frame.id() == StandardId::new(id).unwrap().into()).collect()
     }
+}
+
+/// Reads an object of node 1, of at most four bytes, as a number.
+pub(crate) fn read(world: &mut World, master: &Master, object: (u16, u8)) -> u32 {
+    let answer = master.ask(world, 1, &request(0x40, object, 0));
+    assert_eq!(answer[0] & 0xE3, 0x43, "{object:x?}: {answer:x?}");
+    let unused = usize::from(answer[0] >> 2 & 3);
+    answer[4..8 - unused].iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
+}
+
+/// Writes an object of node 1 of `size` bytes.
+pub(crate) fn write(world: &mut World, master: &Master, object: (u16, u8), size: u8, value: u32) {
+    let answer = master.ask(world, 1, &request(0x23 | (4 - size) << 2, object, value));
+    assert_eq!(answer[0], 0x60, "{object:x?}: {answer:x?}");
 }
 
 /// Runs on for a time and sums up what happened since power-on.

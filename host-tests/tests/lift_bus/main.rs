@@ -1,34 +1,47 @@
 //! A small lift on one bus: two nodes in personality lift as car position unit and load measuring unit with a panel, and
 //! call controller, drive, doors, light barriers and a display as virtual devices of the host. All of them run the same
-//! CANopen device with dictionaries from the same catalogue.
+//! CANopen device with dictionaries from the same catalogue. With feature `board` there is a second lift, whose nodes are
+//! emulated boards that run the firmware.
 
+#[cfg(feature = "board")]
+mod boards;
 mod car;
 mod controller;
 mod device;
+mod installer;
+mod log;
 mod node;
 mod small_lift;
+#[cfg(feature = "board")]
+#[path = "../board/support.rs"]
+#[allow(dead_code)] // The tests of single boards use the rest of it.
+mod support;
 mod table;
 mod world;
 
-use std::collections::BTreeMap;
-
-use canbus::Stamped;
 use canopen::Frame;
 use canopen::pdo::{Address, Mpdo};
 use canopen::sdo::Multiplexer;
 use host_tests::network::from_bus;
 use profiles::encoder::UNDERFLOW;
-use profiles::lift::catalogue::{Content, by_cob_id};
+use profiles::lift::catalogue::by_cob_id;
 use profiles::lift::load::{FULL_LOAD, HALF_LOAD, OVERLOAD, ZERO_LOAD};
 
 use controller::{FAST, LANDINGS, call};
+use installer::Site;
+use log::every_frame_is_known;
 use small_lift::SmallLift;
-use table::{BARRIERS, CONTROLLER, DISPLAY, DOORS, DRIVE, LOAD, POSITION};
+use table::{CONTROLLER, LOAD, POSITION};
 
 #[test]
 fn a_small_lift() {
     let mut lift = SmallLift::new();
-    lift.install();
+    lift.describe_position_unit();
+    lift.run(5);
+    lift.preset();
+    lift.describe_load_and_panel();
+    lift.save();
+    lift.run(5);
     assert_eq!(lift.read(POSITION, 0x1000, 0), 0x0600_01A1, "a car position unit");
     assert_eq!(lift.read(LOAD, 0x1000, 0), 0x0000_01A1, "load measuring unit, input and output panel unit");
     assert_eq!(lift.read(POSITION, 0x6383, 1), u64::from(LANDINGS[0]), "the preset outlives the reset");
@@ -58,7 +71,7 @@ fn too_many_people(lift: &mut SmallLift) {
     assert!(lift.is_lit(), "the call is taken");
     lift.run(1000);
     assert!(lift.doors_are(car::WIDTH));
-    assert_eq!(lift.position(), LANDINGS[0].into());
+    assert_eq!(lift.position(), u64::from(LANDINGS[0]));
 }
 
 /// One leaves, which takes time: the doors open again.
@@ -68,7 +81,7 @@ fn somebody_in_the_door(lift: &mut SmallLift) {
     lift.run_until(500, |lift| !lift.doors_are(car::WIDTH));
     lift.world.borrow_mut().is_blocked[1] = true;
     lift.run_until(700, |lift| lift.doors_are(car::WIDTH));
-    assert_eq!(lift.position(), LANDINGS[0].into());
+    assert_eq!(lift.position(), u64::from(LANDINGS[0]));
     lift.world.borrow_mut().is_blocked[1] = false;
     lift.run_until(1000, |lift| lift.doors_are(0.0));
 }
@@ -94,45 +107,6 @@ fn velocity(frame: &Frame) -> Option<i32> {
     let field = by_cob_id(frame.id().into()).filter(|_| frame.id() == 0x183)?.fields().nth(3)?;
     let word = u32::try_from(field.value(frame.data())?).ok()?;
     Some(word.cast_signed())
-}
-
-/// Every frame is one of the catalogue, of its length, or one of CiA 301's services to or from a device that is there.
-fn every_frame_is_known(log: &[Stamped]) {
-    let mut counts = BTreeMap::<u16, usize>::new();
-    for frame in log.iter().filter_map(|stamped| from_bus(&stamped.frame)) {
-        *counts.entry(frame.id()).or_default() += 1;
-        let Some(definition) = by_cob_id(frame.id().into()) else {
-            assert!(is_service(frame.id()), "{:X}h", frame.id());
-            continue;
-        };
-        match definition.pdo.content {
-            Content::Objects(_) => {
-                let bits: usize = definition.fields().map(|field| usize::from(field.object.bits)).sum();
-                assert_eq!(frame.data().len() * 8, bits, "{}", definition.pdo.name);
-            }
-            Content::Multiplexed => {
-                let mpdo = Mpdo::parse(frame.data().try_into().unwrap()).unwrap();
-                let known: &[u16] = if definition.producer == Some(DISPLAY) {
-                    &[0x5000]
-                } else {
-                    &[0x2303, 0x2313, 0x63C0, 0x63C5]
-                };
-                assert!(known.contains(&mpdo.at.index), "{mpdo:?}");
-            }
-        }
-    }
-    let pdos: Vec<u16> = counts.keys().copied().filter(|id| by_cob_id((*id).into()).is_some()).collect();
-    let expected = [
-        0x182, 0x183, 0x188, 0x18C, 0x200, 0x201, 0x202, 0x205, 0x206, 0x400, 0x490, 0x491, 0x507, 0x510,
-        0x511,
-    ];
-    assert_eq!(pdos, expected, "each device sends its own and nobody sends another's");
-}
-
-/// Boot-up and heartbeats, and SDO responses that nobody waited for any longer: none of an error.
-fn is_service(id: u16) -> bool {
-    let devices = [CONTROLLER, DRIVE, DISPLAY, POSITION, LOAD].into_iter().chain(DOORS).chain(BARRIERS);
-    devices.map(u16::from).any(|device| [0x580 + device, 0x700 + device].contains(&id))
 }
 
 /// A position on the bus is that of the car when it was measured, to one step, and is at most a millisecond old.
@@ -174,4 +148,65 @@ fn the_lamp_can_be_lit_by_a_multiplexed_pdo(lift: &mut SmallLift) {
     lift.network.transmit(&Frame::new(0x500 + u16::from(CONTROLLER), &lamp.encode()).unwrap());
     lift.run(5);
     assert!(lift.is_lit());
+}
+
+/// With the firmware on emulated boards: called with an overload, then up two floors at full speed.
+#[cfg(feature = "board")]
+#[test]
+fn a_small_lift_of_boards() {
+    let mut lift = boards::Boards::new();
+    lift.describe_position_unit();
+    lift.run(5);
+    lift.preset();
+    lift.describe_load_and_panel();
+    lift.write(LOAD, 0x2320, 2, &call(2).to_le_bytes()[..6]);
+    lift.save();
+    assert_eq!(lift.read(POSITION, 0x1000, 0), 0x0600_01A1, "a car position unit");
+    assert_eq!(lift.read(POSITION, 0x6383, 1), u64::from(LANDINGS[0]), "the preset outlives the reset");
+    lift.log.clear();
+
+    lift.load(700.0);
+    lift.nmt(1, 0);
+    lift.run(300);
+    let signals = u64::from(HALF_LOAD | FULL_LOAD | OVERLOAD);
+    assert_eq!(lift.last(0x188, 0), signals);
+    assert!(lift.last(0x188, 1).abs_diff(700) <= 5, "{} kg", lift.last(0x188, 1));
+    assert!(!lift.is_lit());
+    lift.press_button();
+    assert!(lift.is_lit(), "the call is taken, and the pin of lamp 1 is high");
+    lift.run(700);
+    assert!(lift.doors_are(car::WIDTH), "an overload");
+
+    lift.load(300.0);
+    lift.run_until(2000, |lift| lift.doors_are(0.0));
+    lift.run_until(6000, |lift| !lift.is_lit());
+    assert!(lift.last(0x18C, 0).abs_diff(LANDINGS[2].into()) <= 1, "{}", lift.last(0x18C, 0));
+    lift.run_until(1000, |lift| lift.doors_are(car::WIDTH));
+
+    every_frame_is_known(&lift.log);
+    every_position_is_one_that_the_car_has_just_had(&lift);
+    let velocities = lift.log.iter().filter_map(|stamped| velocity(&from_bus(&stamped.frame)?));
+    assert_eq!(velocities.max(), Some(FAST));
+}
+
+/// To one measuring step. At full speed the car is ahead by what it goes between the sample and the end of the frame: that
+/// is less than a sample, and the same each time to one step.
+#[cfg(feature = "board")]
+fn every_position_is_one_that_the_car_has_just_had(lift: &boards::Boards) {
+    let (mut frames, mut ahead) = (0, vec![]);
+    for (at, position) in boards::positions(&lift.log) {
+        let before = canopen::Instant(at.0 - boards::OLDEST.0);
+        // The car was at 3 m from the end of the tape when the preset made that 10 m.
+        let [oldest, newest] = [before, at].map(|at| lift.car(at) + 7_000.0);
+        let (low, high) = (oldest.min(newest) - 1.0, oldest.max(newest) + 1.0);
+        assert!((low..=high).contains(&position), "{position} at {at:?}, not {low} to {high}");
+        let is_fast = newest - oldest > 0.999 * boards::OLDEST.0 as f64 * 1e-6 * f64::from(FAST);
+        ahead.extend(is_fast.then_some(newest - position));
+        frames += 1;
+    }
+    let least = ahead.iter().copied().fold(f64::MAX, f64::min);
+    let most = ahead.iter().copied().fold(f64::MIN, f64::max);
+    println!("{frames} positions; at 2.5 m/s the car is {least:.2} to {most:.2} mm ahead");
+    assert!(frames > 2_500, "one a millisecond while it drives: {frames}");
+    assert!(ahead.len() > 300 && most - least <= 1.0, "{least} to {most} mm in {} frames", ahead.len());
 }

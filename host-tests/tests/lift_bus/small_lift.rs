@@ -1,4 +1,4 @@
-//! The lift as a whole: its devices on one bus, its shaft, and what its installer does.
+//! The lift as a whole: its devices on one bus, and its shaft.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -6,13 +6,14 @@ use std::rc::Rc;
 use canbus::Stamped;
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Frame, Instant, Transmit};
-use host_tests::network::{Network, Unit, from_bus};
+use host_tests::network::{Network, Unit};
 use host_tests::sdo::Client;
-use profiles::lift::catalogue::by_cob_id;
 
 use crate::car::{Barrier, Display, Door, Drive, WIDTH};
-use crate::controller::{Controller, LAMP_OFF, LAMP_ON, LANDINGS, call};
+use crate::controller::Controller;
 use crate::device::VirtualDevice;
+use crate::installer::Site;
+use crate::log::last;
 use crate::node::LiftNode;
 use crate::table::{self, BARRIERS, CONTROLLER, DISPLAY, DOORS, DRIVE, LOAD, POSITION};
 use crate::world::World;
@@ -84,18 +85,7 @@ impl SmallLift {
         let world = World { car: 3_000.0, doors: [WIDTH; 2], ..World::default() };
         let world = Rc::new(RefCell::new(world));
         let node = |id| Any::Node(Box::new(LiftNode::new(id, &world)));
-        let [door_1, door_2] = DOORS;
-        let [barrier_1, barrier_2] = BARRIERS;
-        let virtual_devices = [
-            VirtualDevice::new(CONTROLLER, &table::CALL_CONTROLLER, Controller::default(), &world),
-            VirtualDevice::new(DRIVE, &table::CAR_DRIVE, Drive::default(), &world),
-            VirtualDevice::new(door_1, &table::DOOR_1, Door(1), &world),
-            VirtualDevice::new(door_2, &table::DOOR_2, Door(2), &world),
-            VirtualDevice::new(barrier_1, &table::BARRIER_1, Barrier(1), &world),
-            VirtualDevice::new(barrier_2, &table::BARRIER_2, Barrier(2), &world),
-            VirtualDevice::new(DISPLAY, &table::DISPLAY_UNIT, Display::default(), &world),
-        ];
-        let virtual_devices = virtual_devices.map(|device| Any::Virtual(Box::new(device)));
+        let virtual_devices = virtual_devices(&world).map(|device| Any::Virtual(Box::new(device)));
         let mut network = Network::new([node(POSITION), node(LOAD)].into_iter().chain(virtual_devices));
         network.start();
         SmallLift { network, world, log: vec![] }
@@ -118,49 +108,9 @@ impl SmallLift {
         panic!("it did not happen in {limit} ms: {:?}", self.world.borrow().car);
     }
 
-    pub(crate) fn write(&mut self, node: u8, index: u16, sub: u8, bytes: &[u8]) {
-        let result = Client::new(&mut self.network.server(node)).write(Multiplexer { index, sub }, bytes);
-        assert_eq!(result, Ok(()), "{node}: {index:X}h:{sub}");
-    }
-
     pub(crate) fn read(&mut self, node: u8, index: u16, sub: u8) -> u64 {
         let bytes = Client::new(&mut self.network.server(node)).read(Multiplexer { index, sub }).unwrap();
         bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
-    }
-
-    pub(crate) fn nmt(&mut self, command: u8, node: u8) {
-        self.network.transmit(&Frame::new(0, &[command, node]).unwrap());
-        self.run(5);
-    }
-
-    /// What the installer does: each node is one of the two units, a PDO of the other is off; then saved and reset.
-    pub(crate) fn install(&mut self) {
-        self.write(POSITION, 0x2311, 3, &0_f32.to_le_bytes());
-        self.write(POSITION, 0x2100, 1, &[6]);
-        self.write(POSITION, 0x2101, 1, &100_000_u32.to_le_bytes());
-        self.write(POSITION, 0x2105, 0, &[0]);
-        self.write(POSITION, 0x63B8, 1, &20_100_i32.to_le_bytes());
-        self.write(POSITION, 0x63B4, 1, &9_900_i32.to_le_bytes());
-        self.write(POSITION, 0x1901, 1, &0xC000_0188_u32.to_le_bytes());
-        self.run(5);
-        self.write(POSITION, 0x6382, 1, &LANDINGS[0].to_le_bytes());
-
-        self.write(LOAD, 0x2301, 1, &[0]);
-        for (sub, value) in [(1, 2.0e5_f32), (2, 0.0), (3, 6.0e5), (4, 800.0)] {
-            self.write(LOAD, 0x2311, sub, &value.to_le_bytes());
-        }
-        for (sub, kilograms) in [(1, 30_u16), (2, 300), (3, 600), (4, 660)] {
-            self.write(LOAD, 0x6483, sub, &kilograms.to_le_bytes());
-        }
-        self.write(LOAD, 0x2320, 2, &call(4).to_le_bytes()[..6]);
-        self.write(LOAD, 0x2321, 1, &LAMP_OFF.to_le_bytes()[..6]);
-        self.write(LOAD, 0x2321, 2, &LAMP_ON.to_le_bytes()[..6]);
-        self.write(LOAD, 0x1906, 1, &0xC000_018C_u32.to_le_bytes());
-        for node in [POSITION, LOAD] {
-            self.write(node, 0x1010, 1, b"save");
-            self.nmt(0x81, node);
-        }
-        self.run(5);
     }
 
     pub(crate) fn press_button(&mut self) {
@@ -177,10 +127,7 @@ impl SmallLift {
 
     /// The last value of an object that a PDO with this identifier carried.
     pub(crate) fn last(&self, id: u32, object: usize) -> u64 {
-        let field = by_cob_id(id).unwrap().fields().nth(object).unwrap();
-        let frames = self.log.iter().rev().filter_map(|stamped| from_bus(&stamped.frame));
-        let frame = frames.into_iter().find(|frame| u32::from(frame.id()) == id).unwrap();
-        field.value(frame.data()).unwrap()
+        last(&self.log, id, object)
     }
 
     pub(crate) fn position(&self) -> u64 {
@@ -202,4 +149,31 @@ impl SmallLift {
     pub(crate) fn doors_are(&self, width: f64) -> bool {
         self.world.borrow().doors == [width; 2]
     }
+}
+
+impl Site for SmallLift {
+    fn write(&mut self, node: u8, index: u16, sub: u8, bytes: &[u8]) {
+        let result = Client::new(&mut self.network.server(node)).write(Multiplexer { index, sub }, bytes);
+        assert_eq!(result, Ok(()), "{node}: {index:X}h:{sub}");
+    }
+
+    fn nmt(&mut self, command: u8, node: u8) {
+        self.network.transmit(&Frame::new(0, &[command, node]).unwrap());
+        self.run(5);
+    }
+}
+
+/// The devices that the test has made itself.
+pub(crate) fn virtual_devices(world: &Rc<RefCell<World>>) -> [VirtualDevice; 7] {
+    let [door_1, door_2] = DOORS;
+    let [barrier_1, barrier_2] = BARRIERS;
+    [
+        VirtualDevice::new(CONTROLLER, &table::CALL_CONTROLLER, Controller::default(), world),
+        VirtualDevice::new(DRIVE, &table::CAR_DRIVE, Drive::default(), world),
+        VirtualDevice::new(door_1, &table::DOOR_1, Door(1), world),
+        VirtualDevice::new(door_2, &table::DOOR_2, Door(2), world),
+        VirtualDevice::new(barrier_1, &table::BARRIER_1, Barrier(1), world),
+        VirtualDevice::new(barrier_2, &table::BARRIER_2, Barrier(2), world),
+        VirtualDevice::new(DISPLAY, &table::DISPLAY_UNIT, Display::default(), world),
+    ]
 }

@@ -1,7 +1,7 @@
 //! The dictionaries of all devices of the small lift: a device has the PDOs that it produces and consumes and the objects
 //! that they map, as the catalogue says.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Rule, Type};
 use node::lift::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 
 /// Node-IDs.
@@ -47,10 +47,7 @@ macro_rules! dictionary {
             const PARTS: &[&[Object]] = $parts;
             const COUNT: usize = dictionary::count(PARTS);
             static TABLE: [Object; COUNT] = dictionary::gather(PARTS);
-            static ENTRIES: [Entry; COUNT] = dictionary::compile(&TABLE);
-            static DEFAULTS: [u8; dictionary::image_size(&TABLE)] = dictionary::default_image(&TABLE);
-            dictionary::check(&TABLE);
-            Dictionary::new(&ENTRIES, &DEFAULTS)
+            canopen::dictionary!(&TABLE)
         };
     };
 }

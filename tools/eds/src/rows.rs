@@ -120,13 +120,14 @@ fn access(row: &Row) -> Access {
 }
 
 /// An object of one row is a variable or a domain. Of several, it is an array when all rows beyond sub-index 0 have
-/// the same type, unless CiA 301 says that it is a record.
+/// the same type. What CiA 301 calls a record is one: also the mapping of a multiplexed PDO, which has nothing but its
+/// number of entries.
 pub(crate) fn object_type(rows: &[Row]) -> ObjectType {
     let type_of = |row: &Row| DataType(row.kind.code());
     match rows {
         [row] if type_of(row) == DataType::DOMAIN => ObjectType::Domain,
-        [_] => ObjectType::Var,
         [head, ..] if is_record(head.index) => ObjectType::Record,
+        [_] => ObjectType::Var,
         [_, subs @ ..] if subs.windows(2).all(|pair| type_of(&pair[0]) == type_of(&pair[1])) => {
             ObjectType::Array
         }

@@ -5,3 +5,4 @@
 pub mod code;
 pub mod image;
 pub mod key;
+pub mod product;

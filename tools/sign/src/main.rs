@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
+use sign::product::{self, version};
 use sign::{code, image::Image, key};
 use update::{Description, Version};
 
@@ -48,16 +49,16 @@ struct ImageArgs {
     #[arg(long)]
     key: Option<PathBuf>,
     /// The product that it is for, as in 1018h:2
-    #[arg(long, value_parser = number)]
+    #[arg(long, value_parser = number, default_value_t = product::PRODUCT)]
     product: u32,
     /// The hardware revisions that it runs on, 0 to 31, with commas
-    #[arg(long, value_delimiter = ',', required = true, value_parser = clap::value_parser!(u32).range(0..32))]
+    #[arg(long, value_delimiter = ',', default_value = "0", value_parser = clap::value_parser!(u32).range(0..32))]
     hardware: Vec<u32>,
     /// Its version, as 1.2.3
-    #[arg(long = "image-version", value_parser = version)]
+    #[arg(long = "image-version", value_parser = version, default_value = env!("CARGO_PKG_VERSION"))]
     version: Version,
     /// The security counter: raise it when no older image may ever run again
-    #[arg(long)]
+    #[arg(long, default_value_t = 0)]
     counter: u32,
     /// Where the image goes [default: the name of the file with .img]
     #[arg(long, short)]
@@ -69,12 +70,6 @@ fn number(text: &str) -> Result<u32> {
         Some(hex) => u32::from_str_radix(hex, 16)?,
         None => text.parse()?,
     })
-}
-
-fn version(text: &str) -> Result<Version> {
-    let numbers: Vec<u16> = text.split('.').map(str::parse).collect::<Result<_, _>>()?;
-    let [major, minor, patch] = numbers[..] else { bail!("three numbers with points between them") };
-    Ok(Version { major, minor, patch })
 }
 
 fn signing_key(path: Option<&Path>) -> Result<ed25519_dalek::SigningKey> {

@@ -1,9 +1,7 @@
 //! The dictionary of the benchmark: every object of the protocol core, four PDOs each way of two INTEGER32, and what
 //! the operations read and write. zencan.toml describes the same node.
 
-use canopen::dictionary::{
-    self, Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Rule, Type,
-};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Group, Mapping, Object, Rule, Type};
 
 const fn fixed(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadOnly)
@@ -178,8 +176,5 @@ const COUNT: usize = dictionary::count(PARTS);
 const ROWS: [Object; COUNT] = dictionary::gather(PARTS);
 /// Bytes of the values.
 pub(crate) const SIZE: usize = dictionary::image_size(&ROWS);
-static ENTRIES: [Entry; COUNT] = dictionary::compile(&ROWS);
-static DEFAULTS: [u8; SIZE] = dictionary::default_image(&ROWS);
-const _: () = dictionary::check(&ROWS);
 
-pub(crate) static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+pub(crate) static DICTIONARY: Dictionary = canopen::dictionary!(&ROWS);

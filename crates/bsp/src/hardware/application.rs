@@ -1,7 +1,5 @@
 //! The application slot as the bootloader sees it.
 
-use cortex_m::peripheral::SCB;
-
 use super::memory;
 use crate::vectors::Vectors;
 
@@ -13,17 +11,30 @@ pub fn vectors() -> Option<Vectors> {
     Vectors::check(words, &memory::ram(), &image)
 }
 
+/// Words of the NVIC that the chip has: up to 97 interrupts (RM0390, table 38).
+const INTERRUPT_WORDS: usize = 4;
+
+/// Whether the place of the header is erased, as after a debugger has put a program there.
+pub fn has_no_header() -> bool {
+    let bytes = memory::header();
+    bytes.iter().all(|byte| *byte == 0xFF)
+}
+
 /// Starts the application as a reset would. Nothing of the caller goes on: interrupts are off until the application has
 /// its own vector table, and its stack replaces the caller's.
 ///
 /// The caller must not have started a peripheral that writes to memory by itself; the bootloader starts none.
-pub fn start(scb: &SCB, vectors: Vectors) -> ! {
+pub fn start(core: &cortex_m::Peripherals, vectors: Vectors) -> ! {
     let table = memory::application().start;
     cortex_m::interrupt::disable();
     // SAFETY: the slot is aligned as VTOR wants it (memory.x), `vectors` is checked, and this function does not return, so
     // nobody misses the stack. Interrupts are enabled again as a reset leaves them; none of them is in the NVIC.
     unsafe {
-        scb.vtor.write(table);
+        for (enabled, pending) in core.NVIC.icer.iter().zip(&core.NVIC.icpr).take(INTERRUPT_WORDS) {
+            enabled.write(u32::MAX);
+            pending.write(u32::MAX);
+        }
+        core.SCB.vtor.write(table);
         cortex_m::asm::dsb();
         cortex_m::interrupt::enable();
         cortex_m::asm::bootstrap(vectors.stack() as *const u32, vectors.reset() as *const u32)

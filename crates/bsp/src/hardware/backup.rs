@@ -1,9 +1,9 @@
 //! The backup SRAM: what is written there outlives a loss of power, as long as there is a battery behind VBAT.
 
-use stm32f4xx_hal::pac::PWR;
-use stm32f4xx_hal::rcc::{Enable, Rcc};
+use stm32f4xx_hal::pac::{CRC, PWR};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use crate::kept::{Found, Keeper, Slots};
+use crate::kept::{Checksum, Content, Found, Keeper, Slots};
 
 /// 4 KiB (RM0390, table 1; RM0090, table 1).
 const BASE: *const Slots = 0x4002_4000 as *const Slots;
@@ -13,13 +13,39 @@ const _: () = assert!(size_of::<Slots>() <= 4096);
 /// The memory, written through the copies of [`Keeper`].
 pub struct BackupMemory {
     power: PWR,
-    keeper: Keeper<'static>,
+    keeper: Keeper<'static, CrcUnit>,
+}
+
+/// CRC-32/MPEG-2, by the unit of the chip (RM0390, 4).
+struct CrcUnit(CRC);
+
+impl CrcUnit {
+    fn new(crc: CRC, rcc: &mut Rcc) -> CrcUnit {
+        CRC::enable(rcc);
+        CRC::reset(rcc);
+        CrcUnit(crc)
+    }
+}
+
+impl Checksum for CrcUnit {
+    fn start(&mut self, word: u32) {
+        self.0.cr().write(|w| w.reset().set_bit());
+        self.add(word);
+    }
+
+    fn add(&mut self, word: u32) {
+        self.0.dr().write(|w| w.dr().set(word));
+    }
+
+    fn value(&self) -> u32 {
+        self.0.dr().read().bits()
+    }
 }
 
 impl BackupMemory {
     /// Switches it on, and finds what was kept. The backup regulator need not be ready: it takes over when the main supply
     /// goes (RM0390, 5.1.2).
-    pub(crate) fn open(power: PWR, rcc: &mut Rcc) -> (BackupMemory, Found) {
+    pub(crate) fn open(power: PWR, crc: CRC, rcc: &mut Rcc) -> (BackupMemory, Found) {
         PWR::enable(rcc);
         rcc.ahb1enr().modify(|_, w| w.bkpsramen().set_bit());
         protect(&power, false);
@@ -28,14 +54,14 @@ impl BackupMemory {
         // SAFETY: the memory is there, on and aligned, and any bits of it are numbers. `power` is given to this function
         // only, once, so nothing else refers to it.
         let slots = unsafe { &*BASE };
-        let (keeper, found) = Keeper::open(slots);
+        let (keeper, found) = Keeper::open(slots, CrcUnit::new(crc, rcc));
         (BackupMemory { power, keeper }, found)
     }
 
-    /// Keeps these bytes. Nothing else can write to the memory: it is protected but for the time of this call.
-    pub fn write(&mut self, bytes: &[u8]) {
+    /// Keeps this. Nothing else can write to the memory: it is protected but for the time of this call.
+    pub fn write(&mut self, content: &Content) {
         protect(&self.power, false);
-        self.keeper.write(bytes);
+        self.keeper.write(content);
         protect(&self.power, true);
     }
 }

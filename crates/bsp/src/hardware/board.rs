@@ -81,6 +81,7 @@ impl Board {
             timer: device.TIM3,
             pressure: gpioa.pa0.into_analog(),
             supply: gpioa.pa1.into_analog(),
+            thermistor: gpioc.pc2.into_analog(),
         };
         let sampling = Sampling::new(front_end, &mut rcc);
         let streams = StreamsTuple::new(device.DMA1, &mut rcc);
@@ -101,7 +102,7 @@ impl Board {
             data: gpiob.pb14,
         };
         let ssi = Ssi::new(absolute, &mut rcc);
-        let (backup, found) = BackupMemory::open(device.PWR, &mut rcc);
+        let (backup, found) = BackupMemory::open(device.PWR, device.CRC, &mut rcc);
         let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
         let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
         let led = Led::new(gpioa.pa5);
@@ -126,15 +127,6 @@ impl Board {
     }
 }
 
-/// The LED alone, with the clock as it is after a reset: the bootloader needs no more.
-pub fn led(device: Peripherals) -> Led {
-    let mut rcc = device.RCC.constrain();
-    Led::new(device.GPIOA.split(&mut rcc).pa5)
-}
-
-/// Frequency of the core after a reset, in hertz (HSI).
-pub const RESET_CLOCK_HZ: u32 = 16_000_000;
-
 /// Reads and clears the flags, so that the next reset tells its own cause only.
 fn reset_cause(rcc: &RCC) -> ResetCause {
     let cause = ResetCause::from_csr(rcc.csr().read().bits());
@@ -143,7 +135,7 @@ fn reset_cause(rcc: &RCC) -> ResetCause {
 }
 
 /// Keeps the debug port clocked while the core sleeps: RTT is read then.
-fn keep_debugger(debug: &DBGMCU) {
+pub(super) fn keep_debugger(debug: &DBGMCU) {
     debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 }
 

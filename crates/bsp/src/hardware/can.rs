@@ -53,7 +53,7 @@ impl Controller {
 
     /// Goes on the bus, again when it was there: drops what is in the mailboxes and takes new timing and filters. Error
     /// counters start from zero. It does not wait for the bus: one that is stuck must not keep the node from starting.
-    pub fn start(&mut self, timing: BitTiming, banks: &Banks) {
+    pub fn start(&mut self, timing: BitTiming, banks: &[Bank]) {
         self.join(timing, banks, false);
     }
 
@@ -62,7 +62,7 @@ impl Controller {
         self.join(timing, &filters::everything(), true);
     }
 
-    fn join(&mut self, timing: BitTiming, banks: &Banks, silent: bool) {
+    fn join(&mut self, timing: BitTiming, banks: &[Bank], silent: bool) {
         registers().tsr().write(|w| w.abrq0().set_bit().abrq1().set_bit().abrq2().set_bit());
         self.can.modify_config().set_bit_timing(timing.btr()).set_silent(silent).leave_disabled();
         self.set_filters(banks);
@@ -103,7 +103,7 @@ impl Controller {
     }
 
     /// Replaces the filters. Frames that end meanwhile, a few microseconds, are not received.
-    pub fn set_filters(&mut self, banks: &Banks) {
+    pub fn set_filters(&mut self, banks: &[Bank]) {
         let mut filters = self.can.modify_filters();
         filters.set_split(BANKS as u8).clear();
         for (index, bank) in (0..).zip(banks) {
@@ -159,6 +159,38 @@ impl Transmitter {
     /// interrupts again.
     pub fn acknowledge(&mut self) {
         self.0.clear_interrupt_flags();
+    }
+
+    /// Whether all mailboxes are empty: everything that was sent is on the wire.
+    pub fn is_idle(&self) -> bool {
+        let status = registers().tsr().read();
+        status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
+    }
+}
+
+/// TIxR: the place of the identifier, a remote frame, and the request to transmit (RM0390, 30.9.3).
+const STID: u32 = 21;
+const RTR: u32 = 1 << 1;
+const TXRQ: u32 = 1 << 0;
+
+impl Transmitter {
+    /// Puts a frame into the first mailbox, if that is free. For whoever uses no other: frames keep their order then.
+    pub fn put(&mut self, frame: &Frame) -> bool {
+        if registers().tsr().read().tme0().bit_is_clear() {
+            return false;
+        }
+        let mailbox = registers().tx(0);
+        let data = frame.data().iter().rev().fold(0, |word: u64, byte| word << 8 | u64::from(*byte));
+        let [low, high] = [data as u32, (data >> 32) as u32];
+        let remote = if frame.is_remote() { RTR } else { 0 };
+        // SAFETY: DLC, data and identifier take any value.
+        unsafe {
+            mailbox.tdtr().write(|w| w.bits(frame.len() as u32));
+            mailbox.tdlr().write(|w| w.bits(low));
+            mailbox.tdhr().write(|w| w.bits(high));
+            mailbox.tir().write(|w| w.bits(u32::from(frame.id()) << STID | remote | TXRQ));
+        }
+        true
     }
 }
 

@@ -1,31 +1,25 @@
-//! The crash record in RAM that survives a reset, and the panic handler that writes one.
+//! The crash record, and what writes one at a panic.
 
-use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::panic::Location;
 
-use super::memory;
-use crate::crash_record::{Crash, Fault, Place, Sealed, WORDS};
-
-/// At one address in both images (memory.x, RETAINED), and never initialised. `used`, so that the compiler does not
-/// take it for zero at the start.
-#[used]
-#[unsafe(link_section = ".retained")]
-static RECORD: [AtomicU32; WORDS] = [const { AtomicU32::new(0) }; WORDS];
+use super::{memory, retained};
+use crate::crash_record::{Crash, Fault, Place, WORDS};
 
 /// The crash that ended the last run, and forgets it.
 pub fn take() -> Option<Crash> {
-    let mut words: Sealed = [0; WORDS];
-    for (to, from) in words.iter_mut().zip(&RECORD) {
-        *to = from.swap(0, Ordering::Relaxed);
-    }
-    Crash::open(&words)
+    let crash = Crash::open(&retained::crash());
+    retained::set_crash([0; WORDS]);
+    crash
+}
+
+/// Whether the last run ended in a crash that nobody has taken yet.
+pub(super) fn is_recorded() -> bool {
+    Crash::open(&retained::crash()).is_some()
 }
 
 /// Writes the record and restarts.
 pub(crate) fn restart(crash: &Crash) -> ! {
-    for (to, from) in RECORD.iter().zip(crash.seal()) {
-        to.store(from, Ordering::Relaxed);
-    }
+    retained::set_crash(crash.seal());
     cortex_m::peripheral::SCB::sys_reset()
 }
 
@@ -53,9 +47,10 @@ fn log_fault(fault: &Fault) {
     defmt::error!("CFSR {=u32:#010x}, HFSR {=u32:#010x}, address {=u32:#010x}", cfsr, hfsr, address);
 }
 
-#[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
+/// What the panic handler of an image does. It is not the handler itself because one that uses the place is linked with the
+/// names of all places, for which the bootloader has no room.
+pub fn panicked(place: Option<&Location<'_>>) -> ! {
     cortex_m::interrupt::disable();
-    let place = info.location().map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));
+    let place = place.map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));
     restart(&Crash::Panic(place))
 }

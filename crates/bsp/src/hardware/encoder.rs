@@ -35,7 +35,7 @@ static AT_INDEX: AtomicU16 = AtomicU16::new(0);
 /// The encoder in one millisecond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counted {
-    /// Quarter periods, modulo 2^16, at the start of the last scan: 59 us before the interrupt.
+    /// Quarter periods, modulo 2^16, at the start of the last scan: 61 us before the interrupt.
     pub counter: u16,
     /// The same at the last index; `None` when none came since the last call.
     pub index: Option<u16>,

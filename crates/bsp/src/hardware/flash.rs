@@ -46,24 +46,38 @@ impl Flash {
     /// Programs one word and waits for it: 16 us, at most 100. Code that is fetched from flash stands still meanwhile.
     ///
     /// `address` must be in flash, outside of the program, and a multiple of four.
-    fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {
-        self.work(|flash| {
-            flash.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
-            // SAFETY: the callers give addresses of an area that holds no code and no value of this program.
-            unsafe { (address as *mut u32).write_volatile(word) };
-        })
+    pub(super) fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {
+        self.prepare();
+        self.0.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
+        // SAFETY: the callers give addresses of an area that holds no code and no value of this program.
+        unsafe { (address as *mut u32).write_volatile(word) };
+        cortex_m::asm::dsb();
+        self.wait();
+        self.end()
     }
 
     fn erase(&mut self, sector: u8) -> Result<(), Error> {
-        self.work(|flash| {
-            // SAFETY: SNB takes any number of a sector.
-            flash.cr().modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
-            flash.cr().modify(|_, w| w.strt().set_bit());
-        })
+        self.start_erase(sector);
+        self.wait();
+        self.end()
     }
 
-    /// Unlocks the controller for one operation and waits for its end.
-    fn work(&mut self, begin: impl FnOnce(&FLASH)) -> Result<(), Error> {
+    /// Begins to erase a sector; [`Flash::end`] follows when the controller is no longer busy.
+    pub(super) fn start_erase(&mut self, sector: u8) {
+        self.prepare();
+        // SAFETY: SNB takes any number of a sector.
+        self.0.cr().modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
+        self.0.cr().modify(|_, w| w.strt().set_bit());
+        cortex_m::asm::dsb();
+    }
+
+    /// Whether an operation is going on.
+    pub(super) fn is_busy(&self) -> bool {
+        self.0.sr().read().bsy().bit_is_set()
+    }
+
+    /// Forgets old errors and unlocks the controller for one operation.
+    fn prepare(&mut self) {
         self.wait();
         // SAFETY: SR takes 1 for flags to clear.
         self.0.sr().write(|w| unsafe { w.bits(ERRORS) });
@@ -73,20 +87,21 @@ impl Flash {
                 self.0.keyr().write(|w| unsafe { w.bits(key) });
             }
         }
-        begin(&self.0);
-        cortex_m::asm::dsb();
-        self.wait();
+    }
+
+    /// After an operation: locks the controller, and says whether it has done what it was told.
+    pub(super) fn end(&mut self) -> Result<(), Error> {
         let flags = self.0.sr().read().bits() & ERRORS;
         self.0.cr().write(|w| w.lock().set_bit());
         if flags == 0 { Ok(()) } else { Err(Error::Flags(flags)) }
     }
 
     fn wait(&self) {
-        while self.0.sr().read().bsy().bit_is_set() {}
+        while self.is_busy() {}
     }
 
     /// Drops what the data cache holds of the time before (RM0390, 3.4.2). It must be off for that.
-    fn forget_cached(&mut self) {
+    pub(super) fn forget_cached(&mut self) {
         let was_on = self.0.acr().read().dcen().bit_is_set();
         self.0.acr().modify(|_, w| w.dcen().clear_bit());
         self.0.acr().modify(|_, w| w.dcrst().set_bit());

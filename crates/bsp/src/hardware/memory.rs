@@ -2,6 +2,8 @@
 
 use core::ops::Range;
 
+use update::{HEADER_LEN, Header};
+
 use crate::checksum::CRC;
 
 unsafe extern "C" {
@@ -12,6 +14,8 @@ unsafe extern "C" {
     static _parameters_end: u8;
     static _application_start: u8;
     static _application_end: u8;
+    static _updatable_start: u8;
+    static _updatable_end: u8;
     static _program_end: u8;
 }
 
@@ -43,8 +47,26 @@ pub fn parameters() -> Range<u32> {
     unsafe { region(&_parameters_start, &_parameters_end) }
 }
 
-/// Identifies the program: the CRC-32 of its code and constants.
+/// What an update may erase and program: the application with its header, and staging.
+pub(super) fn updatable() -> Range<u32> {
+    // SAFETY: only the addresses are used.
+    unsafe { region(&_updatable_start, &_updatable_end) }
+}
+
+/// Identifies the program: the CRC-32 of its code and constants, as its header says. A program that a debugger has put
+/// there has no header, and counts for itself.
 pub fn program_id() -> u32 {
+    Header::parse(header()).map_or_else(|_| own_crc(), |header| header.code_crc())
+}
+
+/// The place of the application's header.
+pub(super) fn header() -> &'static [u8; HEADER_LEN] {
+    // SAFETY: it lies in front of the application (memory.x): flash, readable whatever it holds. Whoever programs it does
+    // not hold on to this reference meanwhile: it is used to start the application, and by the application.
+    unsafe { &*(updatable().start as *const [u8; HEADER_LEN]) }
+}
+
+fn own_crc() -> u32 {
     let start = application().start;
     let end = (&raw const _program_end) as u32;
     let len = end.saturating_sub(start) as usize;

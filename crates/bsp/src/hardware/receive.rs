@@ -12,7 +12,7 @@ use crate::mailbox::Mailbox;
 const CAPACITY: usize = 32;
 
 /// The queue between the interrupt and the task.
-pub type ReceiveQueue = Queue<Received, CAPACITY>;
+pub type ReceiveQueue<const N: usize = CAPACITY> = Queue<Received, N>;
 
 /// A frame and when its interrupt came.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,11 @@ pub type Frames = Consumer<'static, Received>;
 
 impl Receiver {
     /// The two sides of FIFO 0 or 1.
-    pub fn new(fifo: usize, queue: &'static mut ReceiveQueue, lost: &'static Losses) -> (Receiver, Frames) {
+    pub fn new<const N: usize>(
+        fifo: usize,
+        queue: &'static mut ReceiveQueue<N>,
+        lost: &'static Losses,
+    ) -> (Receiver, Frames) {
         let (producer, consumer) = queue.split();
         (Receiver { fifo, queue: producer, lost }, consumer)
     }

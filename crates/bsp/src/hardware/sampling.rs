@@ -1,20 +1,26 @@
 //! The sampling front end: TIM3 starts a scan of ADC1 16,000 times a second, DMA2 collects it, and the interrupt comes
 //! once a millisecond. When each conversion begins is decided by hardware alone; the core can only be late to collect.
 
-use core::sync::atomic::{AtomicU16, Ordering};
+use core::sync::atomic::AtomicU32;
 
-use stm32f4xx_hal::gpio::{Analog, PA0, PA1};
+use stm32f4xx_hal::gpio::{Analog, PA0, PA1, PC2};
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, DMA2, TIM3};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 use crate::losses::Losses;
+pub(super) use crate::oversampling::SCANS;
+use crate::oversampling::{CHANNELS, WORDS, sums};
 
-/// Channels of one scan: pressure, its supply, temperature sensor, VREFINT.
-const CHANNELS: [u8; 4] = [0, 1, TEMPERATURE, 17];
-/// Scans in a millisecond.
-pub(super) const SCANS: usize = 16;
+/// One scan: pressure, its supply, thermistor, temperature sensor, VREFINT.
+const SCAN: [Conversion; CHANNELS] = [
+    Conversion { channel: 0, time: EXTERNAL },
+    Conversion { channel: 1, time: EXTERNAL },
+    Conversion { channel: 12, time: EXTERNAL },
+    Conversion { channel: TEMPERATURE, time: INTERNAL },
+    Conversion { channel: 17, time: INTERNAL },
+];
 /// Conversions in a half of the buffer.
-const HALF: usize = SCANS * CHANNELS.len();
+const HALF: usize = SCANS * CHANNELS;
 /// Counts of TIM3 between two scans: 72 MHz / 16 kHz.
 const PERIOD: u16 = 4500;
 
@@ -24,28 +30,46 @@ const TEMPERATURE: u8 = 18;
 #[cfg(not(feature = "stm32f446"))]
 const TEMPERATURE: u8 = 16;
 
-/// SMPx codes and what they take: 28 cycles suit a source below 15 kohm, 480 give the internal sensors the 10 us they
-/// need (STM32F446 datasheet, 6.3.22 to 6.3.24).
-const EXTERNAL: (u8, u32) = (2, 28);
-const INTERNAL: (u8, u32) = (7, 480);
+/// A channel and its sampling time.
+#[derive(Clone, Copy)]
+struct Conversion {
+    channel: u8,
+    time: SamplingTime,
+}
+
+/// An SMPx code, and the cycles that it stands for.
+#[derive(Clone, Copy)]
+struct SamplingTime {
+    code: u8,
+    cycles: u32,
+}
+
+/// 28 cycles suit a source below 15 kohm, 480 give the internal sensors the 10 us they need (STM32F446 datasheet, 6.3.22 to
+/// 6.3.24).
+const EXTERNAL: SamplingTime = SamplingTime { code: 2, cycles: 28 };
+const INTERNAL: SamplingTime = SamplingTime { code: 7, cycles: 480 };
 /// Cycles of the successive approximation, 12 bits.
-const CONVERSION: u32 = 12;
+const APPROXIMATION: u32 = 12;
 
 const _: () = {
-    let scan = 2 * (EXTERNAL.1 + CONVERSION) + 2 * (INTERNAL.1 + CONVERSION);
+    let (mut scan, mut i) = (0, 0);
+    while i < CHANNELS {
+        scan += SCAN[i].time.cycles + APPROXIMATION;
+        i += 1;
+    }
     // The ADC runs at a quarter of APB2, which is the clock of TIM3: both 72 MHz.
     assert!(scan * 4 < PERIOD as u32, "a scan must end before the next begins");
     assert!(SCANS as u32 * PERIOD as u32 == 72_000, "the interrupt must come once a millisecond");
 };
 
-/// What the DMA controller writes and the core reads. Atomic, because two bus masters share it.
-static BUFFER: [AtomicU16; 2 * HALF] = [const { AtomicU16::new(0) }; 2 * HALF];
+/// What the DMA controller writes and the core reads, two conversions in a word. Atomic, because two bus masters share it.
+static BUFFER: [AtomicU32; 2 * WORDS] = [const { AtomicU32::new(0) }; 2 * WORDS];
 
 /// Sums over the scans of one millisecond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sums {
-    /// Per channel: pressure, supply, temperature sensor, VREFINT.
-    pub channels: [u32; 4],
+    /// Per channel: pressure, its supply, thermistor, temperature sensor, VREFINT.
+    pub channels: [u32; CHANNELS],
     /// Which half of the buffers they come from.
     pub(super) half: usize,
 }
@@ -60,7 +84,7 @@ pub struct Sampling {
     dma: DMA2,
     timer: TIM3,
     lost: Losses,
-    _parts: (ADC1, PA0<Analog>, PA1<Analog>),
+    _parts: (ADC1, PA0<Analog>, PA1<Analog>, PC2<Analog>),
 }
 
 /// What the front end is made of.
@@ -71,6 +95,7 @@ pub(crate) struct Parts {
     pub(crate) timer: TIM3,
     pub(crate) pressure: PA0<Analog>,
     pub(crate) supply: PA1<Analog>,
+    pub(crate) thermistor: PC2<Analog>,
 }
 
 impl Sampling {
@@ -79,8 +104,8 @@ impl Sampling {
         prepare_dma(&parts.dma, &parts.adc, rcc);
         prepare_adc(&parts.adc, &parts.common, rcc);
         prepare_timer(&parts.timer, rcc);
-        let Parts { adc, dma, timer, pressure, supply, .. } = parts;
-        Sampling { dma, timer, lost: Losses::new(), _parts: (adc, pressure, supply) }
+        let Parts { adc, dma, timer, pressure, supply, thermistor, .. } = parts;
+        Sampling { dma, timer, lost: Losses::new(), _parts: (adc, pressure, supply, thermistor) }
     }
 
     /// What paces it, for those who have something to do at the same instants.
@@ -104,8 +129,8 @@ impl Sampling {
             (false, true) => 1,
             (true, true) => self.latest_of_two(),
         };
-        let values = BUFFER.as_chunks::<HALF>().0.get(half)?;
-        Some(Sums { channels: sum(values), half })
+        let words = BUFFER.as_chunks().0.get(half)?;
+        Some(Sums { channels: sums(words), half })
     }
 
     /// Milliseconds that nobody collected in time, since the last call.
@@ -121,16 +146,6 @@ impl Sampling {
     }
 }
 
-fn sum(half: &[AtomicU16; HALF]) -> [u32; 4] {
-    let mut sums = [0; 4];
-    for scan in half.as_chunks::<{ CHANNELS.len() }>().0 {
-        for (sum, value) in sums.iter_mut().zip(scan) {
-            *sum += u32::from(value.load(Ordering::Relaxed));
-        }
-    }
-    sums
-}
-
 /// DMA2 stream 0, channel 0: ADC1 to the buffer, round and round, an interrupt at each half (RM0390, 9.3).
 fn prepare_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
     DMA2::enable(rcc);
@@ -143,7 +158,7 @@ fn prepare_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
         stream.par().write(|w| w.pa().bits(source));
         stream.m0ar().write(|w| w.m0a().bits(target));
     }
-    stream.ndtr().write(|w| w.ndt().set(BUFFER.len() as u16));
+    stream.ndtr().write(|w| w.ndt().set(2 * HALF as u16));
     stream.cr().write(|w| {
         w.chsel().set(0).pl().very_high().msize().bits16().psize().bits16();
         w.minc().set_bit().circ().set_bit().htie().set_bit().tcie().set_bit()
@@ -159,11 +174,11 @@ fn prepare_adc(adc: &ADC1, common: &ADC_COMMON, rcc: &mut Rcc) {
     adc.cr1().write(|w| w.scan().set_bit());
     // SAFETY: any sampling time and any existing channel may be set.
     unsafe {
-        adc.smpr1().write(|w| w.bits(times(&CHANNELS, 10, INTERNAL.0)));
-        adc.smpr2().write(|w| w.bits(times(&CHANNELS, 0, EXTERNAL.0)));
-        adc.sqr3().write(|w| w.bits(sequence(&CHANNELS)));
+        adc.smpr1().write(|w| w.bits(times(10)));
+        adc.smpr2().write(|w| w.bits(times(0)));
+        adc.sqr3().write(|w| w.bits(sequence()));
     }
-    adc.sqr1().write(|w| w.l().set(CHANNELS.len() as u8 - 1));
+    adc.sqr1().write(|w| w.l().set(CHANNELS as u8 - 1));
     adc.cr2().write(|w| {
         w.exten().rising_edge().extsel().tim3trgo();
         w.dds().set_bit().dma().set_bit().adon().set_bit()
@@ -180,13 +195,15 @@ fn prepare_timer(timer: &TIM3, rcc: &mut Rcc) {
     timer.cr2().write(|w| w.mms().update());
 }
 
-/// Value of the SMPR register that begins with channel `first`: `code` for each of the ten channels that is used.
-fn times(channels: &[u8], first: u8, code: u8) -> u32 {
-    let own = channels.iter().filter(|channel| (first..first + 10).contains(channel));
-    own.fold(0, |register, channel| register | u32::from(code) << (3 * (channel - first)))
+/// Value of the SMPR register that begins with channel `first`: the sampling times of the ten channels from there on.
+fn times(first: u8) -> u32 {
+    let own = SCAN.iter().filter(|conversion| (first..first + 10).contains(&conversion.channel));
+    own.fold(0, |register, Conversion { channel, time }| {
+        register | u32::from(time.code) << (3 * (channel - first))
+    })
 }
 
 /// Value of SQR3: the channels in the order of conversion.
-fn sequence(channels: &[u8]) -> u32 {
-    channels.iter().rev().fold(0, |register, &channel| register << 5 | u32::from(channel))
+fn sequence() -> u32 {
+    SCAN.iter().rev().fold(0, |register, conversion| register << 5 | u32::from(conversion.channel))
 }

@@ -4,12 +4,16 @@ use canopen::{Duration, Instant};
 use stm32f4xx_hal::pac::{TIM2, tim2};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
+use crate::bit_timing::APB1_HZ;
 use crate::extension::Extension;
 
 static EXTENSION: Extension = Extension::new();
 
 /// Half a period: no alarm is set further ahead, so that a compare value means one instant only.
 const FARTHEST: Duration = Duration(1 << 31);
+
+/// Clock of the timers at APB1: twice that of the bus, which is divided (RM0390, 6.2).
+const TIMER_MHZ: u32 = 2 * APB1_HZ / 1_000_000;
 
 fn registers() -> &'static tim2::RegisterBlock {
     // SAFETY: TIM2 is given to `start`, so only this module uses it. Of its registers CNT is read only, each CCR belongs to
@@ -21,7 +25,7 @@ fn registers() -> &'static tim2::RegisterBlock {
 pub(crate) fn start(_tim2: TIM2, rcc: &mut Rcc) -> (TimeInterrupt, [Alarm; 2]) {
     TIM2::enable(rcc);
     TIM2::reset(rcc);
-    let prescaler = rcc.clocks.timclk1().to_MHz().saturating_sub(1);
+    let prescaler = TIMER_MHZ - 1;
     let tim2 = registers();
     tim2.psc().write(|w| w.psc().set(prescaler as u16));
     tim2.arr().write(|w| w.arr().set(u32::MAX));
@@ -41,6 +45,7 @@ pub struct Clock;
 impl Clock {
     /// The present instant, right at every priority.
     #[must_use]
+    #[inline(never)]
     pub fn now() -> Instant {
         Instant(EXTENSION.read(|| registers().cnt().read().cnt().bits()))
     }

@@ -17,7 +17,7 @@ const START_UP_MS: u32 = 3_000;
 /// What KR takes to start again from the top.
 const RELOAD: u16 = 0xAAAA;
 
-/// The watchdog while the node starts: it cannot be fed, but has patience.
+/// The watchdog while the node starts, with much patience.
 pub struct StartUpWatchdog(IndependentWatchdog);
 
 impl StartUpWatchdog {
@@ -27,6 +27,11 @@ impl StartUpWatchdog {
         watchdog.stop_on_debug(debug, true);
         watchdog.start(START_UP_MS.millis());
         StartUpWatchdog(watchdog)
+    }
+
+    /// Gives it another few seconds. That is for the bootloader, whose one loop is alive if it comes by.
+    pub fn feed(&mut self) {
+        self.0.feed();
     }
 
     /// The start-up is over: from now on all parts must report.

@@ -6,6 +6,10 @@ use crate::sdo::Abort;
 
 /// The part of a personality that is code: rules of its own objects.
 pub trait Application {
+    /// A device without PDO, SYNC, EMCY, heartbeat consumer, stored parameters and block upload, such as a bootloader. Its
+    /// dictionary has none of their objects, and the code for them is left out of the image.
+    const SERVICES_ONLY: bool = false;
+
     /// Fills in what no table can know (identity, versions), after every reset.
     fn initialise(&mut self, image: &mut [u8]);
 

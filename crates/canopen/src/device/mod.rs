@@ -63,6 +63,8 @@ struct Core<A, const N: usize> {
     emcy: emcy::Producer,
     tpdos: [Tpdo; TPDOS],
     rpdos: [Rpdo; RPDOS],
+    /// The CAN-IDs of those that are valid, in one place: each frame of anybody is compared with them.
+    rpdo_ids: [u16; RPDOS],
     scanner: Scanner,
     /// The PDOs that are valid, and the RPDOs that have a fault.
     valid_tpdos: PdoSet,
@@ -75,6 +77,9 @@ struct Core<A, const N: usize> {
     jobs: store::Jobs,
     unsound: store::Unsound,
 }
+
+/// The CAN-ID of no frame.
+const NO_ID: u16 = u16::MAX;
 
 /// A deadline in the past: the next poll looks at everything.
 const STALE: Instant = Instant(0);
@@ -100,6 +105,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             emcy: emcy::Producer::new(),
             tpdos: [const { Tpdo::new() }; TPDOS],
             rpdos: [const { Rpdo::new() }; RPDOS],
+            rpdo_ids: [NO_ID; RPDOS],
             scanner: Scanner::new(),
             valid_tpdos: PdoSet::EMPTY,
             valid_rpdos: PdoSet::EMPTY,

@@ -32,11 +32,15 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// All that can be sent and that is mapped into no TPDO. One that is switched off counts too: who does not want its
     /// content sent does not want it in another way.
     fn not_mapped(&self) -> impl Iterator<Item = Watched> {
-        let layouts: Vec<Layout, TPDOS> = self.tpdo_layouts().take(TPDOS).collect();
+        let mut layouts = Vec::<Layout, TPDOS>::new();
+        for layout in self.tpdo_layouts() {
+            // A table with more TPDOs than there is room for does not compile.
+            let _ = layouts.push(layout);
+        }
         let is_mapped = move |entry: &Entry| layouts.iter().any(|layout| layout.contains(entry.field));
-        let entries = self.dictionary.entries().iter();
+        let entries = self.dictionary.entries();
         let free = entries.filter(move |entry| is_sendable(entry) && !is_mapped(entry));
-        free.map(|entry| Watched::new(multiplexer(entry), entry.field))
+        free.map(|entry| Watched::new(multiplexer(&entry), entry.field))
     }
 
     /// What the scanner list names: blocks of sub-indexes of one object.
@@ -47,7 +51,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             let index = u16::from_le_bytes([low, high]);
             (0..size).filter_map(move |i| {
                 let entry = self.dictionary.find(index, first.checked_add(i)?).ok()?;
-                is_sendable(entry).then(|| Watched::new(multiplexer(entry), entry.field))
+                is_sendable(&entry).then(|| Watched::new(multiplexer(&entry), entry.field))
             })
         })
     }
@@ -78,7 +82,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// Whether the object exists and takes process data.
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
         let entry = self.dictionary.find(at.index, at.sub).ok();
-        let entry = entry.filter(|entry| entry.mapping == Mapping::Rpdo && entry.field.size <= LONGEST);
+        let entry =
+            entry.filter(|entry| entry.attributes.mapping == Mapping::Rpdo && entry.field.size <= LONGEST);
         if let Some(entry) = entry {
             let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
             entry.field.set(&mut self.image, bytes);
@@ -123,7 +128,7 @@ impl DispatchingLine {
 }
 
 fn is_sendable(entry: &Entry) -> bool {
-    entry.mapping == Mapping::Tpdo && entry.field.size <= LONGEST
+    entry.attributes.mapping == Mapping::Tpdo && entry.field.size <= LONGEST
 }
 
 fn multiplexer(entry: &Entry) -> Multiplexer {

@@ -3,44 +3,50 @@
 use super::{Application, Core, Job, Part, STALE};
 use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
 use crate::nmt::State;
-use crate::sdo::{Abort, Multiplexer, Objects, Writable};
+use crate::sdo::{Abort, Multiplexer, Objects, Readable, Writable};
 use crate::{Duration, Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
-    fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort> {
+    const IS_SMALL: bool = A::SERVICES_ONLY;
+
+    fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort> {
         let entry = self.entry(at)?;
-        if !entry.access.is_readable() {
+        if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
-        match entry.rule {
-            Rule::ErrorCount => Ok(core::slice::from_ref(self.emcy.history().count())),
-            Rule::Application(number) if entry.kind == Type::Domain => self.application.read_domain(number),
-            Rule::ErrorEntry => {
-                self.emcy.history().error(at.sub).map(|error| &error[..]).ok_or(Abort::NoData)
-            }
-            _ => Ok(stored(entry, &self.image)),
-        }
+        let stream = stream_of(&entry);
+        let bytes = match (entry.rule(), stream) {
+            (_, Some(stream)) => self.content(stream)?,
+            _ if A::SERVICES_ONLY => stored(&entry, &self.image),
+            (Rule::ErrorCount, _) => core::slice::from_ref(self.emcy.history().count()),
+            (Rule::ErrorEntry, _) => self.emcy.history().error(at.sub).ok_or(Abort::NoData)?,
+            _ => stored(&entry, &self.image),
+        };
+        Ok(Readable { bytes, stream })
+    }
+
+    fn content(&self, stream: u8) -> Result<&[u8], Abort> {
+        self.application.read_domain(stream)
     }
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
         let entry = self.writable_entry(at)?;
-        let is_stream = entry.kind == Type::Domain;
-        Ok(if is_stream { Writable::Stream } else { Writable::Value(entry.field.size.into()) })
+        Ok(stream_of(&entry).map_or(Writable::Value(entry.field.size.into()), Writable::Stream))
     }
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
         let entry = self.writable_entry(at)?;
-        if entry.kind == Type::Domain {
-            return self.write_domain(entry, bytes);
+        if let Some(stream) = stream_of(&entry) {
+            return self.write_domain(stream, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
         entry.check_value(bytes)?;
-        self.admit(entry, value, bytes)?;
-        if !entry.rule.is_computed() && !entry.rule.is_command() {
+        self.admit(&entry, value, bytes)?;
+        if !entry.rule().is_computed() && !entry.rule().is_command() {
             entry.field.set(&mut self.image, bytes);
         }
-        self.follow(entry, value, now);
+        self.follow(&entry, value, now);
         Ok(())
     }
 
@@ -48,38 +54,30 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         self.jobs.take_deferred()
     }
 
-    fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
-        self.stream_entry(entry, part)
+    fn stream(&mut self, stream: u8, part: Part<'_>) -> Result<(), Abort> {
+        self.application.write_domain(stream, part)
     }
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
     /// The entry, or the one that it is another name of.
-    fn entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+    fn entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
-        match entry.rule {
+        match entry.rule() {
             Rule::EventTimerOf(number) => self.dictionary.find(0x1800 | u16::from(number), 5),
             _ => Ok(entry),
         }
     }
 
-    fn writable_entry(&self, at: Multiplexer) -> Result<&'static Entry, Abort> {
+    fn writable_entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
         let entry = self.entry(at)?;
-        if entry.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
+        if entry.attributes.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
     }
 
-    fn stream_entry(&mut self, entry: &Entry, part: Part<'_>) -> Result<(), Abort> {
-        match entry.rule {
-            Rule::Application(number) => self.application.write_domain(number, part),
-            _ => Err(Abort::Access),
-        }
-    }
-
-    fn write_domain(&mut self, entry: &Entry, bytes: &[u8]) -> Result<(), Abort> {
-        self.stream_entry(entry, Part::Begin(Some(bytes.len())))?;
-        self.stream_entry(entry, Part::Data(0, bytes))?;
-        self.stream_entry(entry, Part::End(bytes.len()))
+    fn write_domain(&mut self, stream: u8, bytes: &[u8]) -> Result<(), Abort> {
+        self.stream(stream, Part::Begin(Some(bytes.len())))?;
+        self.stream(stream, Part::Data(0, bytes))?;
+        self.stream(stream, Part::End(bytes.len()))
     }
 
     pub(super) fn is_initialising(&self) -> bool {
@@ -106,7 +104,9 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Whether the rule of the entry allows the value.
     fn admit(&mut self, entry: &Entry, value: u32, bytes: &[u8]) -> Result<(), Abort> {
-        match entry.rule {
+        match entry.rule() {
+            Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
+            _ if A::SERVICES_ONLY => Ok(()),
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
             Rule::SyncCobId => sync::check_cob_id(value),
             Rule::SyncOverflow => sync::check_overflow(value, self.number(0x1006, 0)),
@@ -122,24 +122,24 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::PdoInhibit | Rule::PdoSyncStart if self.pdo_is_valid(entry) => Err(Abort::InvalidValue),
             Rule::PdoCount => self.admit_pdo_count(entry, value),
             Rule::PdoSlot => self.admit_pdo_slot(entry, value),
-            Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
             _ => Ok(()),
         }
     }
 
     /// What follows from a new value.
     fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
-        self.pending.parameters |= matches!(entry.group, Group::Application | Group::Calibration);
-        match entry.rule {
+        self.pending.parameters |= matches!(entry.attributes.group, Group::Application | Group::Calibration);
+        match entry.rule() {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
+            Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
+            _ if A::SERVICES_ONLY => (),
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
             }
             Rule::EmcyInhibit => self.emcy.set_inhibit(Duration::from_inhibit(value)),
             Rule::EmcyCobId => self.emcy.configure(value),
-            Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine => self.configure_pdos(now),
             Rule::PdoCobId
@@ -151,7 +151,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             _ => (),
         }
         self.pending.identifiers |= matches!(
-            entry.rule,
+            entry.rule(),
             Rule::SyncCobId | Rule::PdoCobId | Rule::PdoPredefined | Rule::HeartbeatWatch
         );
         (self.process_due, self.services_due) = (STALE, STALE);
@@ -161,8 +161,16 @@ impl<A: Application, const N: usize> Core<A, N> {
 /// The value as an upload gives it: a string ends where its zeros begin.
 fn stored<'a>(entry: &Entry, image: &'a [u8]) -> &'a [u8] {
     let value = entry.field.get(image);
-    match entry.kind {
+    match entry.attributes.kind {
         Type::VisibleString(_) => value.split(|&byte| byte == 0).next().unwrap_or(value),
         _ => value,
+    }
+}
+
+/// The number of the stream that a domain is: the application's.
+fn stream_of(entry: &Entry) -> Option<u8> {
+    match (entry.attributes.kind, entry.rule()) {
+        (Type::Domain, Rule::Application(number)) => Some(number),
+        _ => None,
     }
 }

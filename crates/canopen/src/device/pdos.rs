@@ -3,14 +3,14 @@
 //! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
 //! entries, count, COB-ID valid.
 
-use super::{Application, Core};
+use super::{Application, Core, NO_ID};
 use crate::dictionary::{Dictionary, Entry, Rule};
 use crate::pdo::{
     Addressing, Content, Direction, Layout, MappedObject, RpdoSettings, ScannerSettings, Settings,
     Transmission, locate,
 };
 use crate::sdo::Abort;
-use crate::{CobId, Duration, Instant};
+use crate::{CanId, CobId, Duration, Instant};
 
 /// A PDO by the index of one of its objects.
 ///
@@ -25,8 +25,12 @@ struct Pdo {
 
 impl Pdo {
     fn of(entry: &Entry) -> Pdo {
-        let direction = if entry.index() & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive };
-        Pdo { direction, number: entry.index() & 0x01FF }
+        Pdo::at(entry.index())
+    }
+
+    fn at(index: u16) -> Pdo {
+        let direction = if index & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive };
+        Pdo { direction, number: index & 0x01FF }
     }
 
     fn communication(self) -> u16 {
@@ -37,11 +41,10 @@ impl Pdo {
         self.number | if self.direction == Direction::Transmit { 0x1A00 } else { 0x1600 }
     }
 
-    /// Those that a dictionary has, one way: each has a COB-ID.
+    /// Those that a dictionary has, one way.
     fn all(dictionary: &Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
         let first = Pdo { direction, number: 0 };
-        let objects = dictionary.between(first.communication(), first.mapping());
-        objects.iter().filter(|entry| entry.sub() == 1).map(Pdo::of)
+        dictionary.between(first.communication(), first.mapping()).map(Pdo::at)
     }
 }
 
@@ -92,8 +95,10 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn configure_rpdo(&mut self, pdo: Pdo, place: u8, now: Instant) {
         let settings = self.rpdo_settings(pdo);
         self.valid_rpdos.set(place, settings.is_some());
-        if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
+        let number = usize::from(place);
+        if let (Some(rpdo), Some(id)) = (self.rpdos.get_mut(number), self.rpdo_ids.get_mut(number)) {
             rpdo.configure(settings);
+            *id = rpdo.id().map_or(NO_ID, CanId::get);
         }
         self.forget_rpdo_faults(place, now);
     }
@@ -189,7 +194,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn admit_pdo_cob_id(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let pdo = Pdo::of(entry);
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
-        let is_predefined = entry.rule == Rule::PdoPredefined;
+        let is_predefined = entry.rule() == Rule::PdoPredefined;
         if is_predefined && CobId::parse(self.default_number(entry)).is_none_or(|own| own.id != new.id) {
             return Err(Abort::InvalidValue);
         }
@@ -197,7 +202,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         let transmission = Transmission::parse(low_byte(self.number(entry.index(), 2)));
         let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
         let is_empty = self.number(pdo.mapping(), 0) == 0;
-        let is_not_sent = self.is_multiplexed(pdo) && transmission != Some(Transmission::Event);
+        let is_not_sent =
+            self.is_multiplexed(pdo) && !transmission.is_some_and(Transmission::is_event_driven);
         let is_taken = !is_predefined && new.id.is_restricted();
         let cannot_exist = moves || contradicts || is_empty || is_not_sent || is_taken;
         if !new.bit31 && cannot_exist { Err(Abort::InvalidValue) } else { Ok(()) }
@@ -209,8 +215,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         let transmission = Transmission::parse(low_byte(value)).ok_or(Abort::InvalidValue)?;
         let no_remote = self.cob_id(pdo).is_some_and(|cob_id| !cob_id.bit31 && cob_id.bit30);
         let is_receive = pdo.direction == Direction::Receive;
-        let is_not_sent =
-            self.is_multiplexed(pdo) && transmission != Transmission::Event && self.is_valid(pdo);
+        let is_not_sent = self.is_multiplexed(pdo) && !transmission.is_event_driven() && self.is_valid(pdo);
         if is_not_sent || transmission.needs_remote() && (no_remote || is_receive) {
             return Err(Abort::InvalidValue);
         }

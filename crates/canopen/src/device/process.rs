@@ -11,7 +11,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         let out = &mut self.gate(out);
         if frame.id() == CanId::NMT.get() {
             self.on_nmt(frame, now, out);
-        } else if self.core.state.has_pdos() {
+        } else if self.core.state.has_pdos() && !A::SERVICES_ONLY {
             self.core.on_pdo_frame(frame, now, out);
         }
     }
@@ -31,6 +31,9 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     pub(super) fn send_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         let core = &mut self.core;
+        if A::SERVICES_ONLY {
+            return Instant::NEVER;
+        }
         if now >= core.process_due {
             core.poll_sync(now);
             core.poll_rpdos(now);
@@ -46,7 +49,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     pub fn changed(&mut self, now: Instant, out: &mut impl Transmit) {
         let out = &mut self.gate(out);
         self.start_by_itself(now, out);
-        if self.core.state.has_pdos() {
+        if self.core.state.has_pdos() && !A::SERVICES_ONLY {
             self.core.each_tpdo(|tpdo, image| tpdo.on_change(image, now, out));
             self.core.scanner.on_change(&self.core.image, now, out);
             self.core.process_due = self.core.process_due.min(self.core.scanner.due());

@@ -1,6 +1,6 @@
 //! RPDOs in the device: reception, deadlines, and the faults of each.
 
-use super::{Application, Core};
+use super::{Application, Core, RPDOS};
 use crate::emcy::Fault;
 use crate::pdo::{Reception, Rpdo};
 use crate::{Frame, Instant};
@@ -8,17 +8,23 @@ use crate::{Frame, Instant};
 impl<A: Application, const N: usize> Core<A, N> {
     /// Takes a data frame that may be one of the RPDOs. A good one clears the faults of its PDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
+        for (number, place) in (0..).zip(0..RPDOS) {
+            if self.rpdo_ids.get(place) == Some(&frame.id()) {
+                self.take_rpdo(number, frame, now);
+            }
+        }
+    }
+
+    fn take_rpdo(&mut self, number: u8, frame: &Frame, now: Instant) {
         let late = self.sync.is_window_over(now);
-        for number in self.valid_rpdos.iter() {
-            let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
-            let Some(reception) = rpdo.take(frame, &mut self.image, now, late) else { continue };
-            self.process_due = self.process_due.min(rpdo.due());
-            if let Reception::Multiplexed(addressing) = reception {
-                self.on_mpdo(frame.bytes(), addressing, now);
-            }
-            if reception != Reception::Complete || self.faulty_rpdos.contains(number) {
-                self.on_reception(number, reception, now);
-            }
+        let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
+        let Some(reception) = rpdo.take(frame, &mut self.image, now, late) else { return };
+        self.process_due = self.process_due.min(rpdo.due());
+        if let Reception::Multiplexed(addressing) = reception {
+            self.on_mpdo(frame.bytes(), addressing, now);
+        }
+        if reception != Reception::Complete || self.faulty_rpdos.contains(number) {
+            self.on_reception(number, reception, now);
         }
     }
 

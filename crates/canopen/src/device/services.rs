@@ -21,7 +21,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             self.on_sdo(frame, now, out);
         } else if frame.id() == lss::REQUEST.get() {
             self.on_lss(frame, now, out);
-        } else if frame.id() & 0x780 == ERROR_CONTROL {
+        } else if frame.id() & 0x780 == ERROR_CONTROL && !A::SERVICES_ONLY {
             self.core.on_heartbeat(frame, now);
         }
     }
@@ -30,10 +30,16 @@ impl<A: Application, const N: usize> Device<A, N> {
     fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
+        if let Some(taken) = self.server.take_expected(request, &mut self.core, now) {
+            if let Err(abort) = taken {
+                self.respond(Some(abort), now, out);
+            }
+            return;
+        }
         let response = self.server.answer(request, &mut self.core, now);
         self.core.services_due = self.core.services_due.min(self.server.deadline());
         self.respond(response, now, out);
-        if self.server.is_sending() {
+        if !A::SERVICES_ONLY && self.server.is_sending() {
             self.send_block(now, out);
         }
     }
@@ -41,7 +47,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
     fn send_block(&mut self, now: Instant, out: &mut impl Transmit) {
         let id = self.core.service(SDO_RESPONSE);
-        let abort = self.server.send_block(&mut self.core, now, |data| {
+        let abort = self.server.send_block(&self.core, now, |data| {
             out.room() > RESERVED_ROOM && out.send(Frame::data_frame(id, 8, data)).is_ok()
         });
         if abort.is_some() {
@@ -69,9 +75,13 @@ impl<A: Application, const N: usize> Device<A, N> {
             let out = &mut self.gate(out);
             self.poll_lss(now, out);
             self.poll_heartbeat(now, out);
-            self.poll_watches(now);
+            if !A::SERVICES_ONLY {
+                self.poll_watches(now);
+            }
             if self.core.state.has_services() {
-                self.core.emcy.poll(now, out);
+                if !A::SERVICES_ONLY {
+                    self.core.emcy.poll(now, out);
+                }
                 self.poll_sdo(now, out);
             }
             self.core.services_due = self.next_service();
@@ -94,7 +104,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         if let Some(response) = self.server.expire(now) {
             self.respond(Some(response), now, out);
         }
-        if now >= self.block_due {
+        if !A::SERVICES_ONLY && now >= self.block_due {
             self.send_block(now, out);
         }
     }
@@ -105,12 +115,20 @@ impl<A: Application, const N: usize> Device<A, N> {
         if core.is_initialising() {
             return lss;
         }
-        let heartbeat = lss.min(core.heartbeat.due()).min(core.watches.due());
-        if !core.state.has_services() {
-            return heartbeat;
+        let heartbeat = lss.min(core.heartbeat.due());
+        if A::SERVICES_ONLY {
+            return heartbeat.min(self.next_sdo());
         }
+        let watched = heartbeat.min(core.watches.due());
+        if !core.state.has_services() {
+            return watched;
+        }
+        watched.min(core.emcy.due()).min(self.next_sdo()).min(self.block_due)
+    }
+
+    fn next_sdo(&self) -> Instant {
         let response = self.response.map_or(Instant::NEVER, |(_, due)| due);
-        heartbeat.min(core.emcy.due()).min(self.server.deadline()).min(response).min(self.block_due)
+        self.server.deadline().min(response)
     }
 
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).

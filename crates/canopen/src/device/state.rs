@@ -76,7 +76,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         self.core.configure(now);
         self.core.enter(State::PreOperational);
-        let starts = self.core.number(0x1F80, 0) == SELF_START;
+        let starts = !A::SERVICES_ONLY && self.core.number(0x1F80, 0) == SELF_START;
         self.core.pending.with_values = starts.then_some(State::Operational);
         self.poll_services(now, out);
     }
@@ -184,6 +184,13 @@ impl<A: Application, const N: usize> Core<A, N> {
             return;
         }
         self.state = state;
+        self.services_due = STALE;
+        if !A::SERVICES_ONLY {
+            self.enter_process(state);
+        }
+    }
+
+    fn enter_process(&mut self, state: State) {
         self.sync.stop();
         for tpdo in &mut self.tpdos {
             if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
@@ -194,11 +201,25 @@ impl<A: Application, const N: usize> Core<A, N> {
         } else {
             self.scanner.stop();
         }
-        (self.process_due, self.services_due) = (STALE, STALE);
+        self.process_due = STALE;
     }
 
     /// Takes the values of what is to be reset: the defaults, then what is stored.
     fn load(&mut self) {
+        if A::SERVICES_ONLY {
+            // Nothing of it is stored, and nothing depends on the node-ID.
+            self.image
+                .iter_mut()
+                .zip(self.dictionary.defaults())
+                .for_each(|(value, default)| *value = *default);
+        } else {
+            self.load_parameters();
+        }
+        self.application.initialise(&mut self.image);
+        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
+    }
+
+    fn load_parameters(&mut self) {
         let everything = self.pending.reset == Reset::Node;
         self.load_defaults(|entry| everything || entry.index() < 0x2000);
         self.load_stored(Group::Communication);
@@ -206,16 +227,14 @@ impl<A: Application, const N: usize> Core<A, N> {
             self.load_stored(Group::Application);
             self.load_stored(Group::Calibration);
         }
-        self.application.initialise(&mut self.image);
-        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
     }
 
     pub(super) fn load_defaults(&mut self, is_meant: impl Fn(&Entry) -> bool) {
-        for entry in self.dictionary.entries().iter().filter(|entry| is_meant(entry)) {
+        for entry in self.dictionary.entries().filter(|entry| is_meant(entry)) {
             let default: [u8; 4] = entry.field.load(self.dictionary.defaults());
-            if entry.node_relative {
+            if entry.attributes.node_relative {
                 self.store_node_relative(entry.field, u32::from_le_bytes(default));
-            } else if !entry.rule.is_computed() {
+            } else if !entry.rule().is_computed() {
                 entry.field.set(&mut self.image, entry.field.get(self.dictionary.defaults()));
             }
         }
@@ -230,6 +249,14 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Gives every protocol its parameters.
     fn configure(&mut self, now: Instant) {
+        if !A::SERVICES_ONLY {
+            self.configure_process(now);
+        }
+        let period = Duration::from_millis(self.number(0x1017, 0).into());
+        self.heartbeat.boot_up(period, now);
+    }
+
+    fn configure_process(&mut self, now: Instant) {
         self.configure_sync(now);
         self.emcy.configure(self.number_or(0x1014, 0, NO_EMCY));
         self.emcy.set_inhibit(Duration::from_inhibit(self.number(0x1015, 0)));
@@ -238,8 +265,6 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.emcy.restart(now);
         self.report_stored(now);
         self.update_error_register();
-        let period = Duration::from_millis(self.number(0x1017, 0).into());
-        self.heartbeat.boot_up(period, now);
     }
 
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {

@@ -131,6 +131,9 @@ impl<A: Application, const N: usize> Device<A, N> {
         now: Instant,
         out: &mut impl Transmit,
     ) {
+        if A::SERVICES_ONLY {
+            return self.respond_lss(Slave::stored(false), now, out);
+        }
         match self.core.jobs.begin(Job::Configure(configuration)) {
             Ok(()) => self.core.jobs.lss_waits = true,
             Err(_) => self.respond_lss(Slave::stored(false), now, out),
@@ -148,7 +151,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// Begins the job that a write to 1010h or 1011h asks for.
     pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let selection = Selection::of_sub(entry.sub()).ok_or(Abort::Access)?;
-        let job = match (entry.rule, value) {
+        let job = match (entry.rule(), value) {
             (Rule::Store, SAVE) => Job::Save(selection),
             (Rule::Restore, LOAD) => Job::Restore(selection),
             _ => return Err(Abort::NotStored),
@@ -184,11 +187,14 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Takes what is stored of a group; where that is damaged or does not fit, the defaults stay as a whole.
     pub(super) fn load_stored(&mut self, group: Group) {
+        if A::SERVICES_ONLY {
+            return;
+        }
         let Stored { packed, is_sound } = self.application.stored(group);
         let fits =
             self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
         if !fits {
-            self.load_defaults(|entry| entry.group == group);
+            self.load_defaults(|entry| entry.attributes.group == group);
         }
         self.unsound.set(group, !(fits && is_sound));
         self.application.loaded(group, fits && is_sound);

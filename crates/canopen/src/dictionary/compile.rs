@@ -1,8 +1,8 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
-use super::{Access, DefaultValue, Entry, Field, Group, Mapping, Object, Rule, Type};
-use crate::device::{RPDOS, TPDOS};
-use crate::pdo::WATCHED;
+use super::entry::Attributes;
+use super::tables::{Place, Series};
+use super::{Access, DefaultValue, Object, Tables, Type};
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -35,27 +35,194 @@ pub const fn gather<const N: usize>(parts: &[&[Object]]) -> [Object; N] {
     rows
 }
 
-/// The run-time entries of a table.
+/// The run-time dictionary of a table of rows: its tables, the image of its defaults, and its [`check`](crate::dictionary::check).
+#[macro_export]
+macro_rules! dictionary {
+    ($rows:expr) => {{
+        use $crate::dictionary as make;
+        const _: () = make::check($rows);
+        static TABLES: make::Tables<
+            { make::series_count($rows) },
+            { make::place_count($rows) },
+            { make::attributes_count($rows) },
+        > = make::compile($rows);
+        static DEFAULTS: [u8; make::image_size($rows)] = make::default_image($rows);
+        make::Dictionary::new(&TABLES, &DEFAULTS)
+    }};
+}
+
+/// The run-time tables of a sorted table of rows. The parameters are what [`series_count`], [`place_count`] and
+/// [`attributes_count`] say, or more.
+///
+/// # Panics
+/// During compilation, when they are less.
 #[must_use]
-pub const fn compile<const N: usize>(rows: &[Object; N]) -> [Entry; N] {
-    let mut entries = [entry(&rows[0], 0); N];
-    let (mut i, mut offset) = (0, 0);
-    while i < N {
-        entries[i] = entry(&rows[i], offset);
-        offset += rows[i].stored_size();
+pub const fn compile<const S: usize, const P: usize, const A: usize>(rows: &[Object]) -> Tables<S, P, A> {
+    let tables = Tables { series: [UNUSED; S], places: [NO_PLACE; P], attributes: [attributes(&rows[0]); A] };
+    let mut filling = Filling { tables, series: 0, places: 0, attributes: 0, offset: 0 };
+    let mut row = 0;
+    while row < rows.len() {
+        let object = rows.split_at(row).1.split_at(object_len(rows, row)).0;
+        let objects = series_len(rows, row);
+        filling.add_series(object, objects);
+        row += object.len() * objects;
+    }
+    filling.tables
+}
+
+/// Tables, how much of them is filled, and the place in the image that comes next.
+struct Filling<const S: usize, const P: usize, const A: usize> {
+    tables: Tables<S, P, A>,
+    series: usize,
+    places: usize,
+    attributes: usize,
+    offset: usize,
+}
+
+#[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges.
+impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
+    /// So many objects like this one.
+    const fn add_series(&mut self, object: &[Object], objects: usize) {
+        let stride = image_size(object);
+        self.tables.series[self.series] = Series {
+            index: object[0].index,
+            objects: objects as u8,
+            entries: object.len() as u8,
+            first: self.places as u16,
+            stride: stride as u16,
+        };
+        let (mut row, mut offset) = (0, self.offset);
+        while row < object.len() {
+            self.add_place(&object[row], offset);
+            (row, offset) = (row + 1, offset + object[row].stored_size());
+        }
+        (self.series, self.offset) = (self.series + 1, self.offset + stride * objects);
+    }
+
+    const fn add_place(&mut self, row: &Object, offset: usize) {
+        let attributes = attributes(row);
+        let number = position(&self.tables.attributes, self.attributes, &attributes);
+        if number == self.attributes {
+            self.tables.attributes[number] = attributes;
+            self.attributes += 1;
+        }
+        self.tables.places[self.places] =
+            Place { sub: row.sub, attributes: number as u8, offset: offset as u16 };
+        self.places += 1;
+    }
+}
+
+/// A series of no object, after all others: no search ends in it.
+const UNUSED: Series = Series { index: u16::MAX, objects: 0, entries: 0, first: 0, stride: 0 };
+const NO_PLACE: Place = Place { sub: 0, attributes: 0, offset: 0 };
+
+/// How many series the objects of a table form.
+#[must_use]
+pub const fn series_count(rows: &[Object]) -> usize {
+    let (mut total, mut row) = (0, 0);
+    while row < rows.len() {
+        row += object_len(rows, row) * series_len(rows, row);
+        total += 1;
+    }
+    total
+}
+
+/// How many entries the first objects of all series have.
+#[must_use]
+pub const fn place_count(rows: &[Object]) -> usize {
+    let (mut total, mut row) = (0, 0);
+    while row < rows.len() {
+        total += object_len(rows, row);
+        row += object_len(rows, row) * series_len(rows, row);
+    }
+    total
+}
+
+/// How many different attributes the entries of a table have.
+#[must_use]
+pub const fn attributes_count(rows: &[Object]) -> usize {
+    let mut different = [attributes(&rows[0]); MOST_ATTRIBUTES];
+    let (mut known, mut row) = (0, 0);
+    while row < rows.len() {
+        let attributes = attributes(&rows[row]);
+        if position(&different, known, &attributes) == known {
+            different[known] = attributes;
+            known += 1;
+        }
+        row += 1;
+    }
+    known
+}
+
+/// A place names its attributes in a byte. More than these do not compile.
+const MOST_ATTRIBUTES: usize = 256;
+
+/// Where the attributes are among the first `known`; `known` when they are not.
+const fn position(all: &[Attributes], known: usize, attributes: &Attributes) -> usize {
+    let mut i = 0;
+    while i < known && !is_same(&all[i], attributes) {
         i += 1;
     }
-    entries
+    i
+}
+
+const fn is_same(a: &Attributes, b: &Attributes) -> bool {
+    a.kind.code() == b.kind.code()
+        && a.kind.size() == b.kind.size()
+        && a.low == b.low
+        && a.high == b.high
+        && a.rule.code() == b.rule.code()
+        && a.access as u8 == b.access as u8
+        && a.mapping as u8 == b.mapping as u8
+        && a.group as u8 == b.group as u8
+        && a.node_relative == b.node_relative
+}
+
+/// The rows of the object that begins here.
+const fn object_len(rows: &[Object], first: usize) -> usize {
+    let mut end = first + 1;
+    while end < rows.len() && rows[end].index == rows[first].index {
+        end += 1;
+    }
+    end - first
+}
+
+/// The objects of the series that begins here.
+const fn series_len(rows: &[Object], first: usize) -> usize {
+    let len = object_len(rows, first);
+    let mut objects = 1;
+    while objects < u8::MAX as usize && continues(rows, first, len, objects) {
+        objects += 1;
+    }
+    objects
+}
+
+/// Whether the object after so many of a series is one of it too.
+const fn continues(rows: &[Object], first: usize, len: usize, objects: usize) -> bool {
+    let start = first + len * objects;
+    if start + len > rows.len() || object_len(rows, start) != len {
+        return false;
+    }
+    if rows[start].index as usize != rows[first].index as usize + objects {
+        return false;
+    }
+    let mut i = 0;
+    while i < len {
+        let (a, b) = (&rows[first + i], &rows[start + i]);
+        if a.sub != b.sub || !is_same(&attributes(a), &attributes(b)) {
+            return false;
+        }
+        i += 1;
+    }
+    true
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `check` has seen the ranges.
-const fn entry(row: &Object, offset: usize) -> Entry {
+const fn attributes(row: &Object) -> Attributes {
     let (low, high) = effective_limits(row);
-    Entry {
-        key: row.key(),
-        low: low as i32,
-        high: high as u32,
-        field: Field { offset: offset as u16, size: row.kind.size() },
+    Attributes {
+        low: row.kind.ordered(low as u32),
+        high: row.kind.ordered(high as u32),
         kind: row.kind,
         access: row.access,
         mapping: row.mapping,
@@ -65,7 +232,7 @@ const fn entry(row: &Object, offset: usize) -> Entry {
     }
 }
 
-const fn effective_limits(row: &Object) -> (i64, i64) {
+pub(super) const fn effective_limits(row: &Object) -> (i64, i64) {
     match (row.limits, row.kind.range()) {
         (Some(limits), _) | (None, Some(limits)) => limits,
         (None, None) => (0, 0),
@@ -107,102 +274,5 @@ const fn default_byte(value: DefaultValue, i: usize) -> u8 {
         DefaultValue::NodeId(base) => base.to_le_bytes()[i],
         DefaultValue::Text(text) if i < text.len() => text.as_bytes()[i],
         DefaultValue::Text(_) | DefaultValue::None => 0,
-    }
-}
-
-/// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
-/// are others, attributes that fit together, no more PDOs than a device has room for.
-///
-/// # Panics
-/// During compilation, when a row is wrong.
-pub const fn check(rows: &[Object]) {
-    assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    assert!(pdos(rows, 0x1400) <= RPDOS, "more RPDOs than a device has");
-    assert!(pdos(rows, 0x1800) <= TPDOS, "more TPDOs than a device has");
-    let (mut i, mut sent) = (0, 0);
-    while i < rows.len() {
-        check_row(&rows[i]);
-        sent += matches!(rows[i].mapping, Mapping::Tpdo) as usize;
-        if i > 0 {
-            assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
-        }
-        let has_sub_0 = rows[i].sub == 0 || (i > 0 && rows[i - 1].index == rows[i].index);
-        assert!(has_sub_0, "an object has no sub-index 0");
-        if let Rule::EventTimerOf(number) = rows[i].rule {
-            assert!(has(rows, (0x1800 | number as u32) << 8 | 5), "there is no such event timer");
-        }
-        i += 1;
-    }
-    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
-}
-
-/// PDOs with communication objects among the 512 indexes from `first` on.
-const fn pdos(rows: &[Object], first: u16) -> usize {
-    let (mut total, mut i) = (0, 0);
-    while i < rows.len() {
-        let is_one = rows[i].index & 0xFE00 == first && rows[i].sub == 1;
-        (total, i) = (total + is_one as usize, i + 1);
-    }
-    total
-}
-
-const fn has(rows: &[Object], key: u32) -> bool {
-    let mut i = 0;
-    while i < rows.len() && rows[i].key() != key {
-        i += 1;
-    }
-    i < rows.len()
-}
-
-const fn check_row(row: &Object) {
-    check_limits(row);
-    match (row.default, row.kind) {
-        (DefaultValue::Integer(value), _) => {
-            let (low, high) = effective_limits(row);
-            assert!(
-                row.kind.range().is_some() && low <= value && value <= high,
-                "the default is out of range"
-            );
-        }
-        (DefaultValue::Real(value), Type::Real32) => {
-            assert!(value.is_finite(), "the default is not a number");
-        }
-        (DefaultValue::Text(text), Type::VisibleString(capacity)) => {
-            assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
-        }
-        (DefaultValue::NodeId(_), Type::Unsigned32) => (),
-        (DefaultValue::None, Type::Domain) => {
-            assert!(matches!(row.rule, Rule::Application(_)), "a domain belongs to the application");
-        }
-        _ => panic!("the default is of another type"),
-    }
-    let mappable = !matches!(row.mapping, Mapping::No);
-    let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
-    assert!(!mappable || fits, "a mapped object has no place in a PDO");
-    assert!(!mappable || !row.rule.is_computed(), "a mapped object has no place in the image");
-    let saved = !matches!(row.group, Group::Volatile);
-    assert!(!saved || matches!(row.access, Access::ReadWrite), "only a parameter can be saved");
-    let tpdo = matches!(row.mapping, Mapping::Tpdo);
-    assert!(!tpdo || row.access.is_readable(), "a TPDO sends what can be read");
-    let rpdo = matches!(row.mapping, Mapping::Rpdo);
-    // An RPDO writes without a check, so what it writes must have none: any value of an integer type.
-    let takes_any = matches!(row.rule, Rule::Plain) && row.limits.is_none() && row.kind.range().is_some();
-    assert!(!rpdo || (row.access.is_writable() && takes_any), "an RPDO writes what takes any value");
-    let is_byte = matches!(row.kind, Type::Unsigned8);
-    assert!(!matches!(row.rule, Rule::Setting) || is_byte, "a setting is a number of eight bits");
-    let is_time = matches!(row.kind, Type::Unsigned16) && matches!(row.group, Group::Volatile);
-    assert!(
-        !matches!(row.rule, Rule::EventTimerOf(_)) || is_time,
-        "an event timer is saved under its own index"
-    );
-    let listed = matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
-    assert!(!listed || row.index == 0x1003, "the error list is object 1003h");
-}
-
-const fn check_limits(row: &Object) {
-    if let Some((low, high)) = row.limits {
-        let Some((min, max)) = row.kind.range() else { panic!("limits of what is not an integer") };
-        assert!(min <= low && low <= high && high <= max, "limits are wider than the type");
-        assert!(row.kind.size() <= 4, "limits of more than 32 bits are not checked");
     }
 }

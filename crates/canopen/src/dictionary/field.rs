@@ -1,9 +1,11 @@
 //! The place of one value in the image of all values.
 
+use crate::sdo::Bytes;
+
 /// Where a value lies in the image, and how long it is.
 ///
 /// An image shorter than the dictionary says reads as zero and takes no write; nothing here can panic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Field {
     pub(crate) offset: u16,
     pub(crate) size: u8,
@@ -19,9 +21,11 @@ impl Field {
 
     /// Replaces the value. Fewer bytes than the value has are followed by zeros, more are cut.
     pub fn set(self, image: &mut [u8], bytes: &[u8]) {
-        // The usual case, and the cheap one.
-        if let (4, Some(word)) = (self.size, bytes.first_chunk::<4>()) {
-            return self.store(image, *word);
+        // The usual cases, and the cheap ones.
+        match (self.size, bytes.first_chunk(), bytes.first_chunk()) {
+            (4, Some(word), _) => return self.store::<4>(image, *word),
+            (8, _, Some(words)) => return self.store::<8>(image, *words),
+            _ => (),
         }
         let start = usize::from(self.offset);
         let Some(place) = image.get_mut(start..start + usize::from(self.size)) else { return };
@@ -30,6 +34,17 @@ impl Field {
             *to = *from;
         }
         rest.fill(0);
+    }
+
+    /// Where the value ends. A place outside every image ends there too.
+    pub(crate) fn end(self) -> u16 {
+        self.offset.saturating_add(self.size.into())
+    }
+
+    /// Eight bytes from the start of the value; those beyond the image are zero.
+    pub(crate) fn eight(self, image: &[u8]) -> [u8; 8] {
+        let rest = image.get(usize::from(self.offset)..).unwrap_or(&[]);
+        rest.first_chunk().copied().unwrap_or_else(|| Bytes::from_slice(rest).padded())
     }
 
     /// The first `K` bytes from the start of the value.

@@ -139,6 +139,40 @@ impl Rule {
         )
     }
 
+    /// A number of its own, as constant functions cannot compare rules.
+    pub(super) const fn code(self) -> u16 {
+        match self {
+            Rule::Plain => 0,
+            Rule::ErrorCount => 1,
+            Rule::ErrorEntry => 2,
+            Rule::SyncCobId => 3,
+            Rule::SyncPeriod => 4,
+            Rule::SyncWindow => 5,
+            Rule::Store => 6,
+            Rule::Restore => 7,
+            Rule::EmcyCobId => 8,
+            Rule::EmcyInhibit => 9,
+            Rule::HeartbeatWatch => 10,
+            Rule::HeartbeatTime => 11,
+            Rule::SyncOverflow => 12,
+            Rule::ProgramControl => 13,
+            Rule::StartUp => 14,
+            Rule::PdoCobId => 15,
+            Rule::PdoPredefined => 16,
+            Rule::PdoType => 17,
+            Rule::PdoInhibit => 18,
+            Rule::PdoEventTimer => 19,
+            Rule::PdoSyncStart => 20,
+            Rule::PdoCount => 21,
+            Rule::PdoSlot => 22,
+            Rule::ScannerLine => 23,
+            Rule::StoreCalibration => 24,
+            Rule::Setting => 25,
+            Rule::EventTimerOf(number) => 0x100 | number as u16,
+            Rule::Application(number) => 0x200 | number as u16,
+        }
+    }
+
     /// Whether the value lives elsewhere and takes no place in the image.
     pub(crate) const fn is_computed(self) -> bool {
         matches!(self, Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_))

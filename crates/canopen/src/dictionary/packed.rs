@@ -60,12 +60,13 @@ impl Dictionary {
         image: &[u8],
         out: &mut heapless::VecView<u8>,
     ) -> Result<(), BufferFull> {
-        let is_kept = |entry: &&Entry| entry.group == group && !self.follows_node_id(entry, node_id, image);
-        let mut last: Option<(&Entry, usize)> = None;
-        for entry in self.entries().iter().filter(is_kept) {
-            let head = match last.filter(|(last, _)| last.is_followed_by(entry)) {
+        let is_kept =
+            |entry: &Entry| entry.attributes.group == group && !self.follows_node_id(entry, node_id, image);
+        let mut last: Option<(Entry, usize)> = None;
+        for entry in self.entries().filter(is_kept) {
+            let head = match last.filter(|(last, _)| last.is_followed_by(&entry)) {
                 Some((_, head)) => head,
-                None => begin(entry, out)?,
+                None => begin(&entry, out)?,
             };
             // The count is the fourth byte of the head; a run has at most as many values as there are sub-indexes.
             if let Some(count) = out.get_mut(head + 3) {
@@ -101,7 +102,7 @@ impl Dictionary {
         image: &mut [u8],
     ) -> Result<(), Abort> {
         let entry = self.find(index, sub)?;
-        if entry.group != group || value.len() != usize::from(entry.field.size) {
+        if entry.attributes.group != group || value.len() != usize::from(entry.field.size) {
             return Err(Abort::Length);
         }
         entry.check_value(value)?;
@@ -110,14 +111,15 @@ impl Dictionary {
     }
 
     fn follows_node_id(&self, entry: &Entry, node_id: Option<NodeId>, image: &[u8]) -> bool {
-        entry.node_relative && entry.field.u32(image) == self.default_number(entry, node_id)
+        entry.attributes.node_relative && entry.field.u32(image) == self.default_number(entry, node_id)
     }
 }
 
 impl Entry {
     fn is_followed_by(&self, next: &Entry) -> bool {
-        let adjacent = next.key == self.key.wrapping_add(1) && next.index() == self.index();
-        adjacent && next.field.size == self.field.size && !self.node_relative && !next.node_relative
+        let adjacent = next.index == self.index && next.sub.checked_sub(self.sub) == Some(1);
+        let is_relative = self.attributes.node_relative || next.attributes.node_relative;
+        adjacent && next.field.size == self.field.size && !is_relative
     }
 }
 

@@ -76,15 +76,16 @@ impl Type {
         }
     }
 
-    /// The value of an integer type of at most 32 bits whose bytes, and zeros above them, are this word.
-    pub(crate) fn integer(self, word: u32) -> i64 {
-        let [a, b, c, d] = word.to_le_bytes();
-        match self {
-            Type::Integer8 => i8::from_le_bytes([a]).into(),
-            Type::Integer16 => i16::from_le_bytes([a, b]).into(),
-            Type::Integer32 => i32::from_le_bytes([a, b, c, d]).into(),
-            _ => word.into(),
-        }
+    /// A number of 32 bits for the value of an integer type of at most as many, such that the numbers have the order of
+    /// the values: that of a signed type counts from the smallest INTEGER32.
+    pub(crate) const fn ordered(self, word: u32) -> u32 {
+        let unused = match self {
+            Type::Integer8 => 24,
+            Type::Integer16 => 16,
+            Type::Integer32 => 0,
+            _ => return word,
+        };
+        ((word << unused).cast_signed() >> unused).cast_unsigned() ^ 1 << 31
     }
 }
 
@@ -92,12 +93,17 @@ impl Type {
 mod tests {
     use super::*;
 
+    /// Little-endian words of ascending values.
+    fn assert_ascending(kind: Type, words: &[u32]) {
+        assert!(words.iter().map(|&word| kind.ordered(word)).is_sorted_by(|a, b| a < b), "{kind:?}");
+    }
+
     #[test]
-    fn integers_are_sign_extended_by_their_type() {
-        assert_eq!(Type::Integer8.integer(0xFE), -2);
-        assert_eq!(Type::Unsigned8.integer(0xFE), 254);
-        assert_eq!(Type::Integer16.integer(0x8000), -32768);
-        assert_eq!(Type::Integer32.integer(0xFFFF_FFFF), -1);
-        assert_eq!(Type::Unsigned32.integer(0xFFFF_FFFF), 0xFFFF_FFFF);
+    fn integers_are_ordered_by_their_type() {
+        assert_ascending(Type::Integer8, &[0x80, 0xFE, 0xFF, 0, 1, 0x7F]);
+        assert_ascending(Type::Unsigned8, &[0, 1, 0x7F, 0x80, 0xFF]);
+        assert_ascending(Type::Integer16, &[0x8000, 0xFFFF, 0, 0x7FFF]);
+        assert_ascending(Type::Integer32, &[1 << 31, u32::MAX, 0, u32::MAX >> 1]);
+        assert_ascending(Type::Unsigned32, &[0, u32::MAX >> 1, 1 << 31, u32::MAX]);
     }
 }

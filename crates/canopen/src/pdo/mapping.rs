@@ -65,7 +65,7 @@ pub(crate) fn locate(
         _ => {
             let entry = dictionary.find(mapped.index, mapped.sub).map_err(|_| Abort::NoObject)?;
             let needed = if direction == Direction::Transmit { Mapping::Tpdo } else { Mapping::Rpdo };
-            (entry.field, entry.mapping == needed)
+            (entry.field, entry.attributes.mapping == needed)
         }
     };
     let same_length = u16::from(mapped.bits) == u16::from(field.size) * 8;
@@ -81,29 +81,41 @@ pub(crate) enum Content {
     Multiplexed(Addressing),
 }
 
-/// For each byte of the PDO the place in the image. Byte by byte, as nothing in the dictionary is shorter.
+/// The places in the image of what a PDO carries, in the order of its data. Values that lie beside each other, as those
+/// of one object do, are one place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Layout {
+    /// Bytes of the PDO.
     len: u8,
-    places: [u16; 8],
+    count: u8,
+    places: [Field; 8],
 }
 
 impl Layout {
     /// Appends a mapped object; `PdoLength` when the PDO would grow beyond eight bytes.
     pub(crate) fn push(&mut self, field: Field) -> Result<(), Abort> {
-        let start = usize::from(self.len);
-        let end = start + usize::from(field.size);
-        let places = self.places.get_mut(start..end).ok_or(Abort::PdoLength)?;
-        for (i, place) in (0..).zip(places) {
-            *place = field.offset.saturating_add(i);
+        let len = self.len.saturating_add(field.size);
+        if len > 8 {
+            return Err(Abort::PdoLength);
         }
-        self.len += field.size;
+        match self.places.get_mut(usize::from(self.count).wrapping_sub(1)) {
+            Some(last) if last.end() == field.offset => last.size += field.size,
+            _ => {
+                *self.places.get_mut(usize::from(self.count)).ok_or(Abort::PdoLength)? = field;
+                self.count += 1;
+            }
+        }
+        self.len = len;
         Ok(())
+    }
+
+    fn places(&self) -> impl Iterator<Item = &Field> {
+        self.places.iter().take(usize::from(self.count))
     }
 
     /// Whether a value is in the PDO.
     pub(crate) fn contains(&self, field: Field) -> bool {
-        self.places.iter().take(usize::from(self.len)).any(|&place| place == field.offset)
+        self.places().any(|place| (place.offset..place.end()).contains(&field.offset))
     }
 
     /// Bytes of the PDO.
@@ -113,19 +125,25 @@ impl Layout {
 
     /// The PDO's data from the image.
     pub(crate) fn gather(&self, image: &[u8]) -> [u8; 8] {
-        let mut data = [0; 8];
-        for (byte, &place) in data.iter_mut().zip(&self.places).take(usize::from(self.len)) {
-            *byte = image.get(usize::from(place)).copied().unwrap_or(0);
+        // Each place is read as eight bytes. What does not belong to it is overwritten by the next, or cut at the end.
+        let (mut data, mut at) = ([0; 16], 0);
+        for place in self.places() {
+            if let Some(to) = data.get_mut(at..).and_then(|rest| rest.first_chunk_mut()) {
+                *to = place.eight(image);
+            }
+            at += usize::from(place.size);
         }
-        data
+        let all = data.first_chunk().map_or(0, |data| u64::from_le_bytes(*data));
+        let mask = u64::MAX.checked_shr(64 - u32::from(self.len) * 8).unwrap_or(0);
+        (all & mask).to_le_bytes()
     }
 
     /// The PDO's data into the image.
     pub(crate) fn scatter(&self, data: [u8; 8], image: &mut [u8]) {
-        for (&byte, &place) in data.iter().zip(&self.places).take(usize::from(self.len)) {
-            if let Some(target) = image.get_mut(usize::from(place)) {
-                *target = byte;
-            }
+        let mut data = u64::from_le_bytes(data);
+        for place in self.places() {
+            place.set(image, &data.to_le_bytes());
+            data = data.checked_shr(u32::from(place.size) * 8).unwrap_or(0);
         }
     }
 }

@@ -26,7 +26,7 @@ impl RpdoSettings {
     ) -> Option<RpdoSettings> {
         let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
         let transmission = Transmission::parse(transmission).filter(|kind| !kind.needs_remote())?;
-        let is_synchronous = transmission != Transmission::Event;
+        let is_synchronous = !transmission.is_event_driven();
         Some(RpdoSettings { id: cob_id.id, is_synchronous, deadline, content })
     }
 }

@@ -1,8 +1,8 @@
 //! One TPDO: when it is sent.
 //!
-//! The event of the types 254 and 255: with an event timer, the timer alone sends (a measured value changes a
-//! thousand times a second); without one, every change of a mapped value does, at most once per inhibit time.
-//! Entering Operational is an event in both cases.
+//! The types 254 and 255 are sent on entering Operational and when the event timer elapses. Without an event timer, a PDO of
+//! type 255 is sent with every change of a mapped value, at most once per inhibit time. With one, the timer alone sends: a
+//! measured value changes a thousand times a second.
 
 use super::{Layout, Transmission};
 use crate::sync::Sync;
@@ -91,7 +91,7 @@ impl Tpdo {
     /// Entering Operational, or becoming valid in it.
     pub(crate) fn start(&mut self) {
         self.stop();
-        self.pending = self.settings.is_some_and(|settings| settings.transmission == Transmission::Event);
+        self.pending = self.settings.is_some_and(|settings| settings.transmission.is_event_driven());
     }
 
     /// Leaving Operational: nothing is due, a PDO that waits is dropped.
@@ -137,7 +137,9 @@ impl Tpdo {
                 // The client asks again if the queue is full: a sample of the past need not be kept for it.
                 let _ = out.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
-            (Transmission::Remote | Transmission::Event, _) => self.send(image, now, out),
+            (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
+                self.send(image, now, out);
+            }
             _ => (),
         }
     }
@@ -191,7 +193,7 @@ impl Tpdo {
         if sent {
             self.data = Some(data);
         }
-        if settings.transmission == Transmission::Event && self.event_due == Instant::NEVER {
+        if settings.transmission.is_event_driven() && self.event_due == Instant::NEVER {
             self.event_due = self.following_event(now);
         }
     }

@@ -13,8 +13,10 @@ pub enum Transmission {
     SyncRemote,
     /// 253: sampled and sent on a remote frame.
     Remote,
-    /// 254 and 255: by event or event timer. What the event is, manufacturer (254) or device profile (255) say;
-    /// here both mean the same.
+    /// 254: by event timer. The event that the manufacturer may add is none here, but for entering Operational.
+    Timer,
+    /// 255: by event timer; without one, with every change of a mapped value. What the event is, the device profile says:
+    /// CiA 404 and CiA 417 say this.
     Event,
 }
 
@@ -27,9 +29,16 @@ impl Transmission {
             (0, _) => Some(Transmission::SyncAcyclic),
             (252, _) => Some(Transmission::SyncRemote),
             (253, _) => Some(Transmission::Remote),
-            (254 | 255, _) => Some(Transmission::Event),
+            (254, _) => Some(Transmission::Timer),
+            (255, _) => Some(Transmission::Event),
             _ => None,
         }
+    }
+
+    /// Whether neither SYNC nor a remote frame is needed to send it: 254 and 255.
+    #[must_use]
+    pub const fn is_event_driven(self) -> bool {
+        matches!(self, Transmission::Timer | Transmission::Event)
     }
 
     /// Whether it is only sent on a remote frame, and so makes no sense where those are not allowed.

@@ -1,7 +1,7 @@
 //! Block download (CiA 301, 7.2.4.3.9 to 11): the client sends up to 127 segments before it waits for an answer.
 
 use super::objects::{BUFFER, Sink};
-use super::{Abort, BlockEnd, BlockSegment, BlockSize, Objects, crc};
+use super::{Abort, BlockEnd, BlockSegment, BlockSize, Objects};
 use crate::Instant;
 
 /// A block download under way.
@@ -9,41 +9,49 @@ use crate::Instant;
 pub(super) struct Receiver {
     sink: Sink,
     check_crc: bool,
-    crc: u16,
     /// Last segment of this block that came in sequence.
     sequence: u8,
-    /// The segment that came last, in sequence or not. One that comes twice in a row counts once.
+    /// The segment that came last, in sequence or not, if it may be the one that comes next. One that comes twice in a
+    /// row counts once.
     newest: Option<BlockSegment>,
     /// Something of this block has come.
     has_begun: bool,
-    /// The newest segment. It may be the last one, and how much of that is data is only known at the end.
-    held: Option<[u8; 7]>,
-    /// The last segment is there: only the end is missing.
-    complete: bool,
+    /// The last segment of all. How much of it is data, only the end says; nothing else is missing.
+    last: Option<[u8; 7]>,
 }
 
 impl Receiver {
     pub(super) fn new(sink: Sink, check_crc: bool) -> Receiver {
-        Receiver {
-            sink,
-            check_crc,
-            crc: 0,
-            sequence: 0,
-            newest: None,
-            has_begun: false,
-            held: None,
-            complete: false,
-        }
+        Receiver { sink, check_crc, sequence: 0, newest: None, has_begun: false, last: None }
     }
 
     /// Whether frames are segments now, and not requests.
     pub(super) fn wants_segments(&self) -> bool {
-        !self.complete
+        self.last.is_none()
     }
 
     /// Whether a block has begun: if its last segment is lost, nobody would answer it.
     pub(super) fn is_within_block(&self) -> bool {
         self.wants_segments() && self.has_begun
+    }
+
+    /// Whether the frame is the next segment, and neither the first nor the last of a block: most frames of a transfer
+    /// are nothing else.
+    pub(super) fn expects(&self, frame: [u8; 8]) -> bool {
+        let [sequence, ..] = frame;
+        matches!(sequence, 2..=126) && sequence == self.sequence + 1 && self.is_within_block()
+    }
+
+    /// Takes a frame that it expects.
+    pub(super) fn take_expected(
+        &mut self,
+        frame: [u8; 8],
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<(), Abort> {
+        let [sequence, data @ ..] = frame;
+        (self.sequence, self.newest) = (sequence, None);
+        self.sink.append_segment(data, buffer, objects)
     }
 
     /// Takes a segment; `true` at the end of a block. Segments after a gap are left to be sent again.
@@ -57,32 +65,25 @@ impl Receiver {
         if self.newest.replace(segment) == Some(segment) {
             return Ok(false);
         }
+        let is_end = segment.last || segment.sequence == BlockSize::MAX;
         if segment.sequence.get() == self.sequence + 1 {
             self.sequence += 1;
-            self.flush(0, buffer, objects)?;
-            self.held = Some(segment.data);
-            self.complete = segment.last;
+            if segment.last {
+                self.last = Some(segment.data);
+            } else {
+                self.sink.append_segment(segment.data, buffer, objects)?;
+            }
         }
-        Ok(segment.last || segment.sequence == BlockSize::MAX)
+        if is_end {
+            self.sink.hand_over(buffer, objects)?;
+        }
+        Ok(is_end)
     }
 
     /// The sequence number to acknowledge; the next block begins.
     pub(super) fn acknowledge(&mut self) -> u8 {
         self.has_begun = false;
         core::mem::take(&mut self.sequence)
-    }
-
-    /// Passes on what is held, but for the `unused` bytes at its end.
-    fn flush(
-        &mut self,
-        unused: u8,
-        buffer: &mut [u8; BUFFER],
-        objects: &mut impl Objects,
-    ) -> Result<(), Abort> {
-        let Some(held) = self.held.take() else { return Ok(()) };
-        let (data, _) = held.split_at_checked(7 - usize::from(unused.min(7))).unwrap_or((&held, &[]));
-        self.crc = crc::extend(self.crc, data);
-        self.sink.append(data, buffer, objects)
     }
 
     /// The end of the transfer.
@@ -93,8 +94,11 @@ impl Receiver {
         objects: &mut impl Objects,
         now: Instant,
     ) -> Result<(), Abort> {
-        self.flush(end.unused, buffer, objects)?;
-        if self.check_crc && self.crc != end.crc {
+        if let Some(last) = &self.last {
+            let data = last.get(..7 - usize::from(end.unused.min(7))).unwrap_or(last);
+            self.sink.append(data, buffer, objects)?;
+        }
+        if self.check_crc && self.sink.crc(buffer) != end.crc {
             return Err(Abort::Crc);
         }
         self.sink.complete(buffer, objects, now)

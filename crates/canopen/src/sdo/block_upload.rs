@@ -1,7 +1,7 @@
 //! Block upload (CiA 301, 7.2.4.3.13 to 15): the server sends up to 127 segments before it waits for an answer.
 
 use super::objects::{BUFFER, Source};
-use super::{Abort, BlockEnd, BlockSegment, BlockSize, Objects, crc};
+use super::{Abort, BlockEnd, BlockSegment, BlockSize, Bytes, Objects, crc};
 
 /// A block upload under way.
 #[derive(Clone, Copy, Debug)]
@@ -54,29 +54,38 @@ impl Sender {
         self.acknowledged + usize::from(sequence) * 7
     }
 
-    /// The next segment of the block. To be followed by [`sent`](Sender::sent) once the queue has it.
-    pub(super) fn segment(
-        &self,
+    /// Sends segments of the block as long as `send` takes them.
+    pub(super) fn send(
+        &mut self,
         buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
-    ) -> Result<BlockSegment, Abort> {
-        let offset = self.offset(self.sequence);
-        let data = self.source.piece(offset, buffer, objects)?;
-        let sequence = BlockSize::new(self.sequence + 1).ok_or(Abort::Sequence)?;
-        Ok(BlockSegment { last: offset + 7 >= self.source.len(), sequence, data: data.padded() })
+        objects: &impl Objects,
+        mut send: impl FnMut([u8; 8]) -> bool,
+    ) -> Result<(), Abort> {
+        let content = self.source.content(buffer, objects)?;
+        let mut rest = content.get(self.offset(self.sequence)..).unwrap_or(&[]);
+        while self.is_sending() {
+            let (data, after) = next_segment(rest);
+            let last = after.is_empty();
+            let sequence = BlockSize::new(self.sequence + 1).ok_or(Abort::Sequence)?;
+            if !send(BlockSegment { last, sequence, data }.encode()) {
+                break;
+            }
+            self.sequence = sequence.get();
+            if last || sequence == self.block_size {
+                self.phase = Phase::Waiting;
+            }
+            rest = after;
+        }
+        self.check(content);
+        Ok(())
     }
 
-    /// The segment is on its way.
-    pub(super) fn sent(&mut self, segment: &BlockSegment) {
-        let offset = self.offset(self.sequence);
-        if offset == self.checked {
-            let len = (self.source.len() - offset.min(self.source.len())).min(7);
-            self.crc = crc::extend(self.crc, segment.data.get(..len).unwrap_or(&segment.data));
-            self.checked += len;
-        }
-        self.sequence = segment.sequence.get();
-        if segment.last || segment.sequence == self.block_size {
-            self.phase = Phase::Waiting;
+    /// Takes what has been sent into the CRC.
+    fn check(&mut self, content: &[u8]) {
+        let sent = self.offset(self.sequence).min(content.len());
+        if let Some(new) = content.get(self.checked..sent) {
+            self.crc = crc::extend(self.crc, new);
+            self.checked = sent;
         }
     }
 
@@ -113,5 +122,13 @@ impl Sender {
     /// The client confirms the end.
     pub(super) fn ended(&self) -> Result<(), Abort> {
         if self.phase == Phase::Ended { Ok(()) } else { Err(Abort::Command) }
+    }
+}
+
+/// Seven bytes, the last of all filled with zeros, and what follows them.
+fn next_segment(content: &[u8]) -> ([u8; 7], &[u8]) {
+    match content.split_first_chunk() {
+        Some((data, rest)) => (*data, rest),
+        None => (Bytes::from_slice(content).padded(), &[]),
     }
 }

@@ -1,53 +1,61 @@
 //! What the server serves, and the two ends of a transfer: where data comes from and where it goes.
 
-use super::{Abort, Bytes, Multiplexer};
+use super::{Abort, Bytes, Multiplexer, crc};
 use crate::{Instant, Part};
 
-/// The longest value that is handed over in one piece: a `VISIBLE_STRING` of 50 characters is the longest there is.
-pub(super) const BUFFER: usize = 64;
+/// The longest value that is handed over in one piece, and how much of a stream is.
+pub(crate) const BUFFER: usize = 64;
+
+/// What an upload reads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Readable<'a> {
+    pub(crate) bytes: &'a [u8],
+    /// The number of the stream that it is the content of, if it is a domain.
+    pub(crate) stream: Option<u8>,
+}
 
 /// How an entry takes a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Writable {
     /// As a whole, of at most this many bytes.
     Value(usize),
-    /// Piece by piece: a domain.
-    Stream,
+    /// Piece by piece: the stream of this number, which is a domain.
+    Stream(u8),
 }
 
 /// The dictionary with its values and rules.
 pub(crate) trait Objects {
+    /// Whether the image is short of room: then it has no upload in blocks, and a client takes segments, and no shortcuts
+    /// that only save time.
+    const IS_SMALL: bool = false;
+
     /// The value of an entry.
-    fn read(&mut self, at: Multiplexer) -> Result<&[u8], Abort>;
+    fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort>;
     /// How the entry can be written, if it can be at all.
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
     /// Replaces the value of an entry and does what follows from it.
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
     /// Whether the response to the write just made has to wait for [`Server::release`](super::Server::release); once.
     fn take_deferred(&mut self) -> bool;
+    /// What is in a stream now.
+    fn content(&self, stream: u8) -> Result<&[u8], Abort>;
     /// Hands over a part of a stream.
-    fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort>;
+    fn stream(&mut self, stream: u8, part: Part<'_>) -> Result<(), Abort>;
 }
 
 /// Where an upload comes from. A value that fits the buffer is a snapshot: it cannot change under way. A longer one
 /// (a domain) is read piece by piece.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source {
-    at: Multiplexer,
+    stream: Option<u8>,
     len: usize,
 }
 
 impl Source {
-    pub(super) fn open(
-        at: Multiplexer,
-        buffer: &mut [u8; BUFFER],
-        objects: &mut impl Objects,
-    ) -> Result<Source, Abort> {
-        let value = objects.read(at)?;
-        for (to, from) in buffer.iter_mut().zip(value) {
-            *to = *from;
-        }
-        Ok(Source { at, len: value.len() })
+    pub(super) fn new(value: Readable<'_>, buffer: &mut [u8; BUFFER]) -> Source {
+        let len = value.bytes.len();
+        let snapshot = buffer.get_mut(..len).map(|place| place.copy_from_slice(value.bytes));
+        Source { stream: value.stream.filter(|_| snapshot.is_none()), len }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -59,25 +67,46 @@ impl Source {
         u32::try_from(self.len).unwrap_or(u32::MAX)
     }
 
-    /// The next up to seven bytes. Fails when the domain has become shorter.
+    /// All of it. Fails when the domain has become shorter.
+    pub(super) fn content<'a>(
+        &self,
+        buffer: &'a [u8; BUFFER],
+        objects: &'a impl Objects,
+    ) -> Result<&'a [u8], Abort> {
+        let content = match self.stream {
+            Some(stream) => objects.content(stream)?,
+            None => buffer,
+        };
+        content.get(..self.len).ok_or(Abort::General)
+    }
+
+    /// The next up to seven bytes.
     pub(super) fn piece(
         &self,
         offset: usize,
         buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
+        objects: &impl Objects,
     ) -> Result<Bytes<7>, Abort> {
-        let value = if self.len <= BUFFER { &buffer[..] } else { objects.read(self.at)? };
-        value.get(offset..self.len).map(Bytes::from_slice).ok_or(Abort::General)
+        let content = self.content(buffer, objects)?;
+        Ok(Bytes::from_slice(content.get(offset..).unwrap_or(&[])))
     }
 }
 
-/// Where a download goes: into the buffer until it is complete, or on into the stream.
+/// Where a download goes: into the buffer, from where a value is written when it is complete, and a stream goes on
+/// whenever the buffer is full.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sink {
     at: Multiplexer,
     kind: Writable,
     announced: Option<usize>,
+    /// The most bytes that it may have.
+    limit: usize,
+    /// Bytes that have come.
     len: usize,
+    /// How many of them are in the buffer.
+    held: usize,
+    /// CRC of those that are no longer there.
+    crc: u16,
 }
 
 impl Sink {
@@ -89,14 +118,18 @@ impl Sink {
     ) -> Result<Sink, Abort> {
         let announced = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
         let kind = objects.writable(at)?;
-        match kind {
+        let limit = match kind {
             Writable::Value(limit) if announced.is_some_and(|size| size > limit) => {
                 return Err(Abort::TooLong);
             }
-            Writable::Value(_) => (),
-            Writable::Stream => objects.stream(at, Part::Begin(announced))?,
-        }
-        Ok(Sink { at, kind, announced, len: 0 })
+            Writable::Value(limit) => limit,
+            Writable::Stream(stream) => {
+                objects.stream(stream, Part::Begin(announced))?;
+                usize::MAX
+            }
+        };
+        let limit = announced.map_or(limit, |size| size.min(limit));
+        Ok(Sink { at, kind, announced, limit, len: 0, held: 0, crc: 0 })
     }
 
     pub(super) fn append(
@@ -105,24 +138,61 @@ impl Sink {
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        let end = self.len.saturating_add(bytes.len());
-        if self.announced.is_some_and(|size| end > size) {
+        if self.limit.saturating_sub(self.len) < bytes.len() {
             return Err(Abort::TooLong);
         }
-        match self.kind {
-            Writable::Stream => objects.stream(self.at, Part::Data(self.len, bytes))?,
-            Writable::Value(limit) if end <= limit => {
-                let rest = buffer.get_mut(self.len..).unwrap_or(&mut []);
-                rest.get_mut(..bytes.len()).ok_or(Abort::TooLong)?.copy_from_slice(bytes);
-            }
-            Writable::Value(_) => return Err(Abort::TooLong),
+        if BUFFER.saturating_sub(self.held) < bytes.len() {
+            self.hand_over(buffer, objects)?;
         }
-        self.len = end;
+        let rest = buffer.get_mut(self.held..).unwrap_or(&mut []);
+        rest.get_mut(..bytes.len()).ok_or(Abort::TooLong)?.copy_from_slice(bytes);
+        self.len += bytes.len();
+        self.held += bytes.len();
         Ok(())
     }
 
+    /// The same for a whole segment.
+    pub(super) fn append_segment(
+        &mut self,
+        data: [u8; 7],
+        buffer: &mut [u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<(), Abort> {
+        if self.held > BUFFER - data.len() {
+            self.hand_over(buffer, objects)?;
+        }
+        let has_room = self.limit.saturating_sub(self.len) >= data.len();
+        let place = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut());
+        *place.filter(|_| has_room).ok_or(Abort::TooLong)? = data;
+        self.len += data.len();
+        self.held += data.len();
+        Ok(())
+    }
+
+    /// Passes on what is in the buffer, if it is part of a stream.
+    pub(super) fn hand_over(
+        &mut self,
+        buffer: &[u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<(), Abort> {
+        let Writable::Stream(stream) = self.kind else { return Ok(()) };
+        self.crc = self.crc(buffer);
+        let part = Part::Data(self.len.saturating_sub(self.held), self.held(buffer));
+        self.held = 0;
+        objects.stream(stream, part)
+    }
+
+    fn held<'a>(&self, buffer: &'a [u8; BUFFER]) -> &'a [u8] {
+        buffer.get(..self.held).unwrap_or(&[])
+    }
+
+    /// CRC of all that has come.
+    pub(super) fn crc(&self, buffer: &[u8; BUFFER]) -> u16 {
+        crc::extend(self.crc, self.held(buffer))
+    }
+
     pub(super) fn complete(
-        &self,
+        &mut self,
         buffer: &[u8; BUFFER],
         objects: &mut impl Objects,
         now: Instant,
@@ -130,9 +200,10 @@ impl Sink {
         if self.announced.is_some_and(|size| size != self.len) {
             return Err(Abort::TooShort);
         }
+        self.hand_over(buffer, objects)?;
         match self.kind {
-            Writable::Stream => objects.stream(self.at, Part::End(self.len)),
-            Writable::Value(_) => objects.write(self.at, buffer.get(..self.len).unwrap_or(&[]), now),
+            Writable::Stream(stream) => objects.stream(stream, Part::End(self.len)),
+            Writable::Value(_) => objects.write(self.at, self.held(buffer), now),
         }
     }
 }

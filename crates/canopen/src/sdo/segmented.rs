@@ -22,7 +22,7 @@ impl Upload {
         &mut self,
         requested: bool,
         buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
+        objects: &impl Objects,
     ) -> Result<Segment, Abort> {
         if requested != self.toggle {
             return Err(Abort::Toggle);
@@ -59,6 +59,10 @@ impl Download {
         }
         self.toggle = !self.toggle;
         self.sink.append(segment.data.as_slice(), buffer, objects)?;
-        if segment.last { self.sink.complete(buffer, objects, now) } else { Ok(()) }
+        if segment.last {
+            self.sink.complete(buffer, objects, now)
+        } else {
+            self.sink.hand_over(buffer, objects)
+        }
     }
 }

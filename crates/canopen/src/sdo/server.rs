@@ -20,10 +20,8 @@ pub(crate) struct Server {
     multiplexer: Multiplexer,
     /// The value under way: a snapshot for an upload, what has come so far of a download.
     buffer: [u8; BUFFER],
-    /// When the transfer is given up.
-    expiry: Instant,
-    /// When a block is answered without its end.
-    pause: Instant,
+    /// When the transfer last went on.
+    active: Instant,
     /// The last request of this transfer that could be one of a series, and its answer.
     previous: ([u8; 8], Option<Response>),
 }
@@ -48,15 +46,18 @@ impl Server {
             transfer: Transfer::Idle,
             multiplexer: Multiplexer { index: 0, sub: 0 },
             buffer: [0; BUFFER],
-            expiry: Instant::NEVER,
-            pause: Instant::NEVER,
+            active: Instant(0),
             previous: ([0; 8], None),
         }
     }
 
     /// When [`expire`](Server::expire) has something to do.
     pub(crate) fn deadline(&self) -> Instant {
-        self.expiry.min(self.pause)
+        match &self.transfer {
+            Transfer::Idle => Instant::NEVER,
+            Transfer::BlockDownload(receiver) if receiver.is_within_block() => self.active + BLOCK_PAUSE,
+            _ => self.active + TIME_OUT,
+        }
     }
 
     /// Forgets the transfer under way, without a word to the client: the NMT state no longer allows any.
@@ -64,18 +65,34 @@ impl Server {
         self.transfer = Transfer::Idle;
         self.multiplexer = Multiplexer { index: 0, sub: 0 };
         self.previous = ([0; 8], None);
-        (self.expiry, self.pause) = (Instant::NEVER, Instant::NEVER);
+    }
+
+    /// Takes a segment within a block, which has no answer but an abort; `None` for any other frame, which is for
+    /// [`answer`](Server::answer). The deadline is not earlier afterwards.
+    pub(crate) fn take_expected<O: Objects>(
+        &mut self,
+        frame: [u8; 8],
+        objects: &mut O,
+        now: Instant,
+    ) -> Option<Result<(), Response>> {
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return None };
+        if O::IS_SMALL || !receiver.expects(frame) {
+            return None;
+        }
+        self.active = now;
+        let taken = receiver.take_expected(frame, &mut self.buffer, objects);
+        Some(taken.map_err(|abort| self.give_up(abort)))
     }
 
     /// Answers a request.
-    pub(crate) fn answer(
+    pub(crate) fn answer<O: Objects>(
         &mut self,
         frame: [u8; 8],
-        objects: &mut impl Objects,
+        objects: &mut O,
         now: Instant,
     ) -> Option<Response> {
         // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
-        if matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
+        if !O::IS_SMALL && matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
             let answer = self.dispatch(frame, objects, now);
             let answer = self.hold(answer, objects);
             return self.settle(answer, now);
@@ -103,7 +120,7 @@ impl Server {
         response.filter(|_| frame == previous && (is_begin || changes && !self.wants_block_segments()))
     }
 
-    fn dispatch(&mut self, frame: [u8; 8], objects: &mut impl Objects, now: Instant) -> Answer {
+    fn dispatch<O: Objects>(&mut self, frame: [u8; 8], objects: &mut O, now: Instant) -> Answer {
         let is_repeated = frame == self.previous.0;
         match Request::parse(frame).ok_or(Abort::Command)? {
             Request::Upload(at) => self.upload(at, objects),
@@ -116,6 +133,7 @@ impl Server {
             }
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
+            _ if O::IS_SMALL => Err(Abort::Command),
             Request::BlockUpload { at, block_size, threshold, .. } => {
                 self.block_upload(at, block_size, threshold, objects)
             }
@@ -154,33 +172,29 @@ impl Server {
 
     /// Does what the time demands: answers a block that has lost its end, or gives up the transfer.
     pub(crate) fn expire(&mut self, now: Instant) -> Option<Response> {
-        if now >= self.expiry {
-            return self.settle(Err(Abort::TimeOut), now);
+        if now < self.deadline() {
+            return None;
         }
         match &mut self.transfer {
-            Transfer::BlockDownload(receiver) if now >= self.pause => {
-                self.pause = Instant::NEVER;
+            Transfer::BlockDownload(receiver)
+                if receiver.is_within_block() && now < self.active + TIME_OUT =>
+            {
                 Some(Response::BlockAcknowledge(receiver.acknowledge(), BlockSize::MAX))
             }
-            _ => None,
+            _ => self.settle(Err(Abort::TimeOut), now),
         }
     }
 
-    /// An error ends the transfer; the one place where it becomes an abort message.
+    /// An error ends the transfer.
     fn settle(&mut self, answer: Answer, now: Instant) -> Option<Response> {
-        if answer.is_err() {
-            self.transfer = Transfer::Idle;
-        }
-        self.expiry = if self.is_idle() { Instant::NEVER } else { now + TIME_OUT };
-        self.pause = match &self.transfer {
-            Transfer::BlockDownload(receiver) if receiver.is_within_block() => now + BLOCK_PAUSE,
-            _ => Instant::NEVER,
-        };
-        answer.unwrap_or_else(|abort| Some(Response::Abort(self.multiplexer, abort.code())))
+        self.active = now;
+        answer.unwrap_or_else(|abort| Some(self.give_up(abort)))
     }
 
-    fn is_idle(&self) -> bool {
-        matches!(self.transfer, Transfer::Idle)
+    /// Ends the transfer: the one place where an error becomes an abort message.
+    fn give_up(&mut self, abort: Abort) -> Response {
+        self.transfer = Transfer::Idle;
+        Response::Abort(self.multiplexer, abort.code())
     }
 
     /// A new transfer; one that was under way is forgotten, as its client has started over.
@@ -193,15 +207,15 @@ impl Server {
     fn upload(&mut self, at: Multiplexer, objects: &mut impl Objects) -> Answer {
         self.begin(at);
         let value = objects.read(at)?;
-        if value.len() <= 4 {
-            return Ok(Some(Response::Uploaded(at, Bytes::from_slice(value))));
+        if value.bytes.len() <= 4 {
+            return Ok(Some(Response::Uploaded(at, Bytes::from_slice(value.bytes))));
         }
-        let source = Source::open(at, &mut self.buffer, objects)?;
+        let source = Source::new(value, &mut self.buffer);
         self.transfer = Transfer::Upload(Upload::new(source));
         Ok(Some(Response::UploadSegmented(at, Some(source.size()))))
     }
 
-    fn upload_segment(&mut self, toggle: bool, objects: &mut impl Objects) -> Answer {
+    fn upload_segment(&mut self, toggle: bool, objects: &impl Objects) -> Answer {
         let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
         let segment = upload.next(toggle, &self.buffer, objects)?;
         if segment.last {
@@ -290,7 +304,7 @@ impl Server {
         objects: &mut impl Objects,
     ) -> Answer {
         self.begin(at);
-        let source = Source::open(at, &mut self.buffer, objects)?;
+        let source = Source::new(objects.read(at)?, &mut self.buffer);
         if source.len() <= usize::from(threshold) {
             return self.upload(at, objects);
         }
@@ -314,21 +328,16 @@ impl Server {
     /// Sends segments of a block as long as `send` takes them.
     pub(crate) fn send_block(
         &mut self,
-        objects: &mut impl Objects,
+        objects: &impl Objects,
         now: Instant,
-        mut send: impl FnMut([u8; 8]) -> bool,
+        send: impl FnMut([u8; 8]) -> bool,
     ) -> Option<Response> {
-        while let Transfer::BlockUpload(sender) = &mut self.transfer
-            && sender.is_sending()
-        {
-            match sender.segment(&self.buffer, objects) {
-                Err(abort) => return self.settle(Err(abort), now),
-                Ok(segment) if send(segment.encode()) => sender.sent(&segment),
-                Ok(_) => return None,
-            }
-            self.expiry = now + TIME_OUT;
+        let Transfer::BlockUpload(sender) = &mut self.transfer else { return None };
+        self.active = now;
+        match sender.send(&self.buffer, objects, send) {
+            Ok(()) => None,
+            Err(abort) => self.settle(Err(abort), now),
         }
-        None
     }
 }
 
@@ -336,6 +345,6 @@ impl Server {
 fn unsized_value(data: [u8; 4], at: Multiplexer, objects: &impl Objects) -> Result<Bytes<4>, Abort> {
     match objects.writable(at)? {
         Writable::Value(size) => Ok(Bytes::from_slice(data.get(..size).unwrap_or(&data))),
-        Writable::Stream => Ok(Bytes::new(data, 4)),
+        Writable::Stream(_) => Ok(Bytes::new(data, 4)),
     }
 }

@@ -105,15 +105,11 @@ const ROWS: &[Object] = &[
 ];
 
 const SIZE: usize = dictionary::image_size(ROWS);
-const TABLE: [Object; ROWS.len()] = dictionary::gather(&[ROWS]);
-const ENTRIES: [Entry; ROWS.len()] = dictionary::compile(&TABLE);
-const DEFAULTS: [u8; SIZE] = dictionary::default_image(ROWS);
-const _: () = dictionary::check(ROWS);
 
-pub(crate) const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+pub(crate) const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 /// The rows and their entries, for what compares them.
-pub(crate) fn rows() -> impl Iterator<Item = (&'static Object, &'static Entry)> {
+pub(crate) fn rows() -> impl Iterator<Item = (&'static Object, Entry)> {
     ROWS.iter().zip(DICTIONARY.entries())
 }
 

@@ -2,6 +2,7 @@
 
 mod bench;
 mod block;
+mod dictionary;
 mod emcy;
 mod heartbeat;
 mod lss;

@@ -68,6 +68,20 @@ fn without_an_event_timer_every_change_is_sent() {
 }
 
 #[test]
+fn type_254_without_an_event_timer_is_sent_on_entering_operational_only() {
+    let mut bench = bench(254, 0, 0);
+    assert_eq!(sent(&mut bench), [[0; 4]]);
+    bench.set_value(1, &[1, 0, 0, 0]);
+    bench.run(Duration::from_millis(5000));
+    assert!(sent(&mut bench).is_empty());
+    request(&mut bench);
+    assert_eq!(sent(&mut bench), [[1, 0, 0, 0]]);
+    bench.nmt(0x80);
+    bench.nmt(1);
+    assert_eq!(sent(&mut bench), [[1, 0, 0, 0]]);
+}
+
+#[test]
 fn within_the_inhibit_time_changes_wait_and_the_newest_wins() {
     let mut bench = bench(255, 50, 0);
     assert_eq!(sent(&mut bench).len(), 1);

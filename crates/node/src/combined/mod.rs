@@ -7,7 +7,7 @@ mod shift;
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
 use crate::{Personality, communication, encoder, flags, pressure};
-use canopen::dictionary::{self, Access, Dictionary, Entry, Object, Type};
+use canopen::dictionary::{self, Access, Dictionary, Object, Type};
 
 /// From the indexes of a device profile to those of the second device.
 const SHIFT: u16 = 0x800;
@@ -51,14 +51,11 @@ const PARTS: &[&[Object]] = &[
     &[PRESSURE_TYPE],
     &INTEGER,
 ];
-static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
-static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
-const _: () = dictionary::check(&OBJECTS);
 
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);
 static FLAGS: flags::Fields = flags::Fields::new(&DICTIONARY);
 static PRESSURE: pressure::Fields = pressure::Fields::new(&DICTIONARY, SHIFT);
 static ENCODER: encoder::Fields = encoder::Fields::new(&DICTIONARY, ENCODER_TYPE.index);

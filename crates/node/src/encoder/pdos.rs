@@ -6,8 +6,8 @@ use canopen::dictionary::DefaultValue;
 
 const POSITION_VALUE: &[i64] = &[POSITION as i64];
 
-/// Sent on entering Operational and when the event timer elapses, which is 6200h. With the timer at 0 a change is the
-/// event, as in the other personalities (CiA 301, 7.2.2.4.1).
+/// Type 254: sent on entering Operational and when the event timer elapses, which is 6200h. A change of the position is no
+/// event: CiA 406 names none but these two, and a shaft that turns changes it a thousand times a second.
 pub(crate) const BY_EVENT: Tpdo = Tpdo {
     number: 0,
     cob_id: DefaultValue::NodeId(0x180),

@@ -14,9 +14,13 @@ struct Node {
     raw: RawEncoder,
 }
 
+fn defaults() -> [u8; IMAGE_SIZE] {
+    *DICTIONARY.defaults().first_chunk().unwrap()
+}
+
 impl Node {
     fn new() -> Node {
-        let mut node = Node { image: DEFAULTS, encoder: Encoder::default(), raw: RawEncoder::default() };
+        let mut node = Node { image: defaults(), encoder: Encoder::default(), raw: RawEncoder::default() };
         node.encoder.apply(&FIELDS.parameters(&node.image));
         node.sample();
         node
@@ -45,7 +49,7 @@ impl Node {
         let bytes = &value.to_le_bytes()[..size];
         let row = OBJECTS.iter().find(|row| (row.index, row.sub) == (index, sub)).unwrap();
         if let Rule::Application(rule) = row.rule {
-            FIELDS.write(rule, entry, bytes, &mut self.image)?;
+            FIELDS.write(rule, &entry, bytes, &mut self.image)?;
         }
         entry.field().set(&mut self.image, bytes);
         Ok(())
@@ -59,7 +63,7 @@ impl Node {
 
 #[test]
 fn the_defaults_of_the_table_are_those_of_the_measurement() {
-    assert_eq!(FIELDS.parameters(&DEFAULTS), Parameters::default());
+    assert_eq!(FIELDS.parameters(DICTIONARY.defaults()), Parameters::default());
 }
 
 /// The objects of the encoder itself.
@@ -250,7 +254,7 @@ fn a_reset_of_the_dictionary_repeats_no_command() {
     node.turn_to(1000);
     node.write(0x6003, 0, 77).unwrap();
     node.sample();
-    node.image = DEFAULTS;
+    node.image = defaults();
     node.sample();
     node.encoder.apply(&FIELDS.parameters(&node.image));
     node.turn_to(1001);

@@ -16,7 +16,7 @@ use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
 use crate::pressure::CALIBRATION;
 use crate::{Personality, communication};
-use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::dictionary::{self, Dictionary, Object};
 
 /// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
@@ -41,14 +41,11 @@ const PARTS: &[&[Object]] = &[
     &[TRANSFER_BUFFER],
     &PROFILE,
 ];
-static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
-static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
-const _: () = dictionary::check(&OBJECTS);
 
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);
 static FIELDS: Fields = Fields::new(&DICTIONARY);
 
 pub(crate) static DEFINITION: Definition =

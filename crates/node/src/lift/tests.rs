@@ -1,7 +1,7 @@
 extern crate std;
 use std::vec::Vec;
 
-use canopen::dictionary::{Access, Group, Rule};
+use canopen::dictionary::{Access, Entry, Group, Rule};
 use canopen::sdo::Abort;
 use profiles::encoder::RawEncoder;
 use profiles::lift::catalogue::{CobId, Content, PDOS as CATALOGUE};
@@ -35,10 +35,14 @@ fn pressure(permille: u32) -> RawSample {
     }
 }
 
+fn defaults() -> [u8; IMAGE_SIZE] {
+    *DICTIONARY.defaults().first_chunk().unwrap()
+}
+
 impl Node {
     fn new() -> Node {
         let raw = RawLift { encoder: RawEncoder::default(), pressure: pressure(0), buttons: [false; 2] };
-        let mut node = Node { image: DEFAULTS, lift: Lift::default(), raw };
+        let mut node = Node { image: defaults(), lift: Lift::default(), raw };
         node.write(0x2310, 1, 0).unwrap();
         node.sample();
         node
@@ -65,7 +69,7 @@ impl Node {
     fn write_late(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
         let entry = DICTIONARY.find(index, sub)?;
         let size = entry.field().get(&self.image).len();
-        self.write_bytes(entry, &value.to_le_bytes()[..size])
+        self.write_bytes(&entry, &value.to_le_bytes()[..size])
     }
 
     fn write_bytes(&mut self, entry: &Entry, bytes: &[u8]) -> Result<(), Abort> {
@@ -79,7 +83,7 @@ impl Node {
 
     fn write_real(&mut self, index: u16, sub: u8, value: f32) {
         let entry = DICTIONARY.find(index, sub).unwrap();
-        self.write_bytes(entry, &value.to_le_bytes()).unwrap();
+        self.write_bytes(&entry, &value.to_le_bytes()).unwrap();
         self.lift.apply(&FIELDS.parameters(&self.image));
     }
 
@@ -91,7 +95,7 @@ impl Node {
 
 #[test]
 fn the_defaults_of_the_table_are_those_of_the_measurement() {
-    assert_eq!(FIELDS.parameters(&DEFAULTS), Parameters::default());
+    assert_eq!(FIELDS.parameters(DICTIONARY.defaults()), Parameters::default());
 }
 
 #[test]
@@ -151,7 +155,7 @@ fn a_preset_is_read_at_once_and_stays() {
     assert_eq!((node.read(0x6383, 1), node.read(0x2302, 1)), (77_100, 76_000));
     // It is a parameter: after a reset that finds it stored it is the same.
     let stored = node.image;
-    node.image = DEFAULTS;
+    node.image = defaults();
     DICTIONARY.field(0x2302, 1).set(&mut node.image, DICTIONARY.field(0x2302, 1).get(&stored));
     node.lift.apply(&FIELDS.parameters(&node.image));
     node.sample();

@@ -47,7 +47,7 @@ pub(crate) const CALIBRATION: &[Object] = &[
     real(0x2200, 9, "Reference temperature", 298.15).unit("K"),
     real(0x2200, 10, "Lowest ratio of an intact sensor", 0.025),
     real(0x2200, 11, "Highest ratio of an intact sensor", 0.975),
-    Object::highest(0x2201, 7, "Temperature calibration"),
+    Object::highest(0x2201, 9, "Temperature calibration"),
     // 0: the sensor of the chip, 1: the thermistor.
     parameter(0x2201, 1, "Thermometer", Type::Unsigned8, VALUE).limits(0, 1),
     real(0x2201, 2, "Temperature factor", 1.0),
@@ -57,6 +57,8 @@ pub(crate) const CALIBRATION: &[Object] = &[
     real(0x2201, 5, "Thermistor coefficient B", 0.000_253_164_55).unit("1/K"),
     real(0x2201, 6, "Thermistor coefficient C", 0.0).unit("1/K"),
     real(0x2201, 7, "Resistor of the thermistor", 10_000.0).unit("ohm"),
+    real(0x2201, 8, "Lowest ratio of an intact thermistor", 0.01),
+    real(0x2201, 9, "Highest ratio of an intact thermistor", 0.99),
     Object::highest(0x2202, 2, "Calibration record"),
     parameter(0x2202, 1, "Number of calibrations", Type::Unsigned32, RECORD),
     // As decimal digits, year, month and day: 20251231. 0 for a device that was not calibrated.
@@ -72,7 +74,7 @@ pub(crate) const RULES: core::ops::RangeInclusive<u8> = VALUE..=LOCK;
 pub(crate) struct Places {
     pressure: [Field; 11],
     thermometer: Field,
-    temperature: [Field; 6],
+    temperature: [Field; 8],
     lock: Field,
 }
 
@@ -94,7 +96,8 @@ impl Places {
     fn load(&self, image: &[u8]) -> Calibration {
         let [start, end, z0, z1, z2, s0, s1, s2, reference, break_low, break_high] =
             self.pressure.map(|field| field.f32(image));
-        let [factor, offset, a, b, c, series] = self.temperature.map(|field| field.f32(image));
+        let [factor, offset, a, b, c, series, lowest, highest] =
+            self.temperature.map(|field| field.f32(image));
         let [zero, span] = [(z0, z1, z2), (s0, s1, s2)].map(|(constant, linear, quadratic)| Polynomial {
             constant,
             linear,
@@ -104,7 +107,7 @@ impl Places {
             0 => Thermometer::Internal,
             _ => Thermometer::Thermistor,
         };
-        let thermistor = Thermistor { a, b, c, series };
+        let thermistor = Thermistor { a, b, c, series, break_low: lowest, break_high: highest };
         Calibration {
             pressure: PressureCalibration { start, end, zero, span, reference, break_low, break_high },
             temperature: TemperatureCalibration { thermometer, factor, offset, thermistor },

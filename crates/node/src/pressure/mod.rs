@@ -15,7 +15,7 @@ pub(crate) use values::Fields;
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
 use crate::{Personality, communication, flags};
-use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::dictionary::{self, Dictionary, Object};
 
 /// CiA 404, two analogue input blocks.
 pub(crate) const DEVICE_TYPE: i64 = 0x0002_0194;
@@ -39,14 +39,11 @@ const PARTS: &[&[Object]] = &[
     REAL,
     INTEGER,
 ];
-static ENTRIES: [Entry; OBJECTS.len()] = dictionary::compile(&OBJECTS);
-static DEFAULTS: [u8; IMAGE_SIZE] = dictionary::default_image(&OBJECTS);
-const _: () = dictionary::check(&OBJECTS);
 
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-static DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);
 static FLAGS: flags::Fields = flags::Fields::new(&DICTIONARY);
 static FIELDS: Fields = Fields::new(&DICTIONARY, 0);
 

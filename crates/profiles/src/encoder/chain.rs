@@ -79,12 +79,19 @@ impl Encoder {
 
     /// Processes what was read in one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
+        let mut snapshot = Snapshot::default();
+        self.update(raw, &mut snapshot);
+        snapshot
+    }
+
+    /// The same, with the snapshot where it is to be.
+    pub fn update(&mut self, raw: &RawEncoder, snapshot: &mut Snapshot) {
         self.kept.operating_time.tick();
         if let Some(mask) = self.acknowledge.take() {
             let [low, high, ..] = mask.to_le_bytes();
             self.supervision.acknowledge(u16::from_le_bytes([low, high]));
         }
-        let mut snapshot = self.fixed;
+        *snapshot = self.fixed;
         for (values, channel) in snapshot.channels.iter_mut().zip(&mut self.channels) {
             if let Some(channel) = channel {
                 *values = channel.sample(raw);
@@ -95,17 +102,26 @@ impl Encoder {
         snapshot.warnings = self.supervision.warnings(channels, &raw.board, limits, time);
         snapshot.conditions = self.supervision.conditions(channels, &raw.board, limits);
         snapshot.operating_time = time.tenths();
-        snapshot
     }
 
     /// What is to outlive a loss of power: see [`Kept`].
     #[must_use]
+    #[inline]
     pub fn kept(&self) -> Kept {
-        let mut kept = self.kept;
-        for (kept, channel) in kept.channels.iter_mut().zip(&self.channels) {
-            *kept = channel.as_ref().map_or(*kept, Channel::kept);
-        }
-        kept
+        let ([first, second], [before, before_too]) = (&self.channels, &self.kept.channels);
+        let kept = |channel: &Option<Channel>, before: &KeptChannel| match channel {
+            Some(channel) => channel.kept(),
+            None => *before,
+        };
+        let channels = [kept(first, before), kept(second, before_too)];
+        Kept { channels, operating_time: self.kept.operating_time }
+    }
+
+    /// The same as it is stored: see [`Kept::to_words`]. Not inlined: this crate is compiled for speed, its callers for size.
+    #[must_use]
+    #[inline(never)]
+    pub fn kept_words(&self) -> [u32; Kept::WORDS] {
+        self.kept().to_words()
     }
 }
 

@@ -204,8 +204,8 @@ impl Input {
 
 /// Steps to the nearest zero of a revolution.
 fn nearest(tracker: &Tracker, revolution: NonZeroU32) -> i64 {
+    let step = i64::from(tracker.step_in(revolution));
     let revolution = i64::from(revolution.get());
-    let step = tracker.total().checked_rem_euclid(revolution).unwrap_or(0);
     if step > revolution / 2 { step - revolution } else { step }
 }
 

@@ -103,81 +103,64 @@ pub enum Start {
     Damaged,
 }
 
-/// Bytes of a channel.
-const CHANNEL: usize = 31;
+/// Words of a channel.
+const CHANNEL: usize = 8;
 
 impl Kept {
-    /// Bytes of its stored form.
-    pub const SIZE: usize = 2 * CHANNEL + 8;
+    /// Words of its stored form.
+    pub const WORDS: usize = 2 * CHANNEL + 2;
 
     /// The form to be stored. It has no check of its own: whoever stores it adds one.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; Kept::SIZE] {
-        let mut writer = Writer { bytes: [0; Kept::SIZE], at: 0 };
-        for channel in &self.channels {
-            writer.put([channel.kind]);
-            writer.put(channel.resolution.to_le_bytes());
-            writer.put(channel.total.to_le_bytes());
-            writer.put([channel.referenced.into(), channel.reversed.into()]);
-            writer.put(channel.offset.to_le_bytes());
-            writer.put(channel.units.to_le_bytes());
-            writer.put(channel.range.to_le_bytes());
-        }
-        writer.put(self.operating_time.tenths.to_le_bytes());
-        writer.put(self.operating_time.millis.to_le_bytes());
-        writer.bytes
+    pub fn to_words(&self) -> [u32; Kept::WORDS] {
+        let OperatingTime { tenths, millis } = self.operating_time;
+        let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] =
+            self.channels.map(KeptChannel::to_words);
+        [a0, a1, a2, a3, a4, a5, a6, a7, b0, b1, b2, b3, b4, b5, b6, b7, tenths, millis]
     }
 
-    /// From the stored form. Any bytes are something; a channel that fits no sensor is not used.
+    /// From the stored form. Any words are something; a channel that fits no sensor is not used.
     #[must_use]
-    pub fn from_bytes(bytes: &[u8; Kept::SIZE]) -> Kept {
-        let mut reader = Reader { bytes };
-        let channels = [(); 2].map(|()| KeptChannel::take(&mut reader));
-        let operating_time = OperatingTime {
-            tenths: u32::from_le_bytes(reader.take()),
-            millis: u32::from_le_bytes(reader.take()),
-        };
-        Kept { channels, operating_time }
+    pub fn from_words(words: &[u32; Kept::WORDS]) -> Kept {
+        let ([first, second], &[tenths, millis]) = words.as_chunks() else { return Kept::default() };
+        let channels = [first, second].map(KeptChannel::from_words);
+        Kept { channels, operating_time: OperatingTime { tenths, millis } }
     }
 }
 
 impl KeptChannel {
-    fn take(reader: &mut Reader) -> KeptChannel {
-        let [kind] = reader.take();
-        let resolution = u32::from_le_bytes(reader.take());
-        let total = i64::from_le_bytes(reader.take());
-        let [referenced, reversed] = reader.take().map(|byte| byte != 0);
-        let offset = i32::from_le_bytes(reader.take());
-        let units = u32::from_le_bytes(reader.take());
-        let range = u64::from_le_bytes(reader.take());
-        KeptChannel { kind, resolution, total, referenced, offset, units, range, reversed }
+    fn to_words(self) -> [u32; CHANNEL] {
+        let flags = u32::from_le_bytes([self.kind, self.referenced.into(), self.reversed.into(), 0]);
+        let ([total, total_high], [range, range_high]) =
+            (halves(self.total.cast_unsigned()), halves(self.range));
+        let offset = self.offset.cast_unsigned();
+        [flags, self.resolution, total, total_high, offset, self.units, range, range_high]
     }
-}
 
-struct Writer {
-    bytes: [u8; Kept::SIZE],
-    at: usize,
-}
-
-impl Writer {
-    fn put<const N: usize>(&mut self, value: [u8; N]) {
-        if let Some(place) = self.bytes.get_mut(self.at..).and_then(|rest| rest.first_chunk_mut()) {
-            *place = value;
+    fn from_words(words: &[u32; CHANNEL]) -> KeptChannel {
+        let [flags, resolution, total, total_high, offset, units, range, range_high] = *words;
+        let [kind, referenced, reversed, _] = flags.to_le_bytes();
+        KeptChannel {
+            kind,
+            resolution,
+            total: whole([total, total_high]).cast_signed(),
+            referenced: referenced != 0,
+            offset: offset.cast_signed(),
+            units,
+            range: whole([range, range_high]),
+            reversed: reversed != 0,
         }
-        self.at += N;
     }
 }
 
-struct Reader<'a> {
-    bytes: &'a [u8],
+/// The low and the high word.
+#[allow(clippy::cast_possible_truncation)]
+fn halves(value: u64) -> [u32; 2] {
+    [value as u32, (value >> 32) as u32]
 }
 
-impl Reader<'_> {
-    fn take<const N: usize>(&mut self) -> [u8; N] {
-        let Some((value, rest)) = self.bytes.split_first_chunk() else { return [0; N] };
-        self.bytes = rest;
-        *value
-    }
+fn whole([low, high]: [u32; 2]) -> u64 {
+    u64::from(high) << 32 | u64::from(low)
 }
 
 #[cfg(test)]
@@ -197,9 +180,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn bytes_give_back_what_was_kept(channels in prop::array::uniform2(any_channel()), tenths: u32, millis: u32) {
+        fn words_give_back_what_was_kept(channels in prop::array::uniform2(any_channel()), tenths: u32, millis: u32) {
             let kept = Kept { channels, operating_time: OperatingTime { tenths, millis } };
-            prop_assert_eq!(Kept::from_bytes(&kept.to_bytes()), kept);
+            prop_assert_eq!(Kept::from_words(&kept.to_words()), kept);
         }
     }
 

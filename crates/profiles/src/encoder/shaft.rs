@@ -98,6 +98,12 @@ impl Tracker {
         self.shaft.total(self.turn)
     }
 
+    /// The step within a turn of this length. Of the tracker's own length it needs no division.
+    #[must_use]
+    pub fn step_in(&self, turn: NonZeroU32) -> u32 {
+        if turn == self.turn { self.shaft.step } else { Shaft::at(self.total(), turn).step }
+    }
+
     /// The last reading.
     #[must_use]
     pub fn word(&self) -> u32 {

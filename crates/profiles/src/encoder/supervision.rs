@@ -94,8 +94,11 @@ struct Lasting {
 
 impl Lasting {
     fn update(&mut self, now: bool) -> bool {
-        self.other = if now == self.is_set { 0 } else { self.other.saturating_add(1) };
-        if self.other >= DEBOUNCE {
+        if now == self.is_set {
+            self.other = 0;
+        } else if self.other < DEBOUNCE - 1 {
+            self.other += 1;
+        } else {
             *self = Lasting { is_set: now, other: 0 };
         }
         self.is_set

@@ -132,7 +132,12 @@ impl Channel {
 
 /// The nearest finite number, and 0 for what is none: nothing else ever leaves the channel.
 fn finite(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value.clamp(f32::MIN, f32::MAX) }
+    match value {
+        finite if finite.is_finite() => finite,
+        f32::INFINITY => f32::MAX,
+        f32::NEG_INFINITY => f32::MIN,
+        _ => 0.0,
+    }
 }
 
 /// Towards zero, to the nearest limit when out of range, 0 for what is not a number: what `as` is defined to do.

@@ -1,7 +1,9 @@
 //! Filters on the field value, objects 61A0h and 61A1h.
 //!
-//! The state is double precision: with a constant of 255, single precision would drop increments below 255 units
-//! of the last place and the output would stick beside its target.
+//! The state has twice the digits of single precision ([`Precise`]): with a constant of 255, single precision would drop
+//! increments below 255 units of the last place and the output would stick beside its target.
+
+use super::precise::Precise;
 
 /// The filter of one channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,9 +11,9 @@ pub struct Filter {
     kind: Kind,
     constant: u8,
     /// Output; `None` until the first input.
-    output: Option<f64>,
+    output: Option<Precise>,
     /// Inputs of the block under way, for the repeating average.
-    sum: f64,
+    sum: Precise,
     count: u8,
 }
 
@@ -31,7 +33,7 @@ impl Filter {
             2 => Kind::RepeatingAverage,
             _ => Kind::None,
         };
-        Filter { kind, constant: constant.max(1), output: None, sum: 0.0, count: 0 }
+        Filter { kind, constant: constant.max(1), output: None, sum: Precise::ZERO, count: 0 }
     }
 
     /// Whether it is the same filter, whatever its state.
@@ -41,35 +43,37 @@ impl Filter {
     }
 
     /// Takes an input and gives the output. The first input is the first output, so that nothing starts with a step from 0.
-    #[allow(clippy::cast_possible_truncation)]
     pub fn next(&mut self, input: f32) -> f32 {
         match self.kind {
             Kind::None => input,
-            Kind::MovingAverage => self.moving_average(input.into()) as f32,
-            Kind::RepeatingAverage => self.repeating_average(input.into()) as f32,
+            Kind::MovingAverage => self.moving_average(Precise::of(input)).rounded(),
+            Kind::RepeatingAverage => self.repeating_average(Precise::of(input)).rounded(),
         }
     }
 
-    fn moving_average(&mut self, input: f64) -> f64 {
+    fn moving_average(&mut self, input: Precise) -> Precise {
         let last = self.output.unwrap_or(input);
-        *self.output.insert(last + (input - last) / f64::from(self.constant))
+        *self.output.insert(last.plus(input.minus(last).over(self.constant)))
     }
 
     /// A new output at the end of every block, held in between.
-    fn repeating_average(&mut self, input: f64) -> f64 {
-        self.sum += input;
+    fn repeating_average(&mut self, input: Precise) -> Precise {
+        self.sum = self.sum.plus(input);
         self.count = self.count.saturating_add(1);
         if self.count < self.constant {
             return *self.output.get_or_insert(input);
         }
-        let average = self.sum / f64::from(self.constant);
-        (self.sum, self.count) = (0.0, 0);
+        let average = self.sum.over(self.constant);
+        (self.sum, self.count) = (Precise::ZERO, 0);
         *self.output.insert(average)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
+    use super::super::precise::LARGEST;
     use super::*;
 
     fn outputs(kind: u8, constant: u8, inputs: &[f32]) -> Vec<f32> {
@@ -97,5 +101,52 @@ mod tests {
         filter.next(0.0);
         let settled = (0..20_000).map(|_| filter.next(100_000.0)).last();
         assert_eq!(settled, Some(100_000.0));
+    }
+
+    /// The same filters in double precision.
+    fn in_double(kind: u8, constant: u8, inputs: &[f32]) -> Vec<f64> {
+        let (mut output, mut block) = (f64::from(inputs[0]), Vec::new());
+        let mut step = |input: f64| {
+            block.push(input);
+            if kind == 1 {
+                output += (input - output) / f64::from(constant);
+            } else if block.len() == usize::from(constant) {
+                output = block.drain(..).sum::<f64>() / f64::from(constant);
+            }
+            output
+        };
+        inputs.iter().map(|&input| step(input.into())).collect()
+    }
+
+    /// Numbers of one sign and of both, of like and of unlike size.
+    fn any_inputs() -> impl Strategy<Value = Vec<f32>> {
+        let any = prop_oneof![0.0..1e6_f32, -1e3..1e3_f32, -1e30..1e30_f32, Just(0.0)];
+        prop::collection::vec(any, 1..600)
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_double_precision(kind in 1..=2_u8, constant in 1..=255_u8, inputs in any_inputs()) {
+            let largest = inputs.iter().fold(0.0, |largest, input| f64::max(largest, input.abs().into()));
+            for (got, expected) in outputs(kind, constant, &inputs).into_iter().zip(in_double(kind, constant, &inputs)) {
+                let tolerance = expected.abs() * f64::from(f32::EPSILON) / 2.0 + largest * 2_f64.powi(-44);
+                prop_assert!((f64::from(got) - expected).abs() <= tolerance, "{} for {}", got, expected);
+            }
+        }
+
+        #[test]
+        fn any_input_gives_a_number(kind: u8, constant: u8, inputs in prop::collection::vec(any::<f32>(), 1..600)) {
+            let inputs: Vec<f32> = inputs.into_iter().filter(|input| input.is_finite()).collect();
+            prop_assert!(outputs(kind, constant, &inputs).iter().all(|output| output.is_finite()));
+        }
+    }
+
+    #[test]
+    fn the_largest_numbers_are_held() {
+        for sign in [1.0, -1.0] {
+            let inputs = [f32::MAX * sign, f32::MIN * sign, f32::MAX * sign];
+            assert_eq!(outputs(1, 1, &inputs), [LARGEST * sign, -LARGEST * sign, LARGEST * sign]);
+            assert_eq!(outputs(2, 255, &[f32::MAX * sign; 256]), [LARGEST * sign; 256]);
+        }
     }
 }

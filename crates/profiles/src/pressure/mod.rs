@@ -7,6 +7,7 @@
 mod calibration;
 mod channel;
 mod filter;
+mod precise;
 mod raw;
 mod sensor;
 mod thermometer;

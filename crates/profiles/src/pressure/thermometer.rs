@@ -35,6 +35,10 @@ pub struct Thermistor {
     pub c: f32,
     /// The resistor to VDDA in ohm.
     pub series: f32,
+    /// A ratio of VDDA below this means a short circuit.
+    pub break_low: f32,
+    /// A ratio of VDDA above this means a broken wire.
+    pub break_high: f32,
 }
 
 /// The calibration of the temperature: what is measured, times the factor, plus the offset.
@@ -51,9 +55,16 @@ pub struct TemperatureCalibration {
 }
 
 impl Default for Thermistor {
-    /// 10 kohm at 25 degC, beta 3950 K, with 10 kohm.
+    /// 10 kohm at 25 degC, beta 3950 K, with 10 kohm: -40 degC are 97.6 % and 125 degC 3.5 % of VDDA.
     fn default() -> Thermistor {
-        Thermistor { a: 0.001_022_29, b: 0.000_253_164_55, c: 0.0, series: 10_000.0 }
+        Thermistor {
+            a: 0.001_022_29,
+            b: 0.000_253_164_55,
+            c: 0.0,
+            series: 10_000.0,
+            break_low: 0.01,
+            break_high: 0.99,
+        }
     }
 }
 
@@ -65,7 +76,8 @@ impl Default for TemperatureCalibration {
 }
 
 impl TemperatureCalibration {
-    /// The temperature in K; `None` when it is not measured: an input at a rail, no factory calibration, or no number.
+    /// The temperature in K; `None` when it is not measured: an input at a rail, a broken thermistor, no factory calibration,
+    /// or no number.
     #[must_use]
     pub fn temperature(&self, raw: &RawSample) -> Option<f32> {
         let measured = match self.thermometer {
@@ -86,7 +98,8 @@ impl TemperatureCalibration {
 impl Thermistor {
     fn temperature(&self, raw: &RawSample) -> Option<f32> {
         let full = CODES * u32::from(raw.count);
-        if raw.is_rail(raw.thermistor) {
+        let ratio = real(raw.thermistor) / real(full);
+        if raw.is_rail(raw.thermistor) || ratio < self.break_low || ratio > self.break_high {
             return None;
         }
         let resistance = self.series * (real(raw.thermistor) / real(full.saturating_sub(raw.thermistor)));
@@ -102,7 +115,7 @@ impl Thermistor {
     fn is_valid(&self) -> bool {
         let ends = [self.series / real(CODES), 1.0, self.series * real(CODES)];
         let falls = |log: f32| self.b + 3.0 * self.c * log * log > 0.0 && self.reciprocal(log).is_finite();
-        self.series > 0.0 && ends.map(libm::logf).into_iter().all(falls)
+        self.series > 0.0 && self.break_low < self.break_high && ends.map(libm::logf).into_iter().all(falls)
     }
 }
 
@@ -161,7 +174,7 @@ mod tests {
     #[test]
     fn steinhart_and_hart_of_a_data_sheet() {
         // 10 kohm, beta(25/85) 3435 K: coefficients of a fit, R at 0 degC 27.28 kohm (1/T by the formula in double).
-        let own = Thermistor { a: 1.129_148e-3, b: 2.341_25e-4, c: 8.767_41e-8, series: 10_000.0 };
+        let own = Thermistor { a: 1.129_148e-3, b: 2.341_25e-4, c: 8.767_41e-8, ..Thermistor::default() };
         assert!(own.is_valid());
         let resistance: f64 = 10_000.0;
         let log = resistance.ln();
@@ -178,7 +191,20 @@ mod tests {
             let own = TemperatureCalibration::default();
             assert_eq!(own.temperature(&RawSample { temperature: sum, ..RAW }), None);
         }
-        assert!(thermistor(1).is_some() && thermistor(16 * 4095 - 1).is_some());
+    }
+
+    #[test]
+    fn a_thermistor_beyond_its_limits_is_broken() {
+        // 1 % and 99 % of 16 * 4096.
+        for (sum, is_intact) in [(655, false), (656, true), (64_880, true), (64_881, false)] {
+            assert_eq!(thermistor(sum).is_some(), is_intact, "{sum}");
+        }
+        let thermometer = Thermometer::Thermistor;
+        let wide = Thermistor { break_low: 0.0, break_high: 1.0, ..Thermistor::default() };
+        let own = TemperatureCalibration { thermometer, thermistor: wide, ..Default::default() };
+        for sum in [1, 16 * 4095 - 1] {
+            assert!(own.temperature(&RawSample { thermistor: sum, ..RAW }).is_some());
+        }
     }
 
     #[test]
@@ -205,6 +231,8 @@ mod tests {
             Thermistor { a: f32::INFINITY, ..thermistor },
             Thermistor { series: 0.0, ..thermistor },
             Thermistor { series: -1.0, ..thermistor },
+            Thermistor { break_low: 0.99, ..thermistor },
+            Thermistor { break_high: f32::NAN, ..thermistor },
         ] {
             assert!(!TemperatureCalibration { thermistor: bad, ..good }.is_valid());
         }

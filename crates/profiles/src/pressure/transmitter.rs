@@ -107,6 +107,13 @@ impl Transmitter {
 
     /// Processes the sums of one millisecond.
     pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
+        let mut snapshot = Snapshot::default();
+        self.update(raw, &mut snapshot);
+        snapshot
+    }
+
+    /// The same, with the snapshot where it is to be.
+    pub fn update(&mut self, raw: &RawSample, snapshot: &mut Snapshot) {
         let ratio = raw.ratio();
         self.check_break(ratio);
         let kelvin = self.calibration.temperature.temperature(raw);
@@ -115,13 +122,12 @@ impl Transmitter {
             pressure_rail: raw.is_rail(raw.pressure),
             temperature_rail: kelvin.is_none(),
         };
-        let pressure_valid = !conditions.sensor_break && !conditions.pressure_rail;
-        Snapshot {
-            pressure: self.pressure.sample(self.calibration.pressure.pressure(ratio, kelvin), pressure_valid),
-            // A temperature that is not measured is 0 K, as for a transmitter without a temperature sensor.
-            temperature: self.temperature.sample(kelvin.unwrap_or(0.0), !conditions.temperature_rail),
-            conditions,
-        }
+        let pressure = self.calibration.pressure.pressure(ratio, kelvin);
+        let is_valid = !conditions.sensor_break && !conditions.pressure_rail;
+        snapshot.pressure = self.pressure.sample(pressure, is_valid);
+        // A temperature that is not measured is 0 K, as for a transmitter without a temperature sensor.
+        snapshot.temperature = self.temperature.sample(kelvin.unwrap_or(0.0), !conditions.temperature_rail);
+        snapshot.conditions = conditions;
     }
 
     fn check_break(&mut self, ratio: f32) {

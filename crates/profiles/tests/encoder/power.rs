@@ -8,7 +8,7 @@ use crate::bench::{Bench, one, two};
 
 /// The power is lost, the sensor is moved to `total`, the power comes back.
 fn after_power_loss(bench: &Bench, total: i64) -> Bench {
-    let kept = Kept::from_bytes(&bench.encoder.kept().to_bytes());
+    let kept = Kept::from_words(&bench.encoder.kept().to_words());
     Bench::started(bench.parameters, Start::Kept(kept), total)
 }
 

@@ -14,6 +14,10 @@ pub enum FaultKind {
     RailHigh,
     /// The transducer's output is shorted to ground.
     RailLow,
+    /// The wire of the thermistor is broken.
+    OpenThermistor,
+    /// The wires of the thermistor are shorted.
+    ShortedThermistor,
     /// The incremental encoder gives no index pulse.
     MissingIndex,
     /// The data line of the absolute encoder is broken.
@@ -24,10 +28,12 @@ pub enum FaultKind {
     BatteryEmpty,
 }
 
-const NAMES: [(&str, FaultKind); 7] = [
+const NAMES: [(&str, FaultKind); 9] = [
     ("open-sensor", FaultKind::OpenSensor),
     ("rail-high", FaultKind::RailHigh),
     ("rail-low", FaultKind::RailLow),
+    ("open-thermistor", FaultKind::OpenThermistor),
+    ("shorted-thermistor", FaultKind::ShortedThermistor),
     ("missing-index", FaultKind::MissingIndex),
     ("open-ssi", FaultKind::OpenSsi),
     ("wrong-code", FaultKind::WrongCode),

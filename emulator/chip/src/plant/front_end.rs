@@ -3,11 +3,13 @@
 //! ```text
 //! supply 5 V ──┬── transducer ──[ divider 0.66 ]── PA0      10 % of the supply at 0 Pa, 90 % at 1 MPa
 //!              └───────────────[ divider 0.66 ]── PA1
+//! VDDA ── 10 kohm ──┬── PC2
+//!                   └── thermistor ── ground                10 kohm at 25 degrees Celsius, beta 3950 K
 //! ```
 //!
 //! The transducer is ratiometric and both dividers bring 5 V to 3.3 V, so PA0 over PA1 is the pressure whatever the
 //! supply is, and at 5 V the ADC reads the same ratio of VDDA as the transducer gives of its supply. A broken wire
-//! leaves PA0 to the divider's lower resistor: 0 V. The chip's own temperature sensor and reference follow the factory
+//! leaves PA0 to the divider's lower resistor: 0 V. That of a thermistor leaves PC2 to VDDA. The chip's own temperature sensor and reference follow the factory
 //! calibration words in system memory (DS10693, temperature sensor and reference voltage).
 
 /// Full scale of the transducer in pascal.
@@ -26,6 +28,12 @@ pub(crate) const TS_CAL1: u16 = 959;
 pub(crate) const TS_CAL2: u16 = 1207;
 /// Code of the 1.21 V reference at 3.3 V.
 pub(crate) const VREFIN_CAL: u16 = 1502;
+
+/// The thermistor at its reference temperature, and the resistor to VDDA.
+const THERMISTOR_OHM: f64 = 10_000.0;
+const SERIES_OHM: f64 = 10_000.0;
+const THERMISTOR_KELVIN: f64 = 298.15;
+const THERMISTOR_BETA: f64 = 3950.0;
 
 const CAL1_KELVIN: f64 = 273.15 + 30.0;
 const CAL2_KELVIN: f64 = 273.15 + 110.0;
@@ -74,6 +82,12 @@ impl Rails {
 /// What the transducer gives at a pressure in pascal, as a ratio of its supply; it cannot leave its rails.
 pub(super) fn transducer(pascal: f64) -> f64 {
     (0.1 + 0.8 * pascal / FULL_SCALE).clamp(0.0, 1.0)
+}
+
+/// What the thermistor leaves of VDDA at a temperature in kelvin.
+pub(super) fn thermistor(kelvin: f64) -> f64 {
+    let resistance = THERMISTOR_OHM * (THERMISTOR_BETA * (1.0 / kelvin - 1.0 / THERMISTOR_KELVIN)).exp();
+    1.0 / (1.0 + SERIES_OHM / resistance)
 }
 
 /// The 12-bit code of a ratio of VDDA: the first transition is at half a code.

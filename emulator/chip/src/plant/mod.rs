@@ -27,6 +27,7 @@ pub use table::{Table, TableError};
 pub struct Plant {
     pressure: Stimulus,
     temperature: Stimulus,
+    thermistor: Stimulus,
     shaft: Shaft,
     buttons: [Button; BUTTONS],
     faults: Vec<Fault>,
@@ -35,12 +36,13 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// No pressure, 25 degrees Celsius, the shaft at rest at 0, an encoder with so many lines, and no button pressed.
+    /// No pressure, 25 degrees Celsius everywhere, the shaft at rest at 0, an encoder with so many lines, and no button pressed.
     pub(crate) fn new(encoder_lines: u32) -> Self {
         let still = |value| Stimulus::new(Signal::Constant(value), Time::ZERO);
         Self {
             pressure: still(0.0),
             temperature: still(298.15),
+            thermistor: still(298.15),
             shaft: Shaft::new(encoder_lines),
             buttons: [Button::default(); BUTTONS],
             faults: Vec::new(),
@@ -56,6 +58,11 @@ impl Plant {
     /// Sets the temperature of the chip, in kelvin, from `now` on.
     pub fn set_temperature(&mut self, signal: Signal, now: Time) {
         self.temperature = Stimulus::new(signal, now);
+    }
+
+    /// Sets the temperature of the thermistor, in kelvin, from `now` on.
+    pub fn set_thermistor(&mut self, signal: Signal, now: Time) {
+        self.thermistor = Stimulus::new(signal, now);
     }
 
     /// Sets the motion of the shaft from `now` on; even motion starts where the shaft is.
@@ -110,6 +117,17 @@ impl Plant {
     /// PA1 as a ratio of VDDA.
     pub(crate) fn supply_input(&self) -> f64 {
         self.rails.supply_ratio()
+    }
+
+    /// PC2 as a ratio of VDDA.
+    pub(crate) fn thermistor_input(&self, now: Time) -> f64 {
+        if self.has(FaultKind::OpenThermistor, now) {
+            1.0
+        } else if self.has(FaultKind::ShortedThermistor, now) {
+            0.0
+        } else {
+            front_end::thermistor(self.thermistor.at(now))
+        }
     }
 
     /// The temperature sensor as a ratio of VDDA.

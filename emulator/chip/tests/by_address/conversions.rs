@@ -2,7 +2,7 @@
 
 use canbus::Time;
 use chip::Peripherals;
-use chip::plant::{Fault, Signal};
+use chip::plant::{Fault, FaultKind, Signal};
 
 use crate::support::{AHB1ENR, APB1ENR, APB2ENR, Rig};
 
@@ -208,6 +208,32 @@ fn a_low_supply_shows_on_both_inputs() {
     rig.write(CR2, ADON | SWSTART);
     rig.wait(Time::from_micros(10));
     assert_eq!(rig.read(DR), code(0.9).into());
+}
+
+#[test]
+fn a_thermistor_divides_vdda_and_may_be_broken() {
+    let mut rig = rig();
+    let now = rig.now;
+    let after = |millis| now + Time::from_millis(millis);
+    for (kind, from, until) in [(FaultKind::OpenThermistor, 10, 20), (FaultKind::ShortedThermistor, 20, 30)] {
+        rig.chip.plant_mut(now).add_fault(Fault { kind, from: after(from), until: after(until) });
+    }
+    rig.write(SQR3, 12);
+    // 10 kohm at 25 degrees Celsius; at 0, beta 3950 K makes 33.6 kohm of it.
+    for (kelvin, ratio, millis) in [
+        (298.15, 0.5, 1),
+        (273.15, 0.770_751, 2),
+        (298.15, 4095.0 / 4096.0, 15),
+        (298.15, 0.0, 25),
+        (298.15, 0.5, 35),
+    ] {
+        rig.wait(after(millis) - rig.now);
+        let now = rig.now;
+        rig.chip.plant_mut(now).set_thermistor(Signal::Constant(kelvin), now);
+        rig.write(CR2, ADON | SWSTART);
+        rig.wait(Time::from_micros(10));
+        assert_eq!(rig.read(DR), code(ratio).into(), "after {millis} ms");
+    }
 }
 
 #[test]

@@ -10,6 +10,9 @@ use object::{Object, ObjectSymbol};
 const PASSED: u32 = 0x600D_600D;
 const FAILED: u32 = 0xBAD0_BAD0;
 
+/// How long programming takes.
+const BUSY: Time = Time::from_micros(16);
+
 /// What the program found out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
@@ -36,9 +39,10 @@ impl Peripherals for Bare {
         Err(BusFault)
     }
 
-    fn program(&mut self, address: u32, old: &[u8], new: &[u8], _: Time) -> Result<(), BusFault> {
+    fn program(&mut self, address: u32, old: &[u8], new: &[u8], now: Time) -> Result<(), BusFault> {
         let bytes = old.iter().zip(new).map(|(old, new)| old & new).collect();
         self.effects.push(Effect::Store { address, bytes });
+        self.effects.push(Effect::StallFlash(now + BUSY));
         Ok(())
     }
 

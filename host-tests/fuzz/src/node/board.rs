@@ -240,7 +240,7 @@ impl Board {
     }
 
     fn deliver(&mut self) {
-        let mut parcel = Parcel::new();
+        let mut parcel = Parcel::new(Personality::default());
         let Some(store) = self.store.as_mut().filter(|_| self.protocol.pack(&mut parcel)) else { return };
         let result = parcel.deliver(store);
         if self.flash.is_down() {

@@ -37,11 +37,7 @@ const ROWS: &[Object] = &[
 ];
 
 const SIZE: usize = dictionary::image_size(ROWS);
-const TABLE: [Object; ROWS.len()] = dictionary::gather(&[ROWS]);
-const ENTRIES: [Entry; ROWS.len()] = dictionary::compile(&TABLE);
-const DEFAULTS: [u8; SIZE] = dictionary::default_image(ROWS);
-const _: () = dictionary::check(ROWS);
-const DICTIONARY: Dictionary = Dictionary::new(&ENTRIES, &DEFAULTS);
+const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 /// From a command to the first answer in the new state.
 const RESTART: Duration = Duration::from_millis(200);

@@ -66,7 +66,7 @@ impl Pressure {
     }
 
     fn save(&mut self, now: Instant, out: &mut impl Transmit) {
-        let mut parcel = Parcel::new();
+        let mut parcel = Parcel::new(Personality::default());
         if self.protocol.pack(&mut parcel) {
             let result = parcel.deliver(&mut self.store);
             self.protocol.finish(&parcel, result, now, out);

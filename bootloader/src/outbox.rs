@@ -1,0 +1,49 @@
+//! What waits for a mailbox: in the order in which it was said. The bootloader sends no process data that would have to go
+//! first.
+
+use bsp::can::Transmitter;
+use canopen::{Frame, QueueFull, Transmit};
+
+/// A response, a heartbeat, LSS, and as much again: whoever asks waits for the answer.
+const CAPACITY: usize = 8;
+
+/// The queue: a ring.
+pub(crate) struct Outbox {
+    frames: [Option<Frame>; CAPACITY],
+    first: usize,
+}
+
+impl Outbox {
+    pub(crate) const fn new() -> Outbox {
+        Outbox { frames: [None; CAPACITY], first: 0 }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.frames.iter().all(Option::is_none)
+    }
+
+    /// Moves frames into free mailboxes.
+    pub(crate) fn pump(&mut self, transmitter: &mut Transmitter) {
+        while let Some(Some(frame)) = self.frames.get(self.first)
+            && transmitter.put(frame)
+        {
+            self.frames[self.first] = None;
+            self.first = (self.first + 1) % CAPACITY;
+        }
+    }
+}
+
+impl Transmit for Outbox {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        let used = CAPACITY - self.room();
+        match self.frames.get_mut((self.first + used) % CAPACITY) {
+            Some(place @ None) => *place = Some(frame),
+            _ => return Err(QueueFull),
+        }
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        self.frames.iter().filter(|place| place.is_none()).count()
+    }
+}

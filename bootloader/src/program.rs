@@ -1,0 +1,129 @@
+//! The program as the bus sees it: what a master's commands do, and what the objects of CiA 302-3 read.
+
+use bsp::{ProgramFlash, board, factory};
+use canopen::dictionary::{Entry, Field};
+use canopen::sdo::Abort;
+use canopen::{Application, Part};
+use update::{Refusal, Status, Target, Updater};
+
+use crate::dictionary::{CONTROL, DATA, DICTIONARY};
+use crate::target::{PRODUCT, REVISION, VENDOR};
+
+/// What 1F51h takes (CiA 302-3).
+const STOP: u8 = 0;
+const START: u8 = 1;
+const RESET: u8 = 2;
+const CLEAR: u8 = 3;
+
+const HARDWARE: Field = DICTIONARY.field(0x1009, 0);
+const IDENTITY: [Field; 4] = [
+    DICTIONARY.field(0x1018, 1),
+    DICTIONARY.field(0x1018, 2),
+    DICTIONARY.field(0x1018, 3),
+    DICTIONARY.field(0x1018, 4),
+];
+const PROGRAM_CONTROL: Field = DICTIONARY.field(0x1F51, 1);
+const IDENTIFICATION: Field = DICTIONARY.field(0x1F56, 1);
+const STATUS: Field = DICTIONARY.field(0x1F57, 1);
+
+/// The update under way, as the application of the CANopen device.
+pub(crate) struct Program {
+    updater: Updater<ProgramFlash>,
+    target: Target,
+    /// The program was told to start, and there is one.
+    starts: bool,
+}
+
+impl Program {
+    pub(crate) fn new(updater: Updater<ProgramFlash>, target: Target) -> Program {
+        Program { updater, target, starts: false }
+    }
+
+    pub(crate) fn updater(&mut self) -> &mut Updater<ProgramFlash> {
+        &mut self.updater
+    }
+
+    /// Whether the application is to be started.
+    pub(crate) fn starts(&self) -> bool {
+        self.starts
+    }
+
+    /// What the objects read now.
+    pub(crate) fn readings(&self) -> Readings {
+        let identification = self.updater.identification().unwrap_or(0);
+        Readings { identification, status: self.updater.status() }
+    }
+
+    fn control(&mut self, command: u8) -> Result<(), Abort> {
+        match command {
+            // The program is stopped, and at its beginning.
+            STOP | RESET => Ok(()),
+            START => self.start(),
+            CLEAR => self.updater.clear().map_err(abort),
+            _ => Err(Abort::InvalidValue),
+        }
+    }
+
+    fn start(&mut self) -> Result<(), Abort> {
+        if self.updater.status().busy {
+            return Err(Abort::DeviceState);
+        }
+        let found = update::application(self.updater.flash(), &self.target);
+        self.starts = found.is_ok() || crate::start::unsigned().is_some();
+        if self.starts { Ok(()) } else { Err(Abort::DeviceState) }
+    }
+}
+
+/// What the objects of the program read.
+pub(crate) struct Readings {
+    /// CRC of the program that was downloaded and found good; 0 until then.
+    identification: u32,
+    status: Status,
+}
+
+impl Readings {
+    pub(crate) fn store(&self, image: &mut [u8]) {
+        PROGRAM_CONTROL.store(image, [STOP]);
+        IDENTIFICATION.store(image, self.identification.to_le_bytes());
+        STATUS.store(image, self.status.word().to_le_bytes());
+    }
+}
+
+impl Application for Program {
+    const SERVICES_ONLY: bool = true;
+
+    fn initialise(&mut self, image: &mut [u8]) {
+        HARDWARE.set(image, board::NAME.as_bytes());
+        let identity = [VENDOR, PRODUCT, REVISION, factory::serial_number()];
+        for (field, value) in IDENTITY.into_iter().zip(identity) {
+            field.store(image, value.to_le_bytes());
+        }
+        self.readings().store(image);
+    }
+
+    fn write(&mut self, number: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        match (number, bytes) {
+            (CONTROL, &[command]) => self.control(command),
+            _ => Err(Abort::Access),
+        }
+    }
+
+    fn write_domain(&mut self, number: u8, part: Part<'_>) -> Result<(), Abort> {
+        let updater = &mut self.updater;
+        let outcome = match (number, part) {
+            (DATA, Part::Begin(size)) => updater.begin(size.map(|size| size.try_into().unwrap_or(u32::MAX))),
+            (DATA, Part::Data(_, bytes)) => updater.receive(bytes),
+            (DATA, Part::End(_)) => updater.finish(),
+            _ => return Err(Abort::Access),
+        };
+        outcome.map_err(abort)
+    }
+}
+
+/// What a refusal is to the SDO client; 1F57h says more.
+fn abort(refusal: Refusal) -> Abort {
+    match refusal {
+        Refusal::NotCleared | Refusal::Unspecified => Abort::DeviceState,
+        _ => Abort::Hardware,
+    }
+}

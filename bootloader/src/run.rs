@@ -1,0 +1,76 @@
+//! The one loop of the bootloader.
+
+use bsp::can::Transmitter;
+use bsp::led::Led;
+use bsp::{Alarm, Clock, Frames, StartUpWatchdog};
+use canopen::{Duration, Instant};
+use cortex_m::peripheral::SCB;
+
+use crate::outbox::Outbox;
+use crate::session::{Session, Then};
+
+/// Frames wait for a mailbox: no interrupt tells when one is free.
+const TRANSMIT_POLL: Duration = Duration::from_millis(1);
+
+/// What the loop owns.
+pub(crate) struct Run {
+    pub(crate) session: Session,
+    pub(crate) frames: Frames,
+    pub(crate) queue: Outbox,
+    pub(crate) transmitter: Transmitter,
+    pub(crate) alarm: Alarm,
+    pub(crate) watchdog: StartUpWatchdog,
+    pub(crate) led: Led,
+}
+
+impl Run {
+    /// Serves the bus and the flash.
+    pub(crate) fn forever(&mut self) -> ! {
+        self.session.join(&mut self.queue);
+        loop {
+            self.watchdog.feed();
+            self.receive();
+            let then = self.session.step(&mut self.queue);
+            self.queue.pump(&mut self.transmitter);
+            self.led.set(blink(Clock::now()));
+            match then {
+                Then::Again => (),
+                Then::Sleep(until) => self.sleep(until),
+                Then::Reset(latest) => self.reset(latest),
+            }
+        }
+    }
+
+    fn receive(&mut self) {
+        while let Some(received) = self.frames.dequeue() {
+            self.session.take(&received, &mut self.queue);
+            self.queue.pump(&mut self.transmitter);
+        }
+    }
+
+    /// Sleeps until then, or until a frame comes. Interrupts that are masked still end the sleep; what comes between the
+    /// look at the queue and the sleep is not slept over.
+    fn sleep(&mut self, until: Instant) {
+        let soon = Clock::now() + TRANSMIT_POLL;
+        let until = if self.queue.is_empty() { until } else { until.min(soon) };
+        cortex_m::interrupt::free(|_| {
+            self.alarm.set(until);
+            if !self.frames.ready() {
+                cortex_m::asm::wfi();
+            }
+        });
+    }
+
+    /// Resets the chip once everything is on the wire.
+    fn reset(&mut self, latest: Instant) {
+        let all_is_said = self.queue.is_empty() && self.transmitter.is_idle();
+        if all_is_said || Clock::now() >= latest {
+            SCB::sys_reset()
+        }
+    }
+}
+
+/// Two short flashes and a pause, in a little more than a second: 2^17 us each.
+fn blink(now: Instant) -> bool {
+    matches!(now.0 >> 17 & 7, 0 | 2)
+}

@@ -1,0 +1,60 @@
+//! The decision at every start: the application, or the bus.
+
+use bsp::handover::Handover;
+use bsp::loader::Loader;
+use bsp::vectors::Vectors;
+use bsp::{application, retained};
+use update::{Decision, Start, Status, Stay};
+
+use crate::target::TARGET;
+
+/// Why the bootloader stays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reason {
+    /// It was asked to, or there is no application that may be started: what 1F57h reads.
+    Stay(Status),
+    /// A checked image waits to be copied.
+    Copy,
+}
+
+/// What a start has come to.
+pub(crate) enum Outcome {
+    /// Start the application.
+    Application(Vectors),
+    /// Stay, for this reason, with what was left in RAM.
+    Stay(Reason, Option<Handover>),
+}
+
+/// Counts the reset, takes the request out of the note in RAM, and decides.
+pub(crate) fn decide(loader: &mut Loader) -> Outcome {
+    let note = retained::handover();
+    if let Some(note) = note {
+        retained::hand_over(&Handover { stay: false, ..note });
+    }
+    let trial = retained::trial().after(loader.reset);
+    retained::set_trial(trial);
+    let start = Start { stay: note.is_some_and(|note| note.stay), trial };
+    match update::boot(&mut loader.flash, &TARGET, start) {
+        Decision::Start(_) => application::vectors().map_or(stay(Stay::Asked, note), Outcome::Application),
+        Decision::Copy => Outcome::Stay(Reason::Copy, note),
+        Decision::Stay(why @ Stay::NoProgram(_)) => unsigned().map_or(stay(why, note), Outcome::Application),
+        Decision::Stay(why) => stay(why, note),
+    }
+}
+
+fn stay(why: Stay, note: Option<Handover>) -> Outcome {
+    Outcome::Stay(Reason::Stay(why.status()), note)
+}
+
+/// An application that a debugger has put there: vectors that can be, and no header at all. A development build starts it,
+/// as it trusts a key that everybody knows anyway.
+#[cfg(not(feature = "production"))]
+pub(crate) fn unsigned() -> Option<Vectors> {
+    application::vectors().filter(|_| application::has_no_header())
+}
+
+/// What leaves the house starts nothing that was not signed.
+#[cfg(feature = "production")]
+pub(crate) fn unsigned() -> Option<Vectors> {
+    None
+}

@@ -1,0 +1,89 @@
+//! Bring-up of the board for the bootloader, in two steps: what the decision at every start needs, and the bus.
+
+use stm32f4xx_hal::pac::{CAN1, GPIOA, GPIOB, Peripherals, RCC, TIM2};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Rcc;
+use update::Reset;
+
+use super::can::{Controller, Transmitter};
+use super::flash::Flash;
+use super::led::Led;
+use super::time_base::{self, Alarm, TimeInterrupt};
+use super::{ProgramFlash, StartUpWatchdog, board, clock_tree, crash};
+use crate::reset_cause::ResetCause;
+
+/// Clock, watchdog and flash.
+pub struct Loader {
+    /// Why the chip was reset. The flags are left for the application.
+    pub reset: Reset,
+    /// Runs already.
+    pub watchdog: StartUpWatchdog,
+    /// What an update works on.
+    pub flash: ProgramFlash,
+    /// For the bus, if it comes to that.
+    pub rest: Rest,
+}
+
+/// What is not started yet.
+pub struct Rest {
+    rcc: Rcc,
+    can: CAN1,
+    timer: TIM2,
+    ports: (GPIOA, GPIOB),
+}
+
+/// Everything for the bus.
+pub struct Bus {
+    /// The interrupt of the time base.
+    pub time: TimeInterrupt,
+    /// The alarm of the main loop.
+    pub alarm: Alarm,
+    /// The CAN controller, not yet on the bus.
+    pub can: Controller,
+    /// Its transmit mailboxes.
+    pub transmitter: Transmitter,
+    /// The status LED.
+    pub led: Led,
+}
+
+impl Loader {
+    /// The watchdog comes first: a crystal that does not start ends in a reset too. The clock is raised for the CRC of the
+    /// application, which takes nine times as long at the 16 MHz of a reset.
+    #[must_use]
+    pub fn start(device: Peripherals) -> Loader {
+        let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
+        board::keep_debugger(&device.DBGMCU);
+        let reset = reset(&device.RCC);
+        clock_tree::raise(&device.RCC, &device.FLASH);
+        let rcc = device.RCC.constrain();
+        let flash = ProgramFlash::new(Flash::new(device.FLASH));
+        let rest = Rest { rcc, can: device.CAN1, timer: device.TIM2, ports: (device.GPIOA, device.GPIOB) };
+        Loader { reset, watchdog, flash, rest }
+    }
+}
+
+impl Rest {
+    /// The bootloader stays: starts time base, CAN controller and LED, and forgets why the chip was reset.
+    #[must_use]
+    pub fn start(mut self) -> Bus {
+        self.rcc.csr().modify(|_, w| w.rmvf().set_bit());
+        let (time, [alarm, _]) = time_base::start(self.timer, &mut self.rcc);
+        let (gpioa, gpiob) = (self.ports.0.split(&mut self.rcc), self.ports.1.split(&mut self.rcc));
+        let (can, transmitter) = Controller::new(self.can, gpiob.pb9, gpiob.pb8, &mut self.rcc);
+        Bus { time, alarm, can, transmitter, led: Led::new(gpioa.pa5) }
+    }
+
+    /// The application starts: it finds the clocks as a reset leaves them.
+    pub fn stop(self) {
+        clock_tree::lower(&self.rcc);
+    }
+}
+
+fn reset(rcc: &RCC) -> Reset {
+    let cause = ResetCause::from_csr(rcc.csr().read().bits());
+    match cause {
+        _ if cause.is_unexpected() || crash::is_recorded() => Reset::Crash,
+        ResetCause::PowerOn | ResetCause::BrownOut => Reset::Power,
+        _ => Reset::Asked,
+    }
+}

@@ -1,0 +1,68 @@
+//! RAM that survives a reset, at one address in both images (memory.x, RETAINED), and never initialised.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use update::Trial;
+
+use crate::crash_record::{self, WORDS};
+use crate::handover::{self, Handover};
+
+/// Everything that is there. Both images must have the same layout: it changes with a new bootloader only.
+#[repr(C)]
+struct Retained {
+    handover: [AtomicU32; 2],
+    trial: AtomicU32,
+    crash: [AtomicU32; WORDS],
+}
+
+/// `used`, so that the compiler does not take it for zero at the start.
+#[used]
+#[unsafe(link_section = ".retained")]
+static RETAINED: Retained = Retained {
+    handover: [const { AtomicU32::new(0) }; 2],
+    trial: AtomicU32::new(0),
+    crash: [const { AtomicU32::new(0) }; WORDS],
+};
+
+/// What the other image left, if it did since power came.
+#[must_use]
+pub fn handover() -> Option<Handover> {
+    Handover::open(&load(&RETAINED.handover))
+}
+
+/// Leaves a note for the other image.
+pub fn hand_over(note: &Handover) {
+    let words: handover::Sealed = note.seal();
+    store(&RETAINED.handover, words);
+}
+
+/// How often the application has crashed since it last confirmed itself.
+#[must_use]
+pub fn trial() -> Trial {
+    Trial::from_word(RETAINED.trial.load(Ordering::Relaxed))
+}
+
+/// Keeps that count.
+pub fn set_trial(trial: Trial) {
+    RETAINED.trial.store(trial.word(), Ordering::Relaxed);
+}
+
+/// The words of the crash record.
+pub(super) fn crash() -> crash_record::Sealed {
+    load(&RETAINED.crash)
+}
+
+/// Replaces them.
+pub(super) fn set_crash(words: crash_record::Sealed) {
+    store(&RETAINED.crash, words);
+}
+
+fn load<const N: usize>(words: &[AtomicU32; N]) -> [u32; N] {
+    core::array::from_fn(|at| words.get(at).map_or(0, |word| word.load(Ordering::Relaxed)))
+}
+
+fn store<const N: usize>(words: &[AtomicU32; N], values: [u32; N]) {
+    for (word, value) in words.iter().zip(values) {
+        word.store(value, Ordering::Relaxed);
+    }
+}

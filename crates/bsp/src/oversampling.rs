@@ -1,0 +1,54 @@
+//! The sums of the conversions of a millisecond, channel by channel.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+/// Channels of one scan: pressure, its supply, thermistor, temperature sensor, VREFINT.
+pub const CHANNELS: usize = 5;
+/// Scans in a millisecond.
+pub const SCANS: usize = 16;
+/// Words with the conversions of a millisecond, two in each: the first is the lower half.
+pub const WORDS: usize = SCANS * CHANNELS / 2;
+
+/// Largest result of a conversion.
+const FULL_SCALE: usize = 4095;
+const _: () = {
+    assert!(FULL_SCALE * SCANS / 2 < 1 << 16, "the sum of a lower half must not reach into the upper one");
+    assert!(SCANS.is_multiple_of(2), "a channel has its conversions in both halves");
+};
+
+/// The sum of each channel. Both halves of a word are added at once: two scans are a whole number of words. Written out,
+/// because the firmware is compiled for size, and inner loops would cost three times as much.
+#[allow(clippy::many_single_char_names)] // The five words of two scans.
+pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
+    let load = |word: &AtomicU32| word.load(Ordering::Relaxed);
+    let [a, b, c, d, e] =
+        words.as_chunks().0.iter().fold([0; CHANNELS], |[a, b, c, d, e], [v, w, x, y, z]| {
+            [a + load(v), b + load(w), c + load(x), d + load(y), e + load(z)]
+        });
+    let (low, high) = (|sum: u32| sum & 0xFFFF, |sum: u32| sum >> 16);
+    [low(a) + high(c), high(a) + low(d), low(b) + high(d), high(b) + low(e), low(c) + high(e)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As DMA leaves them, from the result of each conversion.
+    fn buffer(conversion: impl Fn(usize) -> u32) -> [AtomicU32; WORDS] {
+        core::array::from_fn(|word| AtomicU32::new(conversion(2 * word) | conversion(2 * word + 1) << 16))
+    }
+
+    #[test]
+    fn every_conversion_counts_for_its_channel() {
+        for one in 0..SCANS * CHANNELS {
+            let mut expected = [0; CHANNELS];
+            expected[one % CHANNELS] = 1;
+            assert_eq!(sums(&buffer(|n| u32::from(n == one))), expected);
+        }
+    }
+
+    #[test]
+    fn the_largest_sums_do_not_run_over() {
+        assert_eq!(sums(&buffer(|_| 4095)), [16 * 4095; CHANNELS]);
+    }
+}

@@ -1,0 +1,108 @@
+//! What must be true of a table, so that everything at run time can rely on it. The panics here are compile errors.
+
+use super::compile::effective_limits;
+use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type, image_size};
+use crate::device::{RPDOS, TPDOS};
+use crate::pdo::WATCHED;
+use crate::sdo::BUFFER;
+
+/// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
+/// are others, attributes that fit together, no more PDOs than a device has room for.
+///
+/// # Panics
+/// During compilation, when a row is wrong.
+pub const fn check(rows: &[Object]) {
+    assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
+    assert!(pdos(rows, 0x1400) <= RPDOS, "more RPDOs than a device has");
+    assert!(pdos(rows, 0x1800) <= TPDOS, "more TPDOs than a device has");
+    let (mut i, mut sent) = (0, 0);
+    while i < rows.len() {
+        check_row(&rows[i]);
+        sent += matches!(rows[i].mapping, Mapping::Tpdo) as usize;
+        if i > 0 {
+            assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
+        }
+        let has_sub_0 = rows[i].sub == 0 || (i > 0 && rows[i - 1].index == rows[i].index);
+        assert!(has_sub_0, "an object has no sub-index 0");
+        assert!(rows[i].sub < u8::MAX, "an object has more entries than a series can");
+        let is_pdo = matches!(rows[i].index, 0x1400..=0x15FF | 0x1800..=0x19FF);
+        assert!(!is_pdo || rows[i].sub > 0 || has(rows, rows[i].key() | 1), "a PDO has no COB-ID");
+        if let Rule::EventTimerOf(number) = rows[i].rule {
+            assert!(has(rows, (0x1800 | number as u32) << 8 | 5), "there is no such event timer");
+        }
+        i += 1;
+    }
+    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
+}
+
+/// PDOs with communication objects among the 512 indexes from `first` on.
+const fn pdos(rows: &[Object], first: u16) -> usize {
+    let (mut total, mut i) = (0, 0);
+    while i < rows.len() {
+        let is_one = rows[i].index & 0xFE00 == first && rows[i].sub == 1;
+        (total, i) = (total + is_one as usize, i + 1);
+    }
+    total
+}
+
+const fn has(rows: &[Object], key: u32) -> bool {
+    let mut i = 0;
+    while i < rows.len() && rows[i].key() != key {
+        i += 1;
+    }
+    i < rows.len()
+}
+
+const fn check_row(row: &Object) {
+    check_limits(row);
+    match (row.default, row.kind) {
+        (DefaultValue::Integer(value), _) => {
+            let (low, high) = effective_limits(row);
+            assert!(
+                row.kind.range().is_some() && low <= value && value <= high,
+                "the default is out of range"
+            );
+        }
+        (DefaultValue::Real(value), Type::Real32) => {
+            assert!(value.is_finite(), "the default is not a number");
+        }
+        (DefaultValue::Text(text), Type::VisibleString(capacity)) => {
+            assert!(capacity as usize <= BUFFER, "an SDO transfer has no room for the text");
+            assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
+        }
+        (DefaultValue::NodeId(_), Type::Unsigned32) => (),
+        (DefaultValue::None, Type::Domain) => {
+            assert!(matches!(row.rule, Rule::Application(_)), "a domain belongs to the application");
+        }
+        _ => panic!("the default is of another type"),
+    }
+    let mappable = !matches!(row.mapping, Mapping::No);
+    let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
+    assert!(!mappable || fits, "a mapped object has no place in a PDO");
+    assert!(!mappable || !row.rule.is_computed(), "a mapped object has no place in the image");
+    let saved = !matches!(row.group, Group::Volatile);
+    assert!(!saved || matches!(row.access, Access::ReadWrite), "only a parameter can be saved");
+    let tpdo = matches!(row.mapping, Mapping::Tpdo);
+    assert!(!tpdo || row.access.is_readable(), "a TPDO sends what can be read");
+    let rpdo = matches!(row.mapping, Mapping::Rpdo);
+    // An RPDO writes without a check, so what it writes must have none: any value of an integer type.
+    let takes_any = matches!(row.rule, Rule::Plain) && row.limits.is_none() && row.kind.range().is_some();
+    assert!(!rpdo || (row.access.is_writable() && takes_any), "an RPDO writes what takes any value");
+    let is_byte = matches!(row.kind, Type::Unsigned8);
+    assert!(!matches!(row.rule, Rule::Setting) || is_byte, "a setting is a number of eight bits");
+    let is_time = matches!(row.kind, Type::Unsigned16) && matches!(row.group, Group::Volatile);
+    assert!(
+        !matches!(row.rule, Rule::EventTimerOf(_)) || is_time,
+        "an event timer is saved under its own index"
+    );
+    let listed = matches!(row.rule, Rule::ErrorCount | Rule::ErrorEntry);
+    assert!(!listed || row.index == 0x1003, "the error list is object 1003h");
+}
+
+const fn check_limits(row: &Object) {
+    if let Some((low, high)) = row.limits {
+        let Some((min, max)) = row.kind.range() else { panic!("limits of what is not an integer") };
+        assert!(min <= low && low <= high && high <= max, "limits are wider than the type");
+        assert!(row.kind.size() <= 4, "limits of more than 32 bits are not checked");
+    }
+}

@@ -1,0 +1,33 @@
+//! The run-time tables say what the rows say.
+
+use crate::bench::{DICTIONARY, rows};
+use canopen::sdo::Abort;
+
+#[test]
+fn every_row_has_its_entry_and_its_place() {
+    let mut offset = 0;
+    let mut image: Vec<u8> = DICTIONARY.defaults().to_vec();
+    assert_eq!(rows().count(), DICTIONARY.entries().count());
+    for (row, entry) in rows() {
+        assert_eq!((row.index, row.sub), (entry.index(), entry.sub()));
+        let found = DICTIONARY.find(row.index, row.sub).unwrap();
+        assert_eq!(found.field(), entry.field());
+        assert_eq!(found.field(), DICTIONARY.field(row.index, row.sub));
+        // Each value has bytes of its own: after all are marked, none of them is left.
+        let len = entry.field().get(&image).len();
+        entry.field().set(&mut image, &vec![0xA5; len]);
+        offset += len;
+    }
+    assert_eq!(image.iter().filter(|&&byte| byte == 0xA5).count(), image.len());
+    assert!(offset >= image.len());
+}
+
+#[test]
+fn what_is_missing_is_told_apart() {
+    for (row, _) in rows() {
+        assert_eq!(DICTIONARY.find(row.index, 0xFF).unwrap_err(), Abort::NoSubIndex);
+    }
+    for index in [0, 0x0FFF, 0x1002, 0x1402, 0x1602, 0x6108, 0x6201, 0xFFFF] {
+        assert_eq!(DICTIONARY.find(index, 0).unwrap_err(), Abort::NoObject, "{index:04X}h");
+    }
+}

@@ -1,0 +1,102 @@
+"""The firmware is replaced and put back, at the speed of a real board: to B by a stock python-canopen client that follows the
+sequence of CiA 302-3, back to A by `nodectl update`.
+"""
+
+import json
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import canopen
+import pytest
+from simulator import PATIENCE, Master, Simulator
+
+STOP, START, CLEAR = 0, 1, 3
+BUSY = 1
+BOOT = int.from_bytes(b"TOOB", "little")
+DATA, CONTROL, IDENTIFICATION, STATUS = 0x1F50, 0x1F51, 0x1F56, 0x1F57
+
+
+@pytest.fixture
+def simulator():
+    simulator = Simulator("--bitrate", "1000", speed="real")
+    yield simulator
+    simulator.process.kill()
+
+
+def image(path: Path, version: str) -> Path:
+    """The application, signed as another version: its identification differs with a word that is added to its code."""
+    elf = Path(os.environ["NODE_IMAGES"]) / "firmware"
+    signed = elf.with_name("firmware.img").read_bytes()
+    code = path.with_suffix(".bin")
+    code.write_bytes(signed[512:] + b"\xb0" * 4)
+    sign = [os.environ["SIGN_COMMAND"], "image", code, "--image-version", version, "--out", path]
+    subprocess.run(sign, check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    return path
+
+
+def identification(file: Path) -> int:
+    """CRC-32 of the code, where docs/update.md has it."""
+    return int.from_bytes(file.read_bytes()[28:32], "little")
+
+
+def until(condition, what: str):
+    """Asks again and again, as a master does that does not know how long a step takes."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        try:
+            if condition():
+                return
+        except canopen.SdoCommunicationError:
+            pass
+        time.sleep(0.1)
+    raise AssertionError(f"the node does not {what}")
+
+
+def command_that_restarts(master: Master, command: int) -> None:
+    """It may be acknowledged or not."""
+    try:
+        master.write(CONTROL, 1, command, 1)
+    except canopen.SdoCommunicationError:
+        pass
+
+
+def update_by_the_standard(master: Master, program: bytes) -> None:
+    command_that_restarts(master, STOP)
+    until(lambda: master.read(CONTROL, 1) == 0, "stop")
+    assert master.read(0x1000) == BOOT
+    master.write(CONTROL, 1, CLEAR, 1)
+    until(lambda: not master.read(STATUS, 1) & BUSY, "clear")
+    assert master.read(STATUS, 1) == 0
+    with master.node.sdo.open(DATA, 1, "wb", size=len(program), block_transfer=True) as stream:
+        stream.write(program)
+    until(lambda: not master.read(STATUS, 1) & BUSY, "verify")
+    assert master.read(STATUS, 1) == 0
+    command_that_restarts(master, START)
+    until(lambda: master.read(CONTROL, 1) == 1, "start")
+
+
+def nodectl(simulator: Simulator, *arguments) -> dict:
+    bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
+    command = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", "1", "--json", *arguments]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=10 * PATIENCE)
+    return json.loads(done.stdout)
+
+
+def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, tmp_path: Path):
+    a = Path(os.environ["NODE_IMAGES"]) / "firmware.img"
+    b = image(tmp_path / "b.img", "0.2.0")
+    master = Master(simulator)
+    # What a restarting node swallows must be noticed soon.
+    master.node.sdo.RESPONSE_TIMEOUT = 2.0
+    until(lambda: master.read(IDENTIFICATION, 1) == identification(a), "run A")
+    update_by_the_standard(master, b.read_bytes())
+    assert master.read(IDENTIFICATION, 1) == identification(b)
+    master.close()
+
+    # The two say the same version: a master that has only that to go by needs no force.
+    report = nodectl(simulator, "update", a)
+    assert report["result"] == "updated"
+    assert (report["old_identification"], report["new_identification"]) == (identification(b), identification(a))
+    assert simulator.quit()["bus"]["errors"] == 0

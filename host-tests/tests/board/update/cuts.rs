@@ -1,0 +1,181 @@
+//! The power goes, with the real bootloader. Crate `update` does the same with every outcome of a torn word; here it is the
+//! bootloader with its flash driver, on a flash that the emulator tears.
+//!
+//! B is a program of five words, so that all of its update can be cut at every operation; A is the real application.
+
+use canbus::Time;
+use sign::image::Image;
+
+use super::bench::{Bench, CLEAR, STATUS, signed, version_a, version_b};
+use crate::support::SECOND;
+
+/// Where B leaves its mark when it runs: its own address, in RAM that the bootloader does not use.
+const MARK: u32 = 0x2001_0000;
+/// Never comes.
+const NO_CUT: u64 = u64::MAX >> 1;
+/// The operations of a copy: two sectors, the program, the mark that it is done.
+const COPY: u64 = 2 + 133 + 1;
+/// Of so many cuts in the copy, two are followed by another one.
+const SECOND_CUTS: u64 = 7;
+/// The longest that a recovery takes: two erases, and a start.
+const PATIENCE: u32 = 200;
+
+/// Stack pointer, reset vector, and `ldr r0, [pc, #4]`, `str r0, [r0]`, `b .` with the address of the mark (the code starts
+/// at 0801 0200h).
+fn small() -> Image {
+    let words: [u32; 5] = [0x2000_4000, 0x0801_0209, 0x6000_4801, 0xBF00_E7FE, MARK];
+    signed(words.iter().flat_map(|word| word.to_le_bytes()).collect(), |_| ())
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Runs {
+    A,
+    B,
+}
+
+/// A node that is updated and loses its power, and what its flash held at first.
+struct Victim {
+    bench: Bench,
+    flash: Vec<u8>,
+    a: Vec<u8>,
+    b: Vec<u8>,
+    image: Vec<u8>,
+}
+
+impl Victim {
+    fn new() -> Victim {
+        let mut bench = Bench::running();
+        let a = bench.application();
+        let image = small().to_bytes();
+        let mut b = vec![0xFF; a.len()];
+        b[..image.len()].copy_from_slice(&image);
+        let flash = bench.machine().flash();
+        Victim { bench, flash, a, b, image }
+    }
+
+    /// A again, as it was at first.
+    fn restore(&mut self) {
+        self.bench.machine().set_flash(&self.flash).unwrap();
+        self.bench.power_cycle();
+        assert_eq!(self.wait(), Some(Runs::A));
+    }
+
+    /// The whole sequence of a master that notices nothing, with a cut in that operation of the flash. The operations that
+    /// there were.
+    fn update(&mut self, cut: u64) -> u64 {
+        let bench = &mut self.bench;
+        bench.stop();
+        let flash = bench.machine().peripherals_mut().flash_mut();
+        let before = flash.operations();
+        flash.cut_power_at_operation(cut);
+        go_on_without_the_node(bench, &self.image);
+        bench.machine().peripherals_mut().flash_mut().operations() - before
+    }
+
+    /// Switches the power on, with another cut in the recovery. Whether it came to that operation.
+    fn cut_again(&mut self, second: u64) -> bool {
+        self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(second);
+        self.bench.power_cycle();
+        self.bench.run(SECOND * 2);
+        self.bench.machine().next_event() == Time::NEVER
+    }
+
+    /// Switches the power on for good, and waits for what runs in the end.
+    fn recover(&mut self) -> Option<Runs> {
+        self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(NO_CUT);
+        self.bench.power_cycle();
+        self.wait()
+    }
+
+    /// What runs, if that is all of A, which answers, or all of B, which leaves its mark.
+    fn wait(&mut self) -> Option<Runs> {
+        for _ in 0..PATIENCE {
+            self.bench.run(Time::from_millis(20));
+            let mut mark = [0; 4];
+            self.bench.machine().read(MARK, &mut mark).unwrap();
+            if u32::from_le_bytes(mark) == MARK {
+                return (self.bench.application() == self.b).then_some(Runs::B);
+            }
+            if self.bench.is_running() {
+                return (self.bench.application() == self.a).then_some(Runs::A);
+            }
+        }
+        None
+    }
+}
+
+/// Clear, download, and time for the copy.
+fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
+    let _ = bench.command(CLEAR);
+    let _ = (0..3000).find(|_| {
+        bench.run(Time::from_millis(1));
+        !matches!(bench.read(STATUS).as_deref(), Ok([1, ..]))
+    });
+    let _ = bench.download(image);
+    let _ = (0..3000).find(|_| {
+        bench.run(Time::from_millis(1));
+        !matches!(bench.read(STATUS).as_deref(), Ok([1, ..]))
+    });
+}
+
+/// Cuts at every operation whose number has this rest by two, so that two threads share the work.
+fn cut_everywhere(rest: u64) {
+    let mut victim = Victim::new();
+    let all = victim.update(NO_CUT);
+    assert_eq!(victim.recover(), Some(Runs::B), "without a cut");
+    let (mut runs, mut twice) = ([0; 2], 0);
+    victim.restore();
+    for cut in (1..=all).filter(|cut| cut % 2 == rest) {
+        victim.update(cut);
+        let second = 1 + cut * 37 % COPY;
+        if cut > all / 2 && cut % SECOND_CUTS < 2 {
+            twice += usize::from(victim.cut_again(second));
+        }
+        let Some(found) = victim.recover() else { panic!("cut {cut} of {all}, perhaps then {second}") };
+        runs[found as usize] += 1;
+        if found == Runs::B {
+            victim.restore();
+        }
+    }
+    println!(
+        "{} cuts in an update of {all} operations, {twice} of them with a second one: {} times A, {} times B",
+        runs[0] + runs[1],
+        runs[0],
+        runs[1]
+    );
+    assert!(runs[0] > 60 && runs[1] > 60 && twice > 10);
+}
+
+#[test]
+fn the_power_goes_at_every_even_operation_of_an_update() {
+    cut_everywhere(0);
+}
+
+#[test]
+fn the_power_goes_at_every_odd_operation_of_an_update() {
+    cut_everywhere(1);
+}
+
+/// Both are the real application here: whichever it is, it answers.
+#[test]
+fn whenever_the_power_goes_the_node_comes_back_with_one_of_the_two() {
+    const CUTS: u64 = 8;
+    let (a, b) = (version_a(), version_b(0));
+    let words = (b.to_bytes().len() / 4) as u64;
+    // Clear, download, the copy with its erases; the commit record in between.
+    let all = 6 + words + 4 + 2 + words;
+    let (mut old, mut new) = (0, 0);
+    for cut in 0..CUTS {
+        let mut bench = Bench::running();
+        bench.stop();
+        bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(1 + cut * all / CUTS + cut);
+        go_on_without_the_node(&mut bench, &b.to_bytes());
+        bench.power_cycle();
+        bench.run(SECOND * 6);
+        let found = bench.identification_of_running();
+        assert!([a.header.code_crc(), b.header.code_crc()].contains(&found), "cut {cut}");
+        if found == a.header.code_crc() { old += 1 } else { new += 1 }
+    }
+    println!("{CUTS} cuts: {old} times the old application, {new} times the new one");
+    assert!(old > 0 && new > 0);
+}

@@ -1,0 +1,131 @@
+//! The field update with the images as they are: the application, the bootloader, and a master that follows CiA 302-3.
+
+mod bench;
+mod corrupted;
+mod cuts;
+mod fleet;
+
+use canbus::Time;
+use update::{HEADER_LEN, Status};
+
+use crate::support::SECOND;
+use bench::{
+    BOOT, Bench, CONTROL, DEVICE_TYPE, HEADER, IDENTIFICATION, PROMPT, START, signed, version_a, version_b,
+};
+
+#[test]
+fn the_application_reads_its_identification_from_its_header() {
+    let mut bench = Bench::running();
+    assert_eq!(bench.word(IDENTIFICATION), version_a().header.code_crc());
+}
+
+#[test]
+fn a_node_is_updated_to_b_and_back() {
+    let mut bench = Bench::running();
+    bench.update(&version_b(0));
+    bench.update(&version_a());
+    assert_eq!(bench.world.summary(1.0, 0).bus.errors, 0);
+}
+
+/// All of it is on the wire, and the flash is erased and programmed: what does the node add?
+#[test]
+fn an_update_takes_what_the_wire_takes() {
+    /// Of 128 KiB in blocks of 127 at 116 bits a frame, nothing but the frames.
+    const WIRE: [(u32, f64); 3] = [(1000, 2.19), (500, 4.38), (250, 8.76)];
+    let image = signed(noise(128 * 1024 - HEADER_LEN), |_| ()).to_bytes();
+    for (kbit, wire) in WIRE {
+        let mut bench = Bench::new(&format!("--bitrate {kbit}"), kbit * 1000, 1);
+        bench.run(SECOND);
+        bench.stop();
+        let [clear, download, copy] = [
+            bench.time(Bench::clear),
+            bench.time(|bench| bench.download(&image).unwrap()),
+            bench.time(|bench| assert_eq!(bench.wait_for_flash(), Status::GOOD)),
+        ];
+        let share = download / wire;
+        println!(
+            "{kbit} kbit/s: clear {clear:.2} s, download {download:.2} s ({share:.3} of the wire limit of {wire} s), \
+             check and copy {copy:.2} s"
+        );
+        assert!(share < 1.15, "{kbit} kbit/s");
+    }
+}
+
+/// Has as many stuff bits as code has, or more.
+fn noise(length: usize) -> Vec<u8> {
+    let mut random = fastrand::Rng::with_seed(1);
+    (0..length).map(|_| random.u8(..)).collect()
+}
+
+/// Both areas, while every sector erases.
+#[test]
+fn the_bus_is_answered_while_the_flash_erases() {
+    let mut bench = Bench::running();
+    bench.stop();
+    bench.slowest = Time::ZERO;
+    bench.clear();
+    println!("slowest answer while staging is cleared: {:.2} ms", bench.slowest.as_secs_f64() * 1e3);
+    assert!(bench.slowest <= PROMPT);
+    bench.download(&version_b(0).to_bytes()).unwrap();
+    let mut slow = 0;
+    let mut worst = Time::ZERO;
+    while {
+        bench.slowest = Time::ZERO;
+        let busy = bench.status().busy;
+        worst = worst.max(bench.slowest);
+        slow += u32::from(bench.slowest > PROMPT);
+        busy
+    } {
+        bench.run(Time::from_millis(1));
+    }
+    println!("slowest answer in check and copy: {:.2} ms", worst.as_secs_f64() * 1e3);
+    assert!(slow <= 2, "only the two checks of the signature may take longer: {slow} answers did");
+    assert!(worst < Time::from_millis(100));
+}
+
+#[test]
+fn without_an_application_the_node_is_126_at_250_kbit() {
+    let mut bench = Bench::new("--bitrate 250", 250_000, 126);
+    bench.machine().write(HEADER, &[0xFF; 1024]).unwrap();
+    bench.power_cycle();
+    bench.run(SECOND);
+    assert_eq!(bench.read(DEVICE_TYPE).unwrap(), BOOT);
+    assert_eq!(bench.status().code, 1);
+    bench.clear();
+    bench.download(&version_a().to_bytes()).unwrap();
+    assert_eq!(bench.wait_for_flash(), Status::GOOD);
+    bench.command(START).unwrap();
+    bench.node = 1;
+    assert_eq!(bench.identification_of_running(), version_a().header.code_crc());
+}
+
+#[test]
+fn an_application_that_crashes_again_and_again_stays_reachable() {
+    const PC: u8 = 15;
+    let mut bench = Bench::running();
+    for _ in 0..3 {
+        bench.machine().set_register(PC, 0x3000_0000);
+        bench.run(SECOND);
+    }
+    assert_eq!(bench.read(DEVICE_TYPE).unwrap(), BOOT);
+    let status = bench.status();
+    assert_eq!((status.code, status.detail), (70, 3), "{status}");
+    assert_eq!(bench.start(), version_a().header.code_crc(), "it gets another try");
+    bench.run(SECOND * 12);
+    bench.machine().set_register(PC, 0x3000_0000);
+    bench.run(SECOND);
+    assert_eq!(bench.read(CONTROL).unwrap(), [1], "a crash after it was well counts for itself");
+}
+
+/// The linker holds the bootloader to its budget; that of the application is printed beside it.
+#[test]
+fn the_bootloader_fits_into_its_two_sectors() {
+    const KIB: u32 = 1024;
+    let mut bench = Bench::running();
+    bench.stop();
+    let memory = bench.world.summary(1.0, 0).nodes[0].memory;
+    println!("bootloader: {} bytes of flash, budget {}", memory.bootloader_flash, 32 * KIB);
+    println!("application: {} bytes of flash, budget {}", memory.flash, 96 * KIB);
+    println!("application: {} bytes of RAM, {} of stack, budget {}", memory.ram, memory.stack, 24 * KIB);
+    assert!(memory.bootloader_flash > 0 && memory.bootloader_flash <= 32 * KIB);
+}

@@ -1,0 +1,52 @@
+//! What the installer of the lift does, over SDO: each node is one of the two units, a PDO of the other is off; then both
+//! are saved and reset.
+
+use crate::controller::{LAMP_OFF, LAMP_ON, LANDINGS, call};
+use crate::table::{LOAD, POSITION};
+
+/// A lift that can be installed.
+pub(crate) trait Site {
+    /// Writes an object of a node.
+    fn write(&mut self, node: u8, index: u16, sub: u8, bytes: &[u8]);
+    /// Sends an NMT command, and waits until it is done.
+    fn nmt(&mut self, command: u8, node: u8);
+
+    /// The node at the tape in the shaft: 0.1 mm a mark, no index.
+    fn describe_position_unit(&mut self) {
+        self.write(POSITION, 0x2311, 3, &0_f32.to_le_bytes());
+        self.write(POSITION, 0x2100, 1, &[6]);
+        self.write(POSITION, 0x2101, 1, &100_000_u32.to_le_bytes());
+        self.write(POSITION, 0x2105, 0, &[0]);
+        self.write(POSITION, 0x63B8, 1, &20_100_i32.to_le_bytes());
+        self.write(POSITION, 0x63B4, 1, &9_900_i32.to_le_bytes());
+        self.write(POSITION, 0x1901, 1, &0xC000_0188_u32.to_le_bytes());
+    }
+
+    /// The car is at the lowest landing. The description must have reached the measurement.
+    fn preset(&mut self) {
+        self.write(POSITION, 0x6382, 1, &LANDINGS[0].to_le_bytes());
+    }
+
+    /// The node at the cylinder and the panel.
+    fn describe_load_and_panel(&mut self) {
+        self.write(LOAD, 0x2301, 1, &[0]);
+        for (sub, value) in [(1, 2.0e5_f32), (2, 0.0), (3, 6.0e5), (4, 800.0)] {
+            self.write(LOAD, 0x2311, sub, &value.to_le_bytes());
+        }
+        for (sub, kilograms) in [(1, 30_u16), (2, 300), (3, 600), (4, 660)] {
+            self.write(LOAD, 0x6483, sub, &kilograms.to_le_bytes());
+        }
+        self.write(LOAD, 0x2320, 2, &call(4).to_le_bytes()[..6]);
+        self.write(LOAD, 0x2321, 1, &LAMP_OFF.to_le_bytes()[..6]);
+        self.write(LOAD, 0x2321, 2, &LAMP_ON.to_le_bytes()[..6]);
+        self.write(LOAD, 0x1906, 1, &0xC000_018C_u32.to_le_bytes());
+    }
+
+    /// All of it is there after a reset.
+    fn save(&mut self) {
+        for node in [POSITION, LOAD] {
+            self.write(node, 0x1010, 1, b"save");
+            self.nmt(0x81, node);
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! What the application of this project says of itself where nobody says otherwise.
+
+use anyhow::{Context, Result};
+use update::{Description, Version};
+
+use crate::code;
+use crate::image::Image;
+use crate::key;
+
+/// The product that the bootloader answers to (1018h:2). An image has all personalities.
+pub const PRODUCT: u32 = node::Personality::Pressure.product_code();
+/// The hardware revisions that there are: 0.
+pub const HARDWARE: u32 = 1;
+
+/// Reads a version as `1.2.3`.
+///
+/// # Errors
+/// It is something else.
+pub fn version(text: &str) -> Result<Version> {
+    let numbers: Vec<u16> = text.split('.').map(str::parse).collect::<Result<_, _>>()?;
+    let numbers: [u16; 3] = numbers.try_into().ok().context("three numbers with points between them")?;
+    let [major, minor, patch] = numbers;
+    Ok(Version { major, minor, patch })
+}
+
+/// The image of an application, signed with the development key, of the version of this project.
+///
+/// # Errors
+/// The file is no application.
+pub fn development_image(file: &[u8]) -> Result<Image> {
+    let version = version(env!("CARGO_PKG_VERSION"))?;
+    let about = Description { product: PRODUCT, hardware: HARDWARE, version, counter: 0 };
+    Image::sign(about, code::read(file)?, &key::development())
+}
