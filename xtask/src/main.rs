@@ -2,6 +2,7 @@
 
 mod bench;
 mod command;
+mod coverage;
 mod eds;
 mod fuzz;
 mod images;
@@ -54,6 +55,8 @@ enum Command {
     Fuzz(fuzz::Flags),
     /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
     Bench(bench::Options),
+    /// Print which lines of the pure crates the tests run
+    Coverage,
     /// Print what each task of the firmware takes at worst, and when it ends at the latest
     Timing,
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
@@ -73,6 +76,7 @@ fn main() -> ExitCode {
         Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
+        Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),
         Command::Timing => timing::print().map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };

@@ -1,0 +1,54 @@
+//! `cargo xtask coverage`: which lines of the pure crates the tests run, by cargo-llvm-cov.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::command::{cargo, root, run, target_dir};
+use crate::native;
+
+/// The crates that are measured, and those whose tests count as well.
+const PURE: [&str; 5] = ["canopen", "profiles", "storage", "update", "node"];
+const TESTS: [&str; 2] = ["host-tests", "fuzz"];
+
+/// Not measured: what is no part of the five, their mocks, and the tables of objects with what makes dictionaries of
+/// them. Those are evaluated by the compiler, which counts no lines; what they come to is compared with `host-tests/tables`.
+const IGNORED: &str = "(tests?|mock|host-tests|emulator|bsp|tools)(/|\\.rs)\
+    |dictionary/(compile|object)\\.rs\
+    |node/src/(pressure|encoder|combined|lift|communication)/(pdos|profile|manufacturer|shift|start_up|objects|mod)\\.rs";
+
+/// Debian's tools, of the LLVM that this compiler comes with.
+const DEBIAN_LLVM: &str = "/usr/lib/llvm-22/bin";
+
+/// Prints a line for each file, and the sum.
+pub(crate) fn print() -> Result<()> {
+    let mut command = cargo();
+    command.args(["llvm-cov", "test", "--quiet", "--profile", "sim", "--summary-only"]);
+    for package in PURE.iter().chain(&TESTS) {
+        command.args(["-p", package]);
+    }
+    command.args(["--ignore-filename-regex", IGNORED]).env("PATH", with_tool()?);
+    if std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0") {
+        native::ensure_packages(&native::missing_packages(&["llvm-22"]), "its llvm-cov reads the counters")?;
+        let tool = |name: &str| Path::new(DEBIAN_LLVM).join(name);
+        command.env("LLVM_COV", tool("llvm-cov")).env("LLVM_PROFDATA", tool("llvm-profdata"));
+    } else {
+        run(Command::new("rustup").args(["component", "add", "llvm-tools"]).current_dir(root()))
+            .context("llvm-cov is missing; with rustup: rustup component add llvm-tools")?;
+    }
+    run(&mut command)
+}
+
+/// The search path with cargo-llvm-cov in it, which is installed below the build directory when it is missing.
+fn with_tool() -> Result<std::ffi::OsString> {
+    let tools = target_dir().join("tools");
+    if !tools.join("bin/cargo-llvm-cov").exists() {
+        eprintln!("installing cargo-llvm-cov to {}", tools.display());
+        run(cargo().args(["install", "--quiet", "--locked", "cargo-llvm-cov", "--root"]).arg(&tools))?;
+    }
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders: Vec<PathBuf> =
+        std::iter::once(tools.join("bin")).chain(std::env::split_paths(&path)).collect();
+    Ok(std::env::join_paths(folders)?)
+}
