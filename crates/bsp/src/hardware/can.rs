@@ -11,7 +11,7 @@ use stm32f4xx_hal::rcc::Rcc;
 use crate::bit_rate_detection::Heard;
 use crate::bit_timing::BitTiming;
 use crate::bus_state::BusState;
-use crate::filters::{self, BANKS, Bank, Banks, Fifo, Pair};
+use crate::filters::{self, BANKS, Bank, Fifo, Pair};
 use crate::transmit_queue::{Mailboxes, Offer};
 
 /// The registers as bxcan wants them.
