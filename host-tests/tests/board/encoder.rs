@@ -108,7 +108,8 @@ fn a_fast_shaft_is_followed_both_ways_across_the_wrap() {
         assert!((i32::from(speed) - expected).abs() <= expected.abs() / 100, "{speed} instead of {expected}");
         let summary = run(&mut world, Time::from_millis(1));
         assert!(summary.nodes[0].incidents.is_empty() && summary.nodes[0].unmodelled.is_empty(), "{summary}");
-        assert!((summary.nodes[0].sampling.rate - 1000.0).abs() < 1e-6, "{summary}");
+        // The first and the last start may be a lock late, a microsecond in the seconds between them.
+        assert!((summary.nodes[0].sampling.rate - 1000.0).abs() < 1e-3, "{summary}");
         println!("{summary}");
     }
 }

@@ -82,7 +82,8 @@ fn sampling_keeps_its_pace_on_a_full_bus() {
     println!("{after}");
     assert_clean(&after);
     assert!(after.bus.load > 0.99);
-    assert!((sampling.rate - 1000.0).abs() < 1e-6, "{} samples a second", sampling.rate);
+    // The first and the last start may be a lock late, a microsecond in the seconds between them.
+    assert!((sampling.rate - 1000.0).abs() < 1e-3, "{} samples a second", sampling.rate);
     assert!(sampling.worst_jitter < 20.0, "{} us", sampling.worst_jitter);
     assert_eq!(responses, requests, "every SDO request is answered");
     assert!(requests as u64 > SYNCS / 2, "an answer comes within two milliseconds");

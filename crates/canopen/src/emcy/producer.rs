@@ -7,7 +7,8 @@ use crate::transmit::RETRY;
 use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
-/// Messages that can wait for the queue or for the inhibit time; what comes on top of that is only in the history.
+/// Messages that can wait for the queue or for the inhibit time; what comes on top of that takes the place of
+/// the newest.
 const WAITING: usize = 8;
 
 /// Faults, their history and the messages about them.
@@ -78,8 +79,12 @@ impl Producer {
 
     fn report(&mut self, code: u16, detail: [u8; 5], now: Instant) {
         let message = Message { code, register: self.register(), detail };
-        // A full queue keeps the older messages: they tell how the trouble began.
-        let _ = self.waiting.push_back(message);
+        // Of a full queue the newest message gives way: the older ones tell how the trouble began, this one how it stands.
+        if self.waiting.push_back(message).is_err()
+            && let Some(newest) = self.waiting.back_mut()
+        {
+            *newest = message;
+        }
         self.due = self.due.min(self.inhibited_until.max(now));
     }
 
