@@ -48,6 +48,10 @@ def simulator(tmp_path_factory):
     log = tmp_path_factory.mktemp("log") / "bus.log"
     simulator = Simulator("--bitrate", "1000", "--pressure", "const:250000", "--candump", str(log), speed="real")
     simulator.log = log
+    # It has booted once before anybody resets it, or that boot-up would be taken for the one of the reset.
+    first = Master(simulator)
+    first.listen(0x701).next()
+    first.close()
     yield simulator
     simulator.process.kill()
 
