@@ -67,6 +67,8 @@ def test_a_master_reads_what_the_node_sends():
     simulator = Simulator("--node", f"{NODE_ID}:lift", "--bitrate", "1000", speed="real")
     master = Master(simulator)
     try:
+        # A heartbeat or the boot-up message: it listens.
+        master.listen(0x700 + NODE_ID).next()
         node = master.network.add_node(NODE_ID, str(EDS))
         node.sdo.RESPONSE_TIMEOUT = PATIENCE
         assert node.sdo[0x1000].raw == 0x000001A1
