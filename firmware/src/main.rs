@@ -121,6 +121,7 @@ mod app {
         let [process_alarm, mut services_alarm] = board.alarms;
         services_alarm.set(Clock::now() + FIRST_SAMPLE);
         let parameters = Some(protocol.prepare());
+        let measurement = Measurement::new(setup.personality, remembering::start(&board.found));
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
@@ -134,7 +135,7 @@ mod app {
             sampling: board.sampling,
             shaft: Shaft::new(board.encoder, board.ssi, surroundings),
             buttons: board.buttons,
-            measurement: cx.local.measurement_place.write(Measurement::new(remembering::start(&board.found))),
+            measurement: cx.local.measurement_place.write(measurement),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,

@@ -28,7 +28,7 @@ impl PressureNode {
         let setup = Setup { node_id, bit_rate: BitRate::FASTEST, serial_number, ..setup() };
         PressureNode {
             protocol: Protocol::new(&setup),
-            measurement: Measurement::new(Start::First),
+            measurement: Measurement::new(setup.personality, Start::First),
             store: empty_store(),
             raw,
             next_sample: Instant::NEVER,

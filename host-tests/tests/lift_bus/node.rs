@@ -27,7 +27,7 @@ impl LiftNode {
         let setup = Setup { personality: Personality::Lift, node_id: NodeId::new(node_id), ..setup() };
         LiftNode {
             protocol: Protocol::new(&setup),
-            measurement: Measurement::new(Start::First),
+            measurement: Measurement::new(setup.personality, Start::First),
             store: empty_store(),
             node_id,
             world: Rc::clone(world),
