@@ -121,7 +121,6 @@ mod app {
         let [process_alarm, mut services_alarm] = board.alarms;
         services_alarm.set(Clock::now() + FIRST_SAMPLE);
         let parameters = Some(protocol.prepare());
-        let measurement = Measurement::new(setup.personality, remembering::start(&board.found));
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
@@ -135,7 +134,7 @@ mod app {
             sampling: board.sampling,
             shaft: Shaft::new(board.encoder, board.ssi, surroundings),
             buttons: board.buttons,
-            measurement: cx.local.measurement_place.write(measurement),
+            measurement: remembering::make(cx.local.measurement_place, setup.personality, &board.found),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
