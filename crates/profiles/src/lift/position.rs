@@ -276,6 +276,7 @@ impl PositionUnits {
     }
 
     /// Takes over parameters, from the next sample on.
+    #[inline(never)]
     pub fn apply(&mut self, parameters: &Parameters) {
         let encoder = parameters.encoder();
         self.encoder.apply(&encoder);
