@@ -4,7 +4,7 @@
 use std::num::{NonZeroU16, NonZeroU32};
 
 use profiles::encoder::{
-    Area, Coding, Format, Frame, OVERFLOW, RawEncoder, SensorType, UNDERFLOW, WARNING_FREQUENCY,
+    Area, Coding, Command, Format, Frame, OVERFLOW, RawEncoder, SensorType, UNDERFLOW, WARNING_FREQUENCY,
 };
 use profiles::lift::position::{
     INVERTED, Parameters, PositionUnits, Snapshot, Source, UNKNOWN, UnitParameters,
@@ -275,9 +275,9 @@ fn what_is_set_for_an_encoder_of_cia_406_does_not_count() {
     let mut other = plain;
     other.sensors.operating = u16::MAX;
     other.sensors.module.offset = 12_345;
-    other.sensors.channels[0].preset = profiles::encoder::Command { value: 777, count: 1 };
     other.sensors.channels[0].area = Area { low: 5, high: 1 };
     let mut cars = [plain, other].map(|parameters| Car::new(parameters, 0.0));
+    cars[1].parameters.sensors.channels[0].preset = Command { value: 777, count: 1 };
     cars.iter_mut().for_each(Car::apply);
     let [plain, other] = cars.map(|mut car| [0.0, 100.0, 1234.5].map(|way| car.drive(way)));
     assert_eq!(plain, other);
