@@ -26,7 +26,7 @@ use crate::dictionary::Dictionary;
 use crate::lss::{BitRate, Configuration, Slave};
 use crate::nmt::State;
 use crate::pdo::{PdoSet, Rpdo, Scanner, Tpdo};
-use crate::sdo::{Response, Server};
+use crate::sdo::Server;
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
 /// How many PDOs a device can have each way; which of them it has, the dictionary says.
@@ -37,12 +37,12 @@ pub(crate) const RPDOS: usize = 8;
 #[derive(Debug)]
 pub struct Device<A, const N: usize> {
     server: Server,
-    /// A response that found the queue full, and when to try again.
-    response: Option<(Response, Instant)>,
+    /// When to try again to send a reply of the server that found the queue full.
+    reply_due: Instant,
     /// When to go on with a block that found the queue full.
     block_due: Instant,
     lss: Slave,
-    /// As `response`, of LSS.
+    /// A response of LSS that found the queue full, and when to try again.
     lss_response: Option<(crate::lss::Response, Instant)>,
     switching: Option<lss::Switching>,
     core: Core<A, N>,
@@ -118,7 +118,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         };
         Device {
             server: Server::new(),
-            response: None,
+            reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
             lss_response: None,

@@ -3,30 +3,27 @@
 use super::{Application, Core, Job, Part, STALE};
 use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
 use crate::nmt::State;
-use crate::sdo::{Abort, Multiplexer, Objects, Readable, Writable};
+use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Duration, Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
     const IS_SMALL: bool = A::SERVICES_ONLY;
 
-    fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort> {
+    fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
         let entry = self.entry(at)?;
         if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
-        let stream = stream_of(&entry);
-        let bytes = match (entry.rule(), stream) {
-            (_, Some(stream)) => self.content(stream)?,
-            _ if A::SERVICES_ONLY => stored(&entry, &self.image),
-            (Rule::ErrorCount, _) => core::slice::from_ref(self.emcy.history().count()),
-            (Rule::ErrorEntry, _) => self.emcy.history().error(at.sub).ok_or(Abort::NoData)?,
-            _ => stored(&entry, &self.image),
-        };
-        Ok(Readable { bytes, stream })
-    }
-
-    fn content(&self, stream: u8) -> Result<&[u8], Abort> {
-        self.application.read_domain(stream)
+        match (entry.attributes.kind, entry.rule()) {
+            (Type::Domain, Rule::Application(number)) => self.application.read_domain(number),
+            (Type::VisibleString(_), _) => Ok(text(entry.field.get(&self.image))),
+            _ if A::SERVICES_ONLY => Ok(entry.field.get(&self.image)),
+            (_, Rule::ErrorCount) => Ok(core::slice::from_ref(self.emcy.history().count())),
+            (_, Rule::ErrorEntry) => {
+                self.emcy.history().error(at.sub).map_or(Err(Abort::NoData), |error| Ok(error))
+            }
+            _ => Ok(entry.field.get(&self.image)),
+        }
     }
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
@@ -158,13 +155,9 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 }
 
-/// The value as an upload gives it: a string ends where its zeros begin.
-fn stored<'a>(entry: &Entry, image: &'a [u8]) -> &'a [u8] {
-    let value = entry.field.get(image);
-    match entry.attributes.kind {
-        Type::VisibleString(_) => value.split(|&byte| byte == 0).next().unwrap_or(value),
-        _ => value,
-    }
+/// A string as an upload gives it: it ends where its zeros begin.
+fn text(value: &[u8]) -> &[u8] {
+    value.split(|&byte| byte == 0).next().unwrap_or(value)
 }
 
 /// The number of the stream that a domain is: the application's.

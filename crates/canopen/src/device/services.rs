@@ -1,8 +1,7 @@
 //! Services: SDO, heartbeat, EMCY and LSS.
 
-use super::{Application, Device, STALE};
+use super::{Application, Device};
 use crate::lss;
-use crate::sdo::Response;
 use crate::transmit::RETRY;
 use crate::{CanId, Frame, Instant, Transmit};
 
@@ -30,15 +29,19 @@ impl<A: Application, const N: usize> Device<A, N> {
     fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
-        if let Some(taken) = self.server.take_expected(request, &mut self.core, now) {
-            if let Err(abort) = taken {
-                self.respond(Some(abort), now, out);
+        if let Some(has_reply) = self.server.take_expected(request, &mut self.core, now) {
+            if has_reply {
+                self.respond(now, out);
             }
             return;
         }
-        let response = self.server.answer(request, &mut self.core, now);
+        let has_reply = self.server.answer(request, &mut self.core, now);
         self.core.services_due = self.core.services_due.min(self.server.deadline());
-        self.respond(response, now, out);
+        // A reply that still waits is obsolete: its client has gone on.
+        self.reply_due = Instant::NEVER;
+        if has_reply {
+            self.respond(now, out);
+        }
         if !A::SERVICES_ONLY && self.server.is_sending() {
             self.send_block(now, out);
         }
@@ -47,25 +50,22 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
     fn send_block(&mut self, now: Instant, out: &mut impl Transmit) {
         let id = self.core.service(SDO_RESPONSE);
-        let abort = self.server.send_block(&self.core, now, |data| {
+        let has_reply = self.server.send_block(&self.core, now, |data| {
             out.room() > RESERVED_ROOM && out.send(Frame::data_frame(id, 8, data)).is_ok()
         });
-        if abort.is_some() {
-            self.respond(abort, now, out);
+        if has_reply {
+            self.respond(now, out);
         }
         self.block_due = if self.server.is_sending() { now + RETRY } else { Instant::NEVER };
         self.core.services_due = self.core.services_due.min(self.block_due);
     }
 
-    /// Sends a response. One that still waits is obsolete: its client has gone on.
-    pub(super) fn respond(&mut self, response: Option<Response>, now: Instant, out: &mut impl Transmit) {
-        self.response = None;
-        let Some(response) = response else { return };
+    /// Sends the server's reply.
+    pub(super) fn respond(&mut self, now: Instant, out: &mut impl Transmit) {
         let id = self.core.service(SDO_RESPONSE);
-        if out.send(Frame::data_frame(id, 8, response.encode())).is_err() {
-            self.response = Some((response, now + RETRY));
-            self.core.services_due = STALE;
-        }
+        let is_sent = out.send(Frame::data_frame(id, 8, self.server.reply())).is_ok();
+        self.reply_due = if is_sent { Instant::NEVER } else { now + RETRY };
+        self.core.services_due = self.core.services_due.min(self.reply_due);
     }
 
     /// Sends what is due. Returns the instant of the next call.
@@ -97,12 +97,11 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     fn poll_sdo(&mut self, now: Instant, out: &mut impl Transmit) {
-        match self.response {
-            Some((response, due)) if now >= due => self.respond(Some(response), now, out),
-            _ => (),
+        if now >= self.reply_due {
+            self.respond(now, out);
         }
-        if let Some(response) = self.server.expire(now) {
-            self.respond(Some(response), now, out);
+        if self.server.expire(now) {
+            self.respond(now, out);
         }
         if !A::SERVICES_ONLY && now >= self.block_due {
             self.send_block(now, out);
@@ -127,8 +126,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     fn next_sdo(&self) -> Instant {
-        let response = self.response.map_or(Instant::NEVER, |(_, due)| due);
-        self.server.deadline().min(response)
+        self.server.deadline().min(self.reply_due)
     }
 
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).

@@ -139,7 +139,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     fn forget_transfer(&mut self) {
         self.server.reset();
-        (self.response, self.block_due) = (None, Instant::NEVER);
+        (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
     }
 
     /// Sets a fault. It is signalled once, until it is cleared.
@@ -267,6 +267,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.update_error_register();
     }
 
+    // Called from many places that are in no hurry.
+    #[inline(never)]
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
         if self.emcy.raise(fault, now) {
             self.update_error_register();
@@ -274,6 +276,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
+    #[inline(never)]
     pub(super) fn clear(&mut self, fault: Fault, now: Instant) {
         self.emcy.clear(fault, now);
         self.update_error_register();

@@ -120,8 +120,8 @@ impl<A: Application, const N: usize> Device<A, N> {
         if lss_waits {
             self.respond_lss(Slave::stored(result.is_ok()), now, out);
         }
-        if let Some(response) = self.server.release(result, now) {
-            self.respond(Some(response), now, out);
+        if self.server.release(result, now) {
+            self.respond(now, out);
         }
     }
 
