@@ -30,8 +30,7 @@ use crate::sdo::Server;
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
 /// How many PDOs a device can have each way; which of them it has, the dictionary says.
-pub(crate) const TPDOS: usize = 8;
-pub(crate) const RPDOS: usize = 8;
+pub(crate) const PDOS: usize = 8;
 
 /// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
 #[derive(Debug)]
@@ -61,10 +60,10 @@ struct Core<A, const N: usize> {
     watches: heartbeat::Consumer,
     sync: sync::Consumer,
     emcy: emcy::Producer,
-    tpdos: [Tpdo; TPDOS],
-    rpdos: [Rpdo; RPDOS],
+    tpdos: [Tpdo; PDOS],
+    rpdos: [Rpdo; PDOS],
     /// The CAN-IDs of those that are valid, in one place: each frame of anybody is compared with them.
-    rpdo_ids: [u16; RPDOS],
+    rpdo_ids: [u16; PDOS],
     scanner: Scanner,
     /// The PDOs that are valid, and the RPDOs that have a fault.
     valid_tpdos: PdoSet,
@@ -103,9 +102,9 @@ impl<A: Application, const N: usize> Device<A, N> {
             watches: heartbeat::Consumer::new(),
             sync: sync::Consumer::new(),
             emcy: emcy::Producer::new(),
-            tpdos: [const { Tpdo::new() }; TPDOS],
-            rpdos: [const { Rpdo::new() }; RPDOS],
-            rpdo_ids: [NO_ID; RPDOS],
+            tpdos: [const { Tpdo::new() }; PDOS],
+            rpdos: [const { Rpdo::new() }; PDOS],
+            rpdo_ids: [NO_ID; PDOS],
             scanner: Scanner::new(),
             valid_tpdos: PdoSet::EMPTY,
             valid_rpdos: PdoSet::EMPTY,

@@ -1,10 +1,11 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
+use super::pdos::low_half;
 use super::{Application, Core, Job, Part, STALE};
 use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
-use crate::{Duration, Instant, emcy, sync};
+use crate::{Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
     const IS_SMALL: bool = A::SERVICES_ONLY;
@@ -20,7 +21,8 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
             _ if A::SERVICES_ONLY => Ok(entry.field.get(&self.image)),
             (_, Rule::ErrorCount) => Ok(core::slice::from_ref(self.emcy.history().count())),
             (_, Rule::ErrorEntry) => {
-                self.emcy.history().error(at.sub).map_or(Err(Abort::NoData), |error| Ok(error))
+                let error = self.emcy.history().error(at.sub).ok_or(Abort::NoData)?;
+                Ok(error)
             }
             _ => Ok(entry.field.get(&self.image)),
         }
@@ -129,13 +131,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         match entry.rule() {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
-            Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
+            Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             _ if A::SERVICES_ONLY => (),
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
             }
-            Rule::EmcyInhibit => self.emcy.set_inhibit(Duration::from_inhibit(value)),
+            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value)),
             Rule::EmcyCobId => self.emcy.configure(value),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine => self.configure_pdos(now),

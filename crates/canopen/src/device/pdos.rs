@@ -10,7 +10,7 @@ use crate::pdo::{
     Transmission, locate,
 };
 use crate::sdo::Abort;
-use crate::{CanId, CobId, Duration, Instant};
+use crate::{CanId, CobId, Instant};
 
 /// A PDO by the index of one of its objects.
 ///
@@ -43,8 +43,7 @@ impl Pdo {
 
     /// Those that a dictionary has, one way.
     fn all(dictionary: &Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
-        let first = Pdo { direction, number: 0 };
-        dictionary.between(first.communication(), first.mapping()).map(Pdo::at)
+        dictionary.pdos(direction).iter().map(move |&number| Pdo { direction, number })
     }
 }
 
@@ -70,8 +69,8 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
     fn place(&self, pdo: Pdo) -> Option<u8> {
-        let mut ranked = (0..).zip(Pdo::all(self.dictionary, pdo.direction));
-        ranked.find(|(_, other)| other.number == pdo.number).map(|(place, _)| place)
+        let mut ranked = (0..).zip(self.dictionary.pdos(pdo.direction));
+        ranked.find(|(_, number)| **number == pdo.number).map(|(place, _)| place)
     }
 
     fn apply(&mut self, pdo: Pdo, place: u8, now: Instant) {
@@ -104,20 +103,18 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     fn tpdo_settings(&self, pdo: Pdo) -> Option<Settings> {
-        let parameter = |sub| self.number(pdo.communication(), sub);
-        let mut settings = Settings::new(self.cob_id_value(pdo), low_byte(parameter(2)))?;
-        settings.inhibit = Duration::from_inhibit(parameter(3));
-        settings.event = Duration::from_millis(parameter(5).into());
-        settings.sync_start = low_byte(parameter(6));
+        let mut settings = Settings::new(self.cob_id_value(pdo), low_byte(self.parameter(pdo, 2)))?;
+        settings.inhibit = low_half(self.parameter(pdo, 3));
+        settings.event = low_half(self.parameter(pdo, 5));
+        settings.sync_start = low_byte(self.parameter(pdo, 6));
         let Content::Objects(layout) = self.content(pdo)? else { return None };
         settings.layout = layout;
         Some(settings)
     }
 
     fn rpdo_settings(&self, pdo: Pdo) -> Option<RpdoSettings> {
-        let parameter = |sub| self.number(pdo.communication(), sub);
-        let deadline = Duration::from_millis(parameter(5).into());
-        RpdoSettings::new(self.cob_id_value(pdo), low_byte(parameter(2)), deadline, self.content(pdo)?)
+        let (kind, deadline) = (low_byte(self.parameter(pdo, 2)), low_half(self.parameter(pdo, 5)));
+        RpdoSettings::new(self.cob_id_value(pdo), kind, deadline, self.content(pdo)?)
     }
 
     /// Whether every mapping names objects that can be mapped. A stored one may be of an older dictionary.
@@ -131,10 +128,9 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn scanner_settings(&self) -> Option<ScannerSettings> {
         Pdo::all(self.dictionary, Direction::Transmit).find_map(|pdo| {
             let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
-            let parameter = |sub| self.number(pdo.communication(), sub);
-            let settings = Settings::new(self.cob_id_value(pdo), low_byte(parameter(2)))?;
-            let inhibit = Duration::from_inhibit(parameter(3));
-            let event = Duration::from_millis(parameter(5).into());
+            let settings = Settings::new(self.cob_id_value(pdo), low_byte(self.parameter(pdo, 2)))?;
+            let inhibit = low_half(self.parameter(pdo, 3));
+            let event = low_half(self.parameter(pdo, 5));
             Some(ScannerSettings { id: settings.id, addressing, own: self.node_id?, inhibit, event })
         })
     }
@@ -148,12 +144,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    /// What is mapped into each TPDO, whether it is valid or not.
-    pub(super) fn tpdo_layouts(&self) -> impl Iterator<Item = Layout> {
-        Pdo::all(self.dictionary, Direction::Transmit).filter_map(|pdo| match self.content(pdo)? {
-            Content::Objects(layout) => Some(layout),
-            Content::Multiplexed(_) => None,
-        })
+    /// What is mapped into each TPDO, whether it is valid or not, is not for the multiplexed one.
+    pub(super) fn leave_out_mapped(&mut self) {
+        for pdo in Pdo::all(self.dictionary, Direction::Transmit) {
+            if let Some(Content::Objects(layout)) = self.content(pdo) {
+                self.scanner.leave_out(&layout);
+            }
+        }
     }
 
     fn is_multiplexed(&self, pdo: Pdo) -> bool {
@@ -168,6 +165,10 @@ impl<A: Application, const N: usize> Core<A, N> {
             layout.push(locate(self.dictionary, mapped, pdo.direction)?)?;
         }
         Ok(layout)
+    }
+
+    fn parameter(&self, pdo: Pdo, sub: u8) -> u32 {
+        self.number(pdo.communication(), sub)
     }
 
     /// A PDO without objects is one that is not valid.
@@ -250,4 +251,10 @@ impl<A: Application, const N: usize> Core<A, N> {
 /// Entries whose type is UNSIGNED8 have no more.
 fn low_byte(value: u32) -> u8 {
     value.to_le_bytes()[0]
+}
+
+/// Entries whose type is UNSIGNED16 have no more.
+pub(super) fn low_half(value: u32) -> u16 {
+    let [low, high, ..] = value.to_le_bytes();
+    u16::from_le_bytes([low, high])
 }

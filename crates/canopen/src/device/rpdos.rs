@@ -1,6 +1,6 @@
 //! RPDOs in the device: reception, deadlines, and the faults of each.
 
-use super::{Application, Core, RPDOS};
+use super::{Application, Core, PDOS};
 use crate::emcy::Fault;
 use crate::pdo::{Reception, Rpdo};
 use crate::{Frame, Instant};
@@ -8,7 +8,7 @@ use crate::{Frame, Instant};
 impl<A: Application, const N: usize> Core<A, N> {
     /// Takes a data frame that may be one of the RPDOs. A good one clears the faults of its PDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
-        for (number, place) in (0..).zip(0..RPDOS) {
+        for (number, place) in (0..).zip(0..PDOS) {
             if self.rpdo_ids.get(place) == Some(&frame.id()) {
                 self.take_rpdo(number, frame, now);
             }

@@ -1,11 +1,12 @@
 //! NMT state, resets, and the reactions to errors.
 
+use super::pdos::low_half;
 use super::{Application, Core, Device, Job, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::emcy::Fault;
 use crate::lss::BitRate;
 use crate::nmt::{Command, State};
-use crate::{CanId, Duration, Instant, NodeId, Transmit};
+use crate::{CanId, Instant, NodeId, Transmit};
 
 /// 1F80h: the one value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
@@ -32,6 +33,25 @@ pub enum Action {
 enum Reset {
     Communication,
     Node,
+}
+
+/// Whose default values are loaded.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Scope {
+    Everything,
+    /// The objects below 2000h.
+    Communication,
+    Group(Group),
+}
+
+impl Scope {
+    fn contains(self, entry: &Entry) -> bool {
+        match self {
+            Scope::Everything => true,
+            Scope::Communication => entry.index() < 0x2000,
+            Scope::Group(group) => entry.attributes.group == group,
+        }
+    }
 }
 
 /// What waits for the caller.
@@ -221,7 +241,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     fn load_parameters(&mut self) {
         let everything = self.pending.reset == Reset::Node;
-        self.load_defaults(|entry| everything || entry.index() < 0x2000);
+        self.load_defaults(if everything { Scope::Everything } else { Scope::Communication });
         self.load_stored(Group::Communication);
         if everything {
             self.load_stored(Group::Application);
@@ -229,8 +249,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    pub(super) fn load_defaults(&mut self, is_meant: impl Fn(&Entry) -> bool) {
-        for entry in self.dictionary.entries().filter(|entry| is_meant(entry)) {
+    pub(super) fn load_defaults(&mut self, scope: Scope) {
+        for entry in self.dictionary.entries().filter(|entry| scope.contains(entry)) {
             let default: [u8; 4] = entry.field.load(self.dictionary.defaults());
             if entry.attributes.node_relative {
                 self.store_node_relative(entry.field, u32::from_le_bytes(default));
@@ -252,14 +272,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         if !A::SERVICES_ONLY {
             self.configure_process(now);
         }
-        let period = Duration::from_millis(self.number(0x1017, 0).into());
-        self.heartbeat.boot_up(period, now);
+        self.heartbeat.boot_up(low_half(self.number(0x1017, 0)), now);
     }
 
     fn configure_process(&mut self, now: Instant) {
         self.configure_sync(now);
         self.emcy.configure(self.number_or(0x1014, 0, NO_EMCY));
-        self.emcy.set_inhibit(Duration::from_inhibit(self.number(0x1015, 0)));
+        self.emcy.set_inhibit(low_half(self.number(0x1015, 0)));
         self.configure_watches(now);
         self.configure_pdos(now);
         self.emcy.restart(now);

@@ -2,6 +2,7 @@
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
+use super::state::Scope;
 use super::{Action, Application, Core, Device};
 use crate::dictionary::{Entry, Group, Rule};
 use crate::emcy::Fault;
@@ -194,7 +195,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         let fits =
             self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
         if !fits {
-            self.load_defaults(|entry| entry.attributes.group == group);
+            self.load_defaults(Scope::Group(group));
         }
         self.unsound.set(group, !(fits && is_sound));
         self.application.loaded(group, fits && is_sound);

@@ -3,16 +3,15 @@
 use super::{Application, Core, STALE};
 use crate::emcy::Fault;
 use crate::sync::Settings;
-use crate::{Duration, Frame, Instant, Transmit};
+use crate::{Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn configure_sync(&mut self, now: Instant) {
-        let micros = |value: u32| Duration(value.into());
         let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
         self.sync.configure(Settings {
             cob_id: self.number_or(0x1005, 0, 0x80),
-            period: micros(self.number(0x1006, 0)),
-            window: micros(self.number(0x1007, 0)),
+            period: self.number(0x1006, 0),
+            window: self.number(0x1007, 0),
             overflow,
         });
         self.clear(Fault::SyncMissing, now);

@@ -2,7 +2,7 @@
 
 use super::compile::effective_limits;
 use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type, image_size};
-use crate::device::{RPDOS, TPDOS};
+use crate::device::PDOS;
 use crate::pdo::WATCHED;
 use crate::sdo::BUFFER;
 
@@ -13,8 +13,8 @@ use crate::sdo::BUFFER;
 /// During compilation, when a row is wrong.
 pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    assert!(pdos(rows, 0x1400) <= RPDOS, "more RPDOs than a device has");
-    assert!(pdos(rows, 0x1800) <= TPDOS, "more TPDOs than a device has");
+    assert!(pdos(rows, 0x1400) <= PDOS, "more RPDOs than a device has");
+    assert!(pdos(rows, 0x1800) <= PDOS, "more TPDOs than a device has");
     let (mut i, mut sent) = (0, 0);
     while i < rows.len() {
         check_row(&rows[i]);

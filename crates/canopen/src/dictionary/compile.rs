@@ -1,8 +1,9 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::entry::Attributes;
-use super::tables::{Place, Series};
+use super::tables::{PdoNumbers, Place, Series};
 use super::{Access, DefaultValue, Object, Tables, Type};
+use crate::device::PDOS;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -58,7 +59,13 @@ macro_rules! dictionary {
 /// During compilation, when they are less.
 #[must_use]
 pub const fn compile<const S: usize, const P: usize, const A: usize>(rows: &[Object]) -> Tables<S, P, A> {
-    let tables = Tables { series: [UNUSED; S], places: [NO_PLACE; P], attributes: [attributes(&rows[0]); A] };
+    let tables = Tables {
+        series: [UNUSED; S],
+        places: [NO_PLACE; P],
+        attributes: [attributes(&rows[0]); A],
+        tpdos: pdo_numbers(rows, 0x1800),
+        rpdos: pdo_numbers(rows, 0x1400),
+    };
     let mut filling = Filling { tables, series: 0, places: 0, attributes: 0, offset: 0 };
     let mut row = 0;
     while row < rows.len() {
@@ -110,6 +117,20 @@ impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
             Place { sub: row.sub, attributes: number as u8, offset: offset as u16 };
         self.places += 1;
     }
+}
+
+/// Of the PDOs whose communication objects are among the 512 indexes from `first` on.
+const fn pdo_numbers(rows: &[Object], first: u16) -> PdoNumbers {
+    let mut pdos = PdoNumbers { count: 0, numbers: [0; PDOS] };
+    let mut row = 0;
+    while row < rows.len() {
+        if rows[row].index & 0xFE00 == first && rows[row].sub == 0 {
+            pdos.numbers[pdos.count as usize] = rows[row].index & 0x01FF;
+            pdos.count += 1;
+        }
+        row += 1;
+    }
+    pdos
 }
 
 /// A series of no object, after all others: no search ends in it.

@@ -19,8 +19,8 @@ pub(crate) struct Producer {
     active: FaultSet,
     history: History,
     waiting: Deque<Message, WAITING>,
-    /// 1015h.
-    inhibit: Duration,
+    /// 1015h, in 100 us.
+    inhibit: u16,
     /// The end of the inhibit time after the last message.
     inhibited_until: Instant,
     due: Instant,
@@ -33,7 +33,7 @@ impl Producer {
             active: FaultSet::EMPTY,
             history: History::new(),
             waiting: Deque::new(),
-            inhibit: Duration(0),
+            inhibit: 0,
             inhibited_until: Instant(0),
             due: Instant::NEVER,
         }
@@ -45,7 +45,7 @@ impl Producer {
     }
 
     /// Takes the inhibit time of 1015h, from the next message on.
-    pub(crate) fn set_inhibit(&mut self, inhibit: Duration) {
+    pub(crate) fn set_inhibit(&mut self, inhibit: u16) {
         self.inhibit = inhibit;
     }
 
@@ -122,8 +122,8 @@ impl Producer {
                 return;
             }
             let _ = self.waiting.pop_front();
-            if !self.inhibit.is_zero() {
-                self.inhibited_until = now + self.inhibit;
+            if self.inhibit != 0 {
+                self.inhibited_until = now + Duration::from_inhibit(self.inhibit);
                 self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
                 return;
             }

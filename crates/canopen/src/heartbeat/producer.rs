@@ -7,26 +7,27 @@ use crate::{CanId, Duration, Frame, Instant, Transmit};
 /// Sends boot-up once and then a heartbeat every period (1017h).
 #[derive(Debug)]
 pub(crate) struct Producer {
-    period: Duration,
+    /// In ms; 0 for no heartbeat.
+    period: u16,
     due: Instant,
     boot_up: bool,
 }
 
 impl Producer {
     pub(crate) const fn new() -> Producer {
-        Producer { period: Duration(0), due: Instant::NEVER, boot_up: false }
+        Producer { period: 0, due: Instant::NEVER, boot_up: false }
     }
 
     /// Boot-up is due at once; it counts as the first heartbeat.
-    pub(crate) fn boot_up(&mut self, period: Duration, now: Instant) {
+    pub(crate) fn boot_up(&mut self, period: u16, now: Instant) {
         *self = Producer { period, due: now, boot_up: true };
     }
 
     /// A new period takes effect at once with a heartbeat; 0 switches the heartbeat off.
-    pub(crate) fn set_period(&mut self, period: Duration, now: Instant) {
+    pub(crate) fn set_period(&mut self, period: u16, now: Instant) {
         self.period = period;
         if !self.boot_up {
-            self.due = if period.is_zero() { Instant::NEVER } else { now };
+            self.due = if period == 0 { Instant::NEVER } else { now };
         }
     }
 
@@ -51,10 +52,11 @@ impl Producer {
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
     fn following(&self, now: Instant) -> Instant {
-        if self.period.is_zero() {
+        if self.period == 0 {
             return Instant::NEVER;
         }
-        let next = self.due + self.period;
-        if next > now { next } else { now + self.period }
+        let period = Duration::from_millis(self.period.into());
+        let next = self.due + period;
+        if next > now { next } else { now + period }
     }
 }

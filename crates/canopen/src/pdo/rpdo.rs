@@ -11,8 +11,8 @@ use crate::{CanId, CobId, Duration, Frame, Instant};
 pub(crate) struct RpdoSettings {
     id: CanId,
     is_synchronous: bool,
-    /// Deadline between two receptions; zero for none.
-    deadline: Duration,
+    /// Deadline between two receptions in ms; 0 for none.
+    deadline: u16,
     content: Content,
 }
 
@@ -21,7 +21,7 @@ impl RpdoSettings {
     pub(crate) fn new(
         cob_id: u32,
         transmission: u8,
-        deadline: Duration,
+        deadline: u16,
         content: Content,
     ) -> Option<RpdoSettings> {
         let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
@@ -71,7 +71,8 @@ impl Rpdo {
 
     /// Takes new settings and starts afresh.
     pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
-        *self = Rpdo { settings, ..Rpdo::new() };
+        self.settings = settings;
+        self.stop();
     }
 
     /// Leaving Operational.
@@ -98,7 +99,10 @@ impl Rpdo {
         if frame.len() < mapped {
             return Some(Reception::TooShort);
         }
-        self.due = if settings.deadline.is_zero() { Instant::NEVER } else { now + settings.deadline };
+        self.due = match settings.deadline {
+            0 => Instant::NEVER,
+            deadline => now + Duration::from_millis(deadline.into()),
+        };
         match (&settings.content, settings.is_synchronous) {
             (Content::Multiplexed(addressing), _) => return Some(Reception::Multiplexed(*addressing)),
             (Content::Objects(layout), false) => layout.scatter(frame.bytes(), image),

@@ -16,8 +16,10 @@ pub(crate) struct Settings {
     /// Whether a remote frame is answered (bit 30 of the COB-ID is 0).
     pub(crate) answers_remote: bool,
     pub(crate) transmission: Transmission,
-    pub(crate) inhibit: Duration,
-    pub(crate) event: Duration,
+    /// Inhibit time in 100 us.
+    pub(crate) inhibit: u16,
+    /// Event timer in ms.
+    pub(crate) event: u16,
     /// SYNC counter with which the count of SYNCs begins; 0 for any.
     pub(crate) sync_start: u8,
     pub(crate) layout: Layout,
@@ -31,15 +33,15 @@ impl Settings {
             id: cob_id.id,
             answers_remote: !cob_id.bit30,
             transmission: Transmission::parse(transmission)?,
-            inhibit: Duration(0),
-            event: Duration(0),
+            inhibit: 0,
+            event: 0,
             sync_start: 0,
             layout: Layout::default(),
         })
     }
 
     fn sends_on_change(&self) -> bool {
-        self.transmission == Transmission::Event && self.event.is_zero()
+        self.transmission == Transmission::Event && self.event == 0
     }
 }
 
@@ -76,7 +78,8 @@ impl Tpdo {
 
     /// Takes new settings and starts afresh.
     pub(crate) fn configure(&mut self, settings: Option<Settings>) {
-        *self = Tpdo { settings, ..Tpdo::new() };
+        self.settings = settings;
+        self.stop();
     }
 
     pub(crate) fn settings(&self) -> Option<&Settings> {
@@ -91,7 +94,7 @@ impl Tpdo {
     /// Entering Operational, or becoming valid in it.
     pub(crate) fn start(&mut self) {
         self.stop();
-        self.pending = self.settings.is_some_and(|settings| settings.transmission.is_event_driven());
+        self.pending = self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
     }
 
     /// Leaving Operational: nothing is due, a PDO that waits is dropped.
@@ -176,11 +179,12 @@ impl Tpdo {
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
     fn following_event(&self, now: Instant) -> Instant {
-        let Some(settings) = self.settings.filter(|settings| !settings.event.is_zero()) else {
+        let Some(settings) = self.settings.as_ref().filter(|settings| settings.event != 0) else {
             return Instant::NEVER;
         };
-        let next = self.event_due + settings.event;
-        if next > now && next < Instant::NEVER { next } else { now + settings.event }
+        let period = Duration::from_millis(settings.event.into());
+        let next = self.event_due + period;
+        if self.event_due != Instant::NEVER && next > now { next } else { now + period }
     }
 
     /// Sends the present values. A full queue leaves it pending: when there is room, the values of then go out.
@@ -189,7 +193,7 @@ impl Tpdo {
         let data = settings.layout.gather(image);
         let sent = out.send(Frame::data_frame(settings.id, settings.layout.len(), data)).is_ok();
         self.pending = !sent;
-        self.inhibited_until = now + if sent { settings.inhibit } else { RETRY };
+        self.inhibited_until = now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
         if sent {
             self.data = Some(data);
         }

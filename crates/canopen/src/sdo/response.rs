@@ -101,7 +101,9 @@ impl Response {
             }
             Response::UploadedSegment(segment) => segment.encode(0x00),
             Response::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),
-            Response::BlockDownload(multiplexer, size) => multiplexer.frame(BLOCK_DOWNLOAD, [size.get(), 0, 0, 0]),
+            Response::BlockDownload(multiplexer, size) => {
+                multiplexer.frame(BLOCK_DOWNLOAD, [size.get(), 0, 0, 0])
+            }
             Response::BlockAcknowledge(sequence, size) => [0xA2, sequence, size.get(), 0, 0, 0, 0, 0],
             Response::BlockDownloaded => [0xA1, 0, 0, 0, 0, 0, 0, 0],
             Response::BlockUpload { at, crc, size } => {

@@ -145,7 +145,7 @@ impl Server {
             Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| false),
             Request::BlockAcknowledge { sequence, block_size } => {
                 match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
-                    Some(end) => self.say(Response::BlockUploadEnd(end)),
+                    Some(end) => Ok(self.say(Response::BlockUploadEnd(end))),
                     None => Ok(false),
                 }
             }
@@ -159,10 +159,10 @@ impl Server {
         }
     }
 
-    /// Makes a response.
-    fn say(&mut self, response: Response) -> Answer {
+    /// Makes a response: there is a reply, `true`.
+    fn say(&mut self, response: Response) -> bool {
         self.reply = response.encode();
-        Ok(true)
+        true
     }
 
     /// Keeps back the reply to a write that takes its time.
@@ -196,8 +196,7 @@ impl Server {
                 if receiver.is_within_block() && now < self.active + TIME_OUT =>
             {
                 let sequence = receiver.acknowledge();
-                self.reply = Response::BlockAcknowledge(sequence, BlockSize::MAX).encode();
-                true
+                self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX))
             }
             _ => self.settle(Err(Abort::TimeOut), now),
         }
@@ -212,8 +211,7 @@ impl Server {
     /// Ends the transfer: the one place where an error becomes an abort message.
     fn give_up(&mut self, abort: Abort) -> bool {
         self.transfer = Transfer::Idle;
-        self.reply = Response::Abort(self.multiplexer, abort.code()).encode();
-        true
+        self.say(Response::Abort(self.multiplexer, abort.code()))
     }
 
     /// A new transfer; one that was under way is forgotten, as its client has started over.
@@ -227,11 +225,11 @@ impl Server {
         self.begin(at);
         let value = objects.read(at)?;
         if value.len() <= 4 {
-            return self.say(Response::Uploaded(at, Bytes::from_slice(value)));
+            return Ok(self.say(Response::Uploaded(at, Bytes::from_slice(value))));
         }
         let source = Source::new(at, value, &mut self.buffer);
         self.transfer = Transfer::Upload(Upload::new(source));
-        self.say(Response::UploadSegmented(at, Some(source.size())))
+        Ok(self.say(Response::UploadSegmented(at, Some(source.size()))))
     }
 
     fn upload_segment(&mut self, toggle: bool, objects: &impl Objects) -> Answer {
@@ -240,7 +238,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        self.say(Response::UploadedSegment(segment))
+        Ok(self.say(Response::UploadedSegment(segment)))
     }
 
     fn download(
@@ -261,7 +259,7 @@ impl Server {
                 self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
             }
         }
-        self.say(Response::Downloaded(at))
+        Ok(self.say(Response::Downloaded(at)))
     }
 
     fn download_segment(&mut self, segment: &Segment, objects: &mut impl Objects, now: Instant) -> Answer {
@@ -270,7 +268,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        self.say(Response::DownloadedSegment { toggle: segment.toggle })
+        Ok(self.say(Response::DownloadedSegment { toggle: segment.toggle }))
     }
 
     fn block_download(
@@ -283,7 +281,7 @@ impl Server {
         self.begin(at);
         let sink = Sink::open(at, size, objects)?;
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
-        self.say(Response::BlockDownload(at, BlockSize::MAX))
+        Ok(self.say(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
     fn wants_block_segments(&self) -> bool {
@@ -304,14 +302,14 @@ impl Server {
             return Ok(false);
         }
         let sequence = receiver.acknowledge();
-        self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX))
+        Ok(self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
     }
 
     fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
         match core::mem::replace(&mut self.transfer, Transfer::Idle) {
             Transfer::BlockDownload(receiver) => {
                 receiver.end(end, &mut self.buffer, objects, now)?;
-                self.say(Response::BlockDownloaded)
+                Ok(self.say(Response::BlockDownloaded))
             }
             _ => Err(Abort::Command),
         }
@@ -332,7 +330,7 @@ impl Server {
         }
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
         self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
-        self.say(Response::BlockUpload { at, crc: true, size: Some(source.size()) })
+        Ok(self.say(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
     }
 
     fn sender(&mut self) -> Result<&mut Sender, Abort> {
@@ -355,8 +353,8 @@ impl Server {
         send: impl FnMut([u8; 8]) -> bool,
     ) -> bool {
         let Transfer::BlockUpload(sender) = &mut self.transfer else { return false };
-        let sent = sender.send(&self.buffer, objects, send);
-        self.settle(sent.map(|()| false), now)
+        let result = sender.send(&self.buffer, objects, send);
+        self.settle(result.map(|()| false), now)
     }
 }
 
