@@ -41,9 +41,12 @@ pub struct Device<A, const N: usize> {
     /// When to go on with a block that found the queue full.
     block_due: Instant,
     lss: Slave,
-    /// A response of LSS that found the queue full, and when to try again.
-    lss_response: Option<(crate::lss::Response, Instant)>,
-    switching: Option<lss::Switching>,
+    /// The last response of LSS, and when to try again if it found the queue full.
+    lss_reply: [u8; 8],
+    lss_reply_due: Instant,
+    switching: lss::Switching,
+    /// When its next step is due.
+    switching_due: Instant,
     core: Core<A, N>,
 }
 
@@ -120,8 +123,10 @@ impl<A: Application, const N: usize> Device<A, N> {
             reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
-            lss_response: None,
-            switching: None,
+            lss_reply: [0; 8],
+            lss_reply_due: Instant::NEVER,
+            switching: lss::Switching::No,
+            switching_due: Instant::NEVER,
             core,
         }
     }

@@ -6,6 +6,7 @@ use crate::dictionary::{Entry, Group};
 use crate::emcy::Fault;
 use crate::lss::BitRate;
 use crate::nmt::{Command, State};
+use crate::transmit::Turn;
 use crate::{CanId, Instant, NodeId, Transmit};
 
 /// 1F80h: the one value that makes the node start by itself.
@@ -102,11 +103,11 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     /// There are values now. A device with an error, or one that its master has already told a state, does not start.
-    pub(super) fn start_by_itself(&mut self, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn start_by_itself(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let Some(state) = self.core.pending.with_values.take() else { return };
         if self.core.emcy.register() == 0 {
             self.core.enter(state);
-            self.send_process(now, out);
+            self.send_process(turn);
         }
     }
 

@@ -8,6 +8,7 @@ use crate::dictionary::{Entry, Group, Rule};
 use crate::emcy::Fault;
 use crate::lss::{Configuration, Slave};
 use crate::sdo::Abort;
+use crate::transmit::Turn;
 use crate::{Instant, Transmit};
 
 /// What 1010h and 1011h take: "save" and "load".
@@ -117,27 +118,26 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// The job is done, or cannot be: whoever waits for it is answered.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) {
         let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
-        let out = &mut self.gate(out);
+        let turn = &mut self.turn(now, out);
         if lss_waits {
-            self.respond_lss(Slave::stored(result.is_ok()), now, out);
+            self.respond_lss(Slave::stored(result.is_ok()), turn);
         }
         if self.server.release(result, now) {
-            self.respond(now, out);
+            self.respond(turn);
         }
     }
 
     pub(super) fn store_configuration(
         &mut self,
         configuration: Configuration,
-        now: Instant,
-        out: &mut impl Transmit,
+        turn: &mut Turn<'_, impl Transmit>,
     ) {
         if A::SERVICES_ONLY {
-            return self.respond_lss(Slave::stored(false), now, out);
+            return self.respond_lss(Slave::stored(false), turn);
         }
         match self.core.jobs.begin(Job::Configure(configuration)) {
             Ok(()) => self.core.jobs.lss_waits = true,
-            Err(_) => self.respond_lss(Slave::stored(false), now, out),
+            Err(_) => self.respond_lss(Slave::stored(false), turn),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::history::History;
 use super::{Fault, FaultSet, Message};
 use crate::sdo::Abort;
-use crate::transmit::RETRY;
+use crate::transmit::{RETRY, Turn};
 use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
@@ -107,8 +107,8 @@ impl Producer {
     }
 
     /// Sends what waits. To be called in states that have EMCY only; what waits then waits on.
-    pub(crate) fn poll(&mut self, now: Instant, out: &mut impl Transmit) {
-        if now < self.due {
+    pub(crate) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now < self.due {
             return;
         }
         let Some(cob_id) = self.id else {
@@ -117,13 +117,13 @@ impl Producer {
             return;
         };
         while let Some(message) = self.waiting.front() {
-            if out.send(Frame::data_frame(cob_id.id, 8, message.encode())).is_err() {
-                self.due = now + RETRY;
+            if !turn.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
+                self.due = turn.now + RETRY;
                 return;
             }
             let _ = self.waiting.pop_front();
             if self.inhibit != 0 {
-                self.inhibited_until = now + Duration::from_inhibit(self.inhibit);
+                self.inhibited_until = turn.now + Duration::from_inhibit(self.inhibit);
                 self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
                 return;
             }

@@ -1,7 +1,7 @@
 //! The producer and the boot-up message (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
 
 use crate::nmt::State;
-use crate::transmit::RETRY;
+use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Sends boot-up once and then a heartbeat every period (1017h).
@@ -37,17 +37,17 @@ impl Producer {
     }
 
     /// Sends what is due.
-    pub(crate) fn poll(&mut self, id: CanId, state: State, now: Instant, out: &mut impl Transmit) {
-        if now < self.due {
+    pub(crate) fn poll(&mut self, id: CanId, state: State, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now < self.due {
             return;
         }
         let code = if self.boot_up { State::Initialising.code() } else { state.code() };
-        if out.send(Frame::data_frame(id, 1, [code, 0, 0, 0, 0, 0, 0, 0])).is_err() {
-            self.due = now + RETRY;
+        if !turn.send(Frame::data_frame(id, 1, [code, 0, 0, 0, 0, 0, 0, 0])) {
+            self.due = turn.now + RETRY;
             return;
         }
         self.boot_up = false;
-        self.due = self.following(now);
+        self.due = self.following(turn.now);
     }
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.

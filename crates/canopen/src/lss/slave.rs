@@ -28,7 +28,14 @@ pub(crate) enum Effect {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Switch {
     pub(crate) bit_rate: BitRate,
-    pub(crate) delay: Duration,
+    /// In ms.
+    delay: u16,
+}
+
+impl Switch {
+    pub(crate) fn delay(self) -> Duration {
+        Duration::from_millis(self.delay.into())
+    }
 }
 
 /// A response, an effect, both or nothing.
@@ -107,7 +114,6 @@ impl Slave {
                 Response::BitTiming(self.set_bit_rate(table, index)).into()
             }
             Request::Activate { delay } => {
-                let delay = Duration::from_millis(delay.into());
                 Effect::Switch(Switch { bit_rate: self.pending.bit_rate, delay }).into()
             }
             Request::Store => Effect::Store(self.pending).into(),

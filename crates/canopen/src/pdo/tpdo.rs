@@ -6,7 +6,7 @@
 
 use super::{Layout, Transmission};
 use crate::sync::Sync;
-use crate::transmit::RETRY;
+use crate::transmit::{RETRY, Turn};
 use crate::{CanId, CobId, Duration, Frame, Instant, Transmit};
 
 /// What the objects 1800h.. and 1A00h.. say about a TPDO that is valid.
@@ -109,7 +109,7 @@ impl Tpdo {
     }
 
     /// A SYNC arrived.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         match settings.transmission {
             Transmission::SyncCyclic(every) => {
@@ -121,37 +121,37 @@ impl Tpdo {
                 self.syncs = self.syncs.saturating_add(1);
                 if self.syncs >= every.get() {
                     self.syncs = 0;
-                    self.send(image, now, out);
+                    self.send(image, turn);
                 }
             }
-            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, now, out),
+            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, turn),
             Transmission::SyncRemote => self.data = Some(settings.layout.gather(image)),
             _ => (),
         }
     }
 
     /// A remote frame asks for it. The synchronous types 0 to 240 belong to the SYNC and do not answer.
-    pub(crate) fn on_remote(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_remote(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = self.settings.as_ref().filter(|settings| settings.answers_remote) else {
             return;
         };
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // The client asks again if the queue is full: a sample of the past need not be kept for it.
-                let _ = out.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+                turn.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
-                self.send(image, now, out);
+                self.send(image, turn);
             }
             _ => (),
         }
     }
 
     /// Mapped values may have changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         if self.settings.as_ref().is_some_and(Settings::sends_on_change) && self.has_changed(image) {
             self.pending = true;
-            self.poll(image, now, out);
+            self.poll(image, turn);
         }
     }
 
@@ -166,14 +166,14 @@ impl Tpdo {
     }
 
     /// Sends what is due.
-    pub(crate) fn poll(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
-        let elapsed = now >= self.event_due;
+    pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+        let elapsed = turn.now >= self.event_due;
         self.pending |= elapsed;
         if elapsed {
-            self.event_due = self.following_event(now);
+            self.event_due = self.following_event(turn.now);
         }
-        if self.pending && now >= self.inhibited_until {
-            self.send(image, now, out);
+        if self.pending && turn.now >= self.inhibited_until {
+            self.send(image, turn);
         }
     }
 
@@ -188,17 +188,17 @@ impl Tpdo {
     }
 
     /// Sends the present values. A full queue leaves it pending: when there is room, the values of then go out.
-    fn send(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         let data = settings.layout.gather(image);
-        let sent = out.send(Frame::data_frame(settings.id, settings.layout.len(), data)).is_ok();
+        let sent = turn.send(Frame::data_frame(settings.id, settings.layout.len(), data));
         self.pending = !sent;
-        self.inhibited_until = now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
+        self.inhibited_until = turn.now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
         if sent {
             self.data = Some(data);
         }
         if settings.transmission.is_event_driven() && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(now);
+            self.event_due = self.following_event(turn.now);
         }
     }
 }
