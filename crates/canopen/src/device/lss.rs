@@ -19,20 +19,22 @@ pub(super) enum Switching {
 }
 
 impl<A: Application, const N: usize> Device<A, N> {
+    #[inline(never)]
     pub(super) fn on_lss(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let Some(request) = frame.full().and_then(Request::parse) else { return };
         let identity = self.core.identity();
         let outcome = self.lss.take(request, &identity, self.core.node_id);
+        let mut response = outcome.response;
         match outcome.effect {
             Some(Effect::Join) => self.core.begin_join(),
             Some(Effect::Switch(switch)) => {
                 self.switching = Switching::Before(switch);
                 self.switching_due = turn.now + switch.delay();
             }
-            Some(Effect::Store(configuration)) => self.store_configuration(configuration, turn),
+            Some(Effect::Store(configuration)) => response = self.core.store_configuration(configuration),
             None => (),
         }
-        if let Some(response) = outcome.response {
+        if let Some(response) = response {
             self.respond_lss(response, turn);
         }
         self.core.services_due = STALE;
@@ -44,6 +46,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         self.send_lss(turn);
     }
 
+    #[inline(never)]
     fn send_lss(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let is_sent = turn.send(Frame::data_frame(RESPONSE, 8, self.lss_reply));
         self.lss_reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };

@@ -68,9 +68,11 @@ struct Core<A, const N: usize> {
     /// The CAN-IDs of those that are valid, in one place: each frame of anybody is compared with them.
     rpdo_ids: [u16; PDOS],
     scanner: Scanner,
-    /// The PDOs that are valid, and the RPDOs that have a fault.
+    /// The PDOs that are valid, those of them that the SYNC concerns, and the RPDOs that have a fault.
     valid_tpdos: PdoSet,
+    synchronous_tpdos: PdoSet,
     valid_rpdos: PdoSet,
+    synchronous_rpdos: PdoSet,
     faulty_rpdos: PdoSet,
     /// Cached next deadlines; `STALE` after a change that may have moved them.
     process_due: Instant,
@@ -110,7 +112,9 @@ impl<A: Application, const N: usize> Device<A, N> {
             rpdo_ids: [NO_ID; PDOS],
             scanner: Scanner::new(),
             valid_tpdos: PdoSet::EMPTY,
+            synchronous_tpdos: PdoSet::EMPTY,
             valid_rpdos: PdoSet::EMPTY,
+            synchronous_rpdos: PdoSet::EMPTY,
             faulty_rpdos: PdoSet::EMPTY,
             process_due: Instant::NEVER,
             services_due: Instant::NEVER,

@@ -11,7 +11,7 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
     const IS_SMALL: bool = A::SERVICES_ONLY;
 
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
-        let entry = self.entry(at)?;
+        let entry = self.dictionary.find(at.index, at.sub)?;
         if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
@@ -59,17 +59,8 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
-    /// The entry, or the one that it is another name of.
-    fn entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
-        match entry.rule() {
-            Rule::EventTimerOf(number) => self.dictionary.find(0x1800 | u16::from(number), 5),
-            _ => Ok(entry),
-        }
-    }
-
     fn writable_entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
-        let entry = self.entry(at)?;
+        let entry = self.dictionary.find(at.index, at.sub)?;
         if entry.attributes.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
     }
 
@@ -146,6 +137,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             | Rule::PdoType
             | Rule::PdoInhibit
             | Rule::PdoEventTimer
+            | Rule::EventTimerOf(_)
             | Rule::PdoSyncStart => self.configure_pdo(entry, now),
             _ => (),
         }

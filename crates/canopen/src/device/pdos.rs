@@ -25,10 +25,10 @@ struct Pdo {
 
 impl Pdo {
     fn of(entry: &Entry) -> Pdo {
-        Pdo::at(entry.index())
-    }
-
-    fn at(index: u16) -> Pdo {
+        let index = match entry.rule() {
+            Rule::EventTimerOf(number) => 0x1800 | u16::from(number),
+            _ => entry.index(),
+        };
         let direction = if index & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive };
         Pdo { direction, number: index & 0x01FF }
     }
@@ -83,6 +83,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn configure_tpdo(&mut self, pdo: Pdo, place: u8) {
         let settings = self.tpdo_settings(pdo);
         self.valid_tpdos.set(place, settings.is_some());
+        let is_synchronous = settings.as_ref().is_some_and(|settings| settings.transmission.is_synchronous());
+        self.synchronous_tpdos.set(place, is_synchronous);
         if let Some(tpdo) = self.tpdos.get_mut(usize::from(place)) {
             tpdo.configure(settings);
             if self.state.has_pdos() {
@@ -94,6 +96,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn configure_rpdo(&mut self, pdo: Pdo, place: u8, now: Instant) {
         let settings = self.rpdo_settings(pdo);
         self.valid_rpdos.set(place, settings.is_some());
+        self.synchronous_rpdos.set(place, settings.as_ref().is_some_and(RpdoSettings::is_synchronous));
         let number = usize::from(place);
         if let (Some(rpdo), Some(id)) = (self.rpdos.get_mut(number), self.rpdo_ids.get_mut(number)) {
             rpdo.configure(settings);

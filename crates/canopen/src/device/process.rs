@@ -2,7 +2,7 @@
 
 use super::{Application, Core, Device, STALE};
 use crate::nmt::Command;
-use crate::pdo::{Rpdo, Tpdo};
+use crate::pdo::{PdoSet, Rpdo, Tpdo};
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
@@ -17,6 +17,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
     }
 
+    #[inline(never)]
     fn on_nmt(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let own = self.core.node_id.filter(|_| !self.core.is_initialising());
         let Some(command) = own.and_then(|own| Command::parse(frame.data(), own)) else { return };
@@ -38,7 +39,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         if turn.now >= core.process_due {
             core.poll_sync(turn.now);
             core.poll_rpdos(turn.now);
-            core.each_tpdo(|tpdo, image| tpdo.poll(image, turn));
+            core.each_tpdo(core.valid_tpdos, |tpdo, image| tpdo.poll(image, turn));
             core.scanner.poll(&core.image, turn);
             let pdos = core.next_tpdo().min(core.next_rpdo()).min(core.scanner.due());
             core.process_due = pdos.min(core.sync.due());
@@ -51,7 +52,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         let turn = &mut self.turn(now, out);
         self.start_by_itself(turn);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
-            self.core.each_tpdo(|tpdo, image| tpdo.on_change(image, turn));
+            self.core.each_tpdo(self.core.valid_tpdos, |tpdo, image| tpdo.on_change(image, turn));
             self.core.scanner.on_change(&self.core.image, turn);
             self.core.process_due = self.core.process_due.min(self.core.scanner.due());
         }
@@ -70,7 +71,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         if self.sync.accepts(frame) {
             self.on_sync(frame, turn);
         } else if frame.is_remote() {
-            self.each_tpdo(|tpdo, image| {
+            self.each_tpdo(self.valid_tpdos, |tpdo, image| {
                 if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
                     tpdo.on_remote(image, turn);
                 }
@@ -85,9 +86,9 @@ impl<A: Application, const N: usize> Core<A, N> {
         valid.map(Tpdo::due).fold(Instant::NEVER, Instant::min)
     }
 
-    /// Visits the TPDOs that are valid. What one of them could not send at once moves the next deadline.
-    pub(super) fn each_tpdo(&mut self, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
-        for number in self.valid_tpdos.iter() {
+    /// Visits some TPDOs. What one of them could not send at once moves the next deadline.
+    pub(super) fn each_tpdo(&mut self, tpdos: PdoSet, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
+        for number in tpdos.iter() {
             let Some(tpdo) = self.tpdos.get_mut(usize::from(number)) else { return };
             visit(tpdo, &self.image);
             if tpdo.is_pending() {

@@ -6,9 +6,8 @@ use super::state::Scope;
 use super::{Action, Application, Core, Device};
 use crate::dictionary::{Entry, Group, Rule};
 use crate::emcy::Fault;
-use crate::lss::{Configuration, Slave};
+use crate::lss::{self, Configuration, Slave};
 use crate::sdo::Abort;
-use crate::transmit::Turn;
 use crate::{Instant, Transmit};
 
 /// What 1010h and 1011h take: "save" and "load".
@@ -126,20 +125,6 @@ impl<A: Application, const N: usize> Device<A, N> {
             self.respond(turn);
         }
     }
-
-    pub(super) fn store_configuration(
-        &mut self,
-        configuration: Configuration,
-        turn: &mut Turn<'_, impl Transmit>,
-    ) {
-        if A::SERVICES_ONLY {
-            return self.respond_lss(Slave::stored(false), turn);
-        }
-        match self.core.jobs.begin(Job::Configure(configuration)) {
-            Ok(()) => self.core.jobs.lss_waits = true,
-            Err(_) => self.respond_lss(Slave::stored(false), turn),
-        }
-    }
 }
 
 impl Default for Jobs {
@@ -164,6 +149,13 @@ impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
         let job = Job::Save(Selection::Calibration);
         if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
+    }
+
+    /// Begins to store what LSS has configured. The response, unless it waits for the end.
+    pub(super) fn store_configuration(&mut self, configuration: Configuration) -> Option<lss::Response> {
+        let is_begun = !A::SERVICES_ONLY && self.jobs.begin(Job::Configure(configuration)).is_ok();
+        self.jobs.lss_waits |= is_begun;
+        (!is_begun).then_some(Slave::stored(false))
     }
 
     /// Begins a job for whose end the answer to the client waits.

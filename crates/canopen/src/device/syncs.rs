@@ -27,11 +27,11 @@ impl<A: Application, const N: usize> Core<A, N> {
         if self.sync.is_back() {
             self.clear(Fault::SyncMissing, turn.now);
         }
-        for number in self.valid_rpdos.iter() {
+        for number in self.synchronous_rpdos.iter() {
             let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
             rpdo.on_sync(&mut self.image);
         }
-        self.each_tpdo(|tpdo, image| tpdo.on_sync(sync, image, turn));
+        self.each_tpdo(self.synchronous_tpdos, |tpdo, image| tpdo.on_sync(sync, image, turn));
         self.process_due = self.process_due.min(self.sync.due());
     }
 

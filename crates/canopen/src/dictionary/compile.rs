@@ -2,7 +2,7 @@
 
 use super::entry::Attributes;
 use super::tables::{PdoNumbers, Place, Series};
-use super::{Access, DefaultValue, Object, Tables, Type};
+use super::{Access, DefaultValue, Object, Rule, Tables, Type};
 use crate::device::PDOS;
 
 /// How many rows the parts of a table have together.
@@ -71,7 +71,7 @@ pub const fn compile<const S: usize, const P: usize, const A: usize>(rows: &[Obj
     while row < rows.len() {
         let object = rows.split_at(row).1.split_at(object_len(rows, row)).0;
         let objects = series_len(rows, row);
-        filling.add_series(object, objects);
+        filling.add_series(rows, object, objects);
         row += object.len() * objects;
     }
     filling.tables
@@ -88,8 +88,8 @@ struct Filling<const S: usize, const P: usize, const A: usize> {
 
 #[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges.
 impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
-    /// So many objects like this one.
-    const fn add_series(&mut self, object: &[Object], objects: usize) {
+    /// So many objects of all `rows` like this one.
+    const fn add_series(&mut self, rows: &[Object], object: &[Object], objects: usize) {
         let stride = image_size(object);
         self.tables.series[self.series] = Series {
             index: object[0].index,
@@ -100,7 +100,11 @@ impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
         };
         let (mut row, mut offset) = (0, self.offset);
         while row < object.len() {
-            self.add_place(&object[row], offset);
+            let place = match object[row].rule {
+                Rule::EventTimerOf(number) => image_size(rows.split_at(event_timer(rows, number)).0),
+                _ => offset,
+            };
+            self.add_place(&object[row], place);
             (row, offset) = (row + 1, offset + object[row].stored_size());
         }
         (self.series, self.offset) = (self.series + 1, self.offset + stride * objects);
@@ -131,6 +135,18 @@ const fn pdo_numbers(rows: &[Object], first: u16) -> PdoNumbers {
         row += 1;
     }
     pdos
+}
+
+/// The row of the event timer of a TPDO.
+///
+/// # Panics
+/// During compilation, when there is none.
+pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
+    let mut row = 0;
+    while rows[row].key() != (0x1800 | number as u32) << 8 | 5 {
+        row += 1;
+    }
+    row
 }
 
 /// A series of no object, after all others: no search ends in it.

@@ -32,6 +32,11 @@ impl RpdoSettings {
 }
 
 impl RpdoSettings {
+    /// Whether its data waits for the SYNC.
+    pub(crate) fn is_synchronous(&self) -> bool {
+        self.is_synchronous
+    }
+
     /// Bytes that it must have.
     fn len(&self) -> usize {
         match &self.content {

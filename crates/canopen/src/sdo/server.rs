@@ -306,13 +306,10 @@ impl Server {
     }
 
     fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
-        match core::mem::replace(&mut self.transfer, Transfer::Idle) {
-            Transfer::BlockDownload(receiver) => {
-                receiver.end(end, &mut self.buffer, objects, now)?;
-                Ok(self.say(Response::BlockDownloaded))
-            }
-            _ => Err(Abort::Command),
-        }
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
+        receiver.end(end, &mut self.buffer, objects, now)?;
+        self.transfer = Transfer::Idle;
+        Ok(self.say(Response::BlockDownloaded))
     }
 
     /// A value of no more than `threshold` bytes goes by the simpler transfers.
