@@ -65,8 +65,9 @@ struct Core<A, const N: usize> {
     emcy: emcy::Producer,
     tpdos: [Tpdo; PDOS],
     rpdos: [Rpdo; PDOS],
-    /// The CAN-IDs of those that are valid, in one place: each frame of anybody is compared with them.
-    rpdo_ids: [u16; PDOS],
+    /// What CAN-IDs those that are valid have, a bit for each value of five bits of them: it keeps away most frames of
+    /// anybody else.
+    rpdo_filter: u32,
     scanner: Scanner,
     /// The PDOs that are valid, those of them that the SYNC concerns, and the RPDOs that have a fault.
     valid_tpdos: PdoSet,
@@ -81,9 +82,6 @@ struct Core<A, const N: usize> {
     jobs: store::Jobs,
     unsound: store::Unsound,
 }
-
-/// The CAN-ID of no frame.
-const NO_ID: u16 = u16::MAX;
 
 /// A deadline in the past: the next poll looks at everything.
 const STALE: Instant = Instant(0);
@@ -109,7 +107,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             emcy: emcy::Producer::new(),
             tpdos: [const { Tpdo::new() }; PDOS],
             rpdos: [const { Rpdo::new() }; PDOS],
-            rpdo_ids: [NO_ID; PDOS],
+            rpdo_filter: 0,
             scanner: Scanner::new(),
             valid_tpdos: PdoSet::EMPTY,
             synchronous_tpdos: PdoSet::EMPTY,

@@ -3,14 +3,14 @@
 //! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
 //! entries, count, COB-ID valid.
 
-use super::{Application, Core, NO_ID};
+use super::{Application, Core};
 use crate::dictionary::{Dictionary, Entry, Rule};
 use crate::pdo::{
     Addressing, Content, Direction, Layout, MappedObject, RpdoSettings, ScannerSettings, Settings,
     Transmission, locate,
 };
 use crate::sdo::Abort;
-use crate::{CanId, CobId, Instant};
+use crate::{CobId, Instant};
 
 /// A PDO by the index of one of its objects.
 ///
@@ -97,11 +97,10 @@ impl<A: Application, const N: usize> Core<A, N> {
         let settings = self.rpdo_settings(pdo);
         self.valid_rpdos.set(place, settings.is_some());
         self.synchronous_rpdos.set(place, settings.as_ref().is_some_and(RpdoSettings::is_synchronous));
-        let number = usize::from(place);
-        if let (Some(rpdo), Some(id)) = (self.rpdos.get_mut(number), self.rpdo_ids.get_mut(number)) {
+        if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
             rpdo.configure(settings);
-            *id = rpdo.id().map_or(NO_ID, CanId::get);
         }
+        self.update_rpdo_filter();
         self.forget_rpdo_faults(place, now);
     }
 
