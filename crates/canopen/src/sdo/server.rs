@@ -97,8 +97,7 @@ impl Server {
         // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
         if !O::IS_SMALL && matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
             let answer = self.dispatch(frame, objects, now);
-            let answer = self.hold(answer, objects);
-            return self.settle(answer, now);
+            return self.conclude(answer, objects, now);
         }
         if let Some(reply) = self.repeated(frame) {
             self.reply = reply;
@@ -108,8 +107,7 @@ impl Server {
             Some(segment) => self.take_block_segment(segment, objects),
             None => self.dispatch(frame, objects, now),
         };
-        let answer = self.hold(answer, objects);
-        let has_reply = self.settle(answer, now);
+        let has_reply = self.conclude(answer, objects, now);
         self.previous = (frame, has_reply.then_some(self.reply));
         has_reply
     }
@@ -165,15 +163,14 @@ impl Server {
         true
     }
 
-    /// Keeps back the reply to a write that takes its time.
-    fn hold(&mut self, answer: Answer, objects: &mut impl Objects) -> Answer {
-        match answer {
-            Ok(true) if objects.take_deferred() => {
-                self.transfer = Transfer::Held;
-                Ok(false)
-            }
-            answer => answer,
+    /// The end of a request: an error ends the transfer, and the reply to a write that takes its time is kept back.
+    fn conclude(&mut self, answer: Answer, objects: &mut impl Objects, now: Instant) -> bool {
+        let has_reply = self.settle(answer, now);
+        let is_held = answer == Ok(true) && objects.take_deferred();
+        if is_held {
+            self.transfer = Transfer::Held;
         }
+        has_reply && !is_held
     }
 
     /// Whether there is a reply that was kept back and for which its client still waits.
