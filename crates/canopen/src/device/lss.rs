@@ -1,7 +1,7 @@
 //! LSS in the device: it works in every NMT state, and without a node-ID it is all there is.
 
 use super::{Action, Application, Core, Device, STALE};
-use crate::lss::{Effect, Identity, RESPONSE, Request, Response, Switch};
+use crate::lss::{Identity, Outcome, RESPONSE, Request, Response, Switch};
 use crate::transmit::{RETRY, Turn};
 use crate::{Frame, Instant, Transmit};
 
@@ -24,16 +24,20 @@ impl<A: Application, const N: usize> Device<A, N> {
         let Some(request) = frame.full().and_then(Request::parse) else { return };
         let identity = self.core.identity();
         let outcome = self.lss.take(request, &identity, self.core.node_id);
-        let mut response = outcome.response;
-        match outcome.effect {
-            Some(Effect::Join) => self.core.begin_join(),
-            Some(Effect::Switch(switch)) => {
+        let response = match outcome {
+            Outcome::Silence => None,
+            Outcome::Answer(response) => Some(response),
+            Outcome::Join => {
+                self.core.begin_join();
+                None
+            }
+            Outcome::Switch(switch) => {
                 self.switching = Switching::Before(switch);
                 self.switching_due = turn.now + switch.delay();
+                None
             }
-            Some(Effect::Store(configuration)) => response = self.core.store_configuration(configuration),
-            None => (),
-        }
+            Outcome::Store(configuration) => self.core.store_configuration(configuration),
+        };
         if let Some(response) = response {
             self.respond_lss(response, turn);
         }

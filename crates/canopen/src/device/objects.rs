@@ -107,11 +107,13 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::Setting => self.begin_deferred(Job::Set(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
-            Rule::PdoCobId | Rule::PdoPredefined => self.admit_pdo_cob_id(entry, value),
-            Rule::PdoType => self.admit_pdo_type(entry, value),
-            Rule::PdoInhibit | Rule::PdoSyncStart if self.pdo_is_valid(entry) => Err(Abort::InvalidValue),
-            Rule::PdoCount => self.admit_pdo_count(entry, value),
-            Rule::PdoSlot => self.admit_pdo_slot(entry, value),
+            Rule::PdoCobId
+            | Rule::PdoPredefined
+            | Rule::PdoType
+            | Rule::PdoInhibit
+            | Rule::PdoSyncStart
+            | Rule::PdoCount
+            | Rule::PdoSlot => self.admit_pdo(entry, value),
             _ => Ok(()),
         }
     }

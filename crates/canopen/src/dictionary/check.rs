@@ -29,7 +29,10 @@ pub const fn check(rows: &[Object]) {
         assert!(!is_pdo || rows[i].sub > 0 || has(rows, rows[i].key() | 1), "a PDO has no COB-ID");
         if let Rule::EventTimerOf(number) = rows[i].rule {
             let timer = &rows[event_timer(rows, number)];
-            assert!(matches!(timer.access, Access::ReadWrite), "an event timer is written under its other name");
+            assert!(
+                matches!(timer.access, Access::ReadWrite),
+                "an event timer is written under its other name"
+            );
             assert!(timer.limits.is_none() && rows[i].limits.is_none(), "an event timer has no limits");
         }
         i += 1;

@@ -1,7 +1,7 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::entry::Attributes;
-use super::tables::{PdoNumbers, Place, Series};
+use super::tables::{Pdos, Place, Series};
 use super::{Access, DefaultValue, Object, Rule, Tables, Type};
 use crate::device::PDOS;
 
@@ -63,8 +63,8 @@ pub const fn compile<const S: usize, const P: usize, const A: usize>(rows: &[Obj
         series: [UNUSED; S],
         places: [NO_PLACE; P],
         attributes: [attributes(&rows[0]); A],
-        tpdos: pdo_numbers(rows, 0x1800),
-        rpdos: pdo_numbers(rows, 0x1400),
+        tpdos: pdos(rows, 0x1800),
+        rpdos: pdos(rows, 0x1400),
     };
     let mut filling = Filling { tables, series: 0, places: 0, attributes: 0, offset: 0 };
     let mut row = 0;
@@ -124,12 +124,12 @@ impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
 }
 
 /// Of the PDOs whose communication objects are among the 512 indexes from `first` on.
-const fn pdo_numbers(rows: &[Object], first: u16) -> PdoNumbers {
-    let mut pdos = PdoNumbers { count: 0, numbers: [0; PDOS] };
+const fn pdos(rows: &[Object], first: u16) -> Pdos {
+    let mut pdos = Pdos { count: 0, indexes: [0; PDOS] };
     let mut row = 0;
     while row < rows.len() {
         if rows[row].index & 0xFE00 == first && rows[row].sub == 0 {
-            pdos.numbers[pdos.count as usize] = rows[row].index & 0x01FF;
+            pdos.indexes[pdos.count as usize] = rows[row].index;
             pdos.count += 1;
         }
         row += 1;

@@ -42,16 +42,16 @@ pub(crate) struct Place {
     pub(crate) offset: u16,
 }
 
-/// The numbers of the PDOs of a dictionary one way, 0 to 511, ascending.
+/// The communication objects of the PDOs of a dictionary one way, ascending.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PdoNumbers {
+pub(crate) struct Pdos {
     pub(crate) count: u8,
-    pub(crate) numbers: [u16; PDOS],
+    pub(crate) indexes: [u16; PDOS],
 }
 
-impl PdoNumbers {
+impl Pdos {
     fn as_slice(&self) -> &[u16] {
-        self.numbers.get(..usize::from(self.count)).unwrap_or(&self.numbers)
+        self.indexes.get(..usize::from(self.count)).unwrap_or(&self.indexes)
     }
 }
 
@@ -61,8 +61,8 @@ pub struct Tables<const S: usize, const P: usize, const A: usize> {
     pub(crate) series: [Series; S],
     pub(crate) places: [Place; P],
     pub(crate) attributes: [Attributes; A],
-    pub(crate) tpdos: PdoNumbers,
-    pub(crate) rpdos: PdoNumbers,
+    pub(crate) tpdos: Pdos,
+    pub(crate) rpdos: Pdos,
 }
 
 /// The dictionary of one personality.
@@ -71,8 +71,8 @@ pub struct Dictionary {
     series: &'static [Series],
     places: &'static [Place],
     attributes: &'static [Attributes],
-    tpdos: &'static PdoNumbers,
-    rpdos: &'static PdoNumbers,
+    tpdos: &'static Pdos,
+    rpdos: &'static Pdos,
     defaults: &'static [u8],
 }
 
@@ -100,7 +100,7 @@ impl Dictionary {
         self.defaults
     }
 
-    /// The numbers of its PDOs one way.
+    /// The indexes of the communication objects of its PDOs one way.
     pub(crate) fn pdos(&self, direction: Direction) -> &'static [u16] {
         match direction {
             Direction::Transmit => self.tpdos.as_slice(),

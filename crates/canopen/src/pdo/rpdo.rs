@@ -4,7 +4,7 @@
 //! again within that time.
 
 use super::{Addressing, Content, Transmission};
-use crate::{CanId, CobId, Duration, Frame, Instant};
+use crate::{CanId, Duration, Frame, Instant};
 
 /// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
 #[derive(Clone, Copy, Debug)]
@@ -17,17 +17,15 @@ pub(crate) struct RpdoSettings {
 }
 
 impl RpdoSettings {
-    /// From a COB-ID and a transmission type as they are stored; `None` for a PDO that is not valid.
+    /// `None` for a transmission type that an RPDO cannot have.
     pub(crate) fn new(
-        cob_id: u32,
-        transmission: u8,
+        id: CanId,
+        transmission: Transmission,
         deadline: u16,
         content: Content,
     ) -> Option<RpdoSettings> {
-        let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
-        let transmission = Transmission::parse(transmission).filter(|kind| !kind.needs_remote())?;
         let is_synchronous = !transmission.is_event_driven();
-        Some(RpdoSettings { id: cob_id.id, is_synchronous, deadline, content })
+        (!transmission.needs_remote()).then_some(RpdoSettings { id, is_synchronous, deadline, content })
     }
 }
 

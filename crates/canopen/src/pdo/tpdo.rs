@@ -7,7 +7,7 @@
 use super::{Layout, Transmission};
 use crate::sync::Sync;
 use crate::transmit::{RETRY, Turn};
-use crate::{CanId, CobId, Duration, Frame, Instant, Transmit};
+use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// What the objects 1800h.. and 1A00h.. say about a TPDO that is valid.
 #[derive(Clone, Copy, Debug)]
@@ -26,20 +26,6 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// From a COB-ID and a transmission type as they are stored; `None` for a PDO that is not valid.
-    pub(crate) fn new(cob_id: u32, transmission: u8) -> Option<Settings> {
-        let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
-        Some(Settings {
-            id: cob_id.id,
-            answers_remote: !cob_id.bit30,
-            transmission: Transmission::parse(transmission)?,
-            inhibit: 0,
-            event: 0,
-            sync_start: 0,
-            layout: Layout::default(),
-        })
-    }
-
     fn sends_on_change(&self) -> bool {
         self.transmission == Transmission::Event && self.event == 0
     }
