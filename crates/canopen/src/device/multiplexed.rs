@@ -40,9 +40,9 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// What the scanner list names: blocks of sub-indexes of one object.
     fn watch_listed(&mut self) {
         let [count, ..] = self.number(SCANNER_LIST, 0).to_le_bytes();
-        for line in 1..=count {
-            let [first, low, high, size] = self.number(SCANNER_LIST, line).to_le_bytes();
-            for sub in (first..=u8::MAX).take(size.into()) {
+        for line in 0..count {
+            let [first, low, high, size] = self.number(SCANNER_LIST, line + 1).to_le_bytes();
+            for sub in first..first.saturating_add(size) {
                 if let Ok(entry) = self.dictionary.find(u16::from_le_bytes([low, high]), sub) {
                     self.watch_entry(&entry);
                 }
@@ -94,10 +94,12 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
         let count = self.number(DISPATCHING_LIST, 0).to_le_bytes()[0];
-        let mut lines = (1..=count).filter_map(|sub| self.dispatching_line(sub));
-        let target = lines.find_map(|line| line.target(mpdo.at, sender));
-        if let Some(at) = target {
-            self.store_mpdo(at, mpdo.data);
+        for line in 0..count {
+            let target = self.dispatching_line(line + 1).and_then(|line| line.target(mpdo.at, sender));
+            if let Some(at) = target {
+                self.store_mpdo(at, mpdo.data);
+                return;
+            }
         }
     }
 

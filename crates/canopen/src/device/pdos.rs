@@ -170,8 +170,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// The layout of the first `count` mapping entries.
     fn layout(&self, pdo: Pdo, count: u8) -> Result<Layout, Abort> {
         let mut layout = Layout::default();
-        for sub in (1..=u8::MAX).take(count.into()) {
-            let mapped = MappedObject::parse(self.number(pdo.mapping(), sub));
+        for slot in 0..count {
+            let mapped = MappedObject::parse(self.number(pdo.mapping(), slot + 1));
             layout.push(locate(self.dictionary, mapped, pdo.direction())?)?;
         }
         Ok(layout)
