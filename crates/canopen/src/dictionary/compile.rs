@@ -1,8 +1,9 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::filling::{Filling, attributes, is_same};
-use super::tables::Series;
+use super::tables::{Pdos, Series};
 use super::{Access, Dictionary, Object, Tables, Type, check};
+use crate::device::PDOS;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -53,12 +54,13 @@ macro_rules! dictionaries {
         const ROWS_OF_ALL: &[&[make::Object]] = &$all;
         const ROOM: make::Counts = make::Counts::of(ROWS_OF_ALL);
         static COMPILED_TABLES: make::Tables<
+            { ROWS_OF_ALL.len() },
             { ROOM.series },
             { ROOM.places },
             { ROOM.attributes },
             { ROOM.defaults },
-        > = make::compile(ROWS_OF_ALL);
-        COMPILED_TABLES.dictionaries::<{ ROWS_OF_ALL.len() }>(ROWS_OF_ALL)
+        > = make::compile(&$all);
+        COMPILED_TABLES.dictionaries(&$all)
     }};
 }
 
@@ -96,15 +98,22 @@ impl Counts {
 /// # Panics
 /// During compilation, when they are less.
 #[must_use]
-pub const fn compile<const S: usize, const P: usize, const A: usize, const V: usize>(
-    all: &[&[Object]],
-) -> Tables<S, P, A, V> {
+pub const fn compile<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize>(
+    all: &[&[Object]; D],
+) -> Tables<D, S, P, A, V> {
     let Filling { series, places, attributes, defaults, .. } = Filling::of(all);
+    let (mut tpdos, mut rpdos, mut i) = ([NO_PDOS; D], [NO_PDOS; D], 0);
+    while i < D {
+        (tpdos[i], rpdos[i]) = (pdos(all[i], 0x1800), pdos(all[i], 0x1400));
+        i += 1;
+    }
     Tables {
         series: beginning(&series),
         places: beginning(&places),
         attributes: beginning(&attributes),
         defaults: beginning(&defaults),
+        tpdos,
+        rpdos,
     }
 }
 
@@ -112,22 +121,52 @@ const fn beginning<T: Copy, const N: usize>(all: &[T]) -> [T; N] {
     *all.first_chunk().expect("too many for the tables")
 }
 
-impl<const S: usize, const P: usize, const A: usize, const V: usize> Tables<S, P, A, V> {
+impl<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize> Tables<D, S, P, A, V> {
     /// The dictionaries of the tables of rows that these tables were made of.
     ///
     /// # Panics
     /// During compilation, when they were not.
     #[must_use]
-    pub const fn dictionaries<const N: usize>(&'static self, all: &[&[Object]]) -> [Dictionary; N] {
-        let Tables { series, places, attributes, defaults } = self;
-        let mut dictionaries = [Dictionary { series, places, attributes, defaults }; N];
+    pub const fn dictionaries(&'static self, all: &[&[Object]; D]) -> [Dictionary; D] {
+        let Tables { series, places, attributes, defaults, tpdos, rpdos } = self;
+        let any = Dictionary { series, places, attributes, defaults, tpdos: &NO_PDOS, rpdos: &NO_PDOS };
+        let mut dictionaries = [any; D];
         let (mut i, mut rest): (usize, &'static [Series]) = (0, series);
-        while i < N {
+        while i < D {
             (dictionaries[i].series, rest) = rest.split_at(series_count(all[i]));
+            (dictionaries[i].tpdos, dictionaries[i].rpdos) = (&tpdos[i], &rpdos[i]);
             i += 1;
         }
         dictionaries
     }
+}
+
+const NO_PDOS: Pdos = Pdos { count: 0, indexes: [0; PDOS] };
+
+/// Of the PDOs whose communication objects are among the 512 indexes from `first` on.
+const fn pdos(rows: &[Object], first: u16) -> Pdos {
+    let mut pdos = NO_PDOS;
+    let mut row = 0;
+    while row < rows.len() {
+        if rows[row].index & 0xFE00 == first && rows[row].sub == 0 {
+            pdos.indexes[pdos.count as usize] = rows[row].index;
+            pdos.count += 1;
+        }
+        row += 1;
+    }
+    pdos
+}
+
+/// The row of the event timer of a TPDO.
+///
+/// # Panics
+/// During compilation, when there is none.
+pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
+    let mut row = 0;
+    while rows[row].key() != (0x1800 | number as u32) << 8 | 5 {
+        row += 1;
+    }
+    row
 }
 
 /// How many series the objects of a table form.
@@ -171,7 +210,7 @@ const fn continues(rows: &[Object], first: usize, len: usize, objects: usize) ->
     let mut i = 0;
     while i < len {
         let (a, b) = (&rows[first + i], &rows[start + i]);
-        if a.sub != b.sub || a.rule.is_computed() || !is_same(&attributes(a), &attributes(b)) {
+        if a.sub != b.sub || !a.rule.has_place() || !is_same(&attributes(a), &attributes(b)) {
             return false;
         }
         i += 1;

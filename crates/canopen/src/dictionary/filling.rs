@@ -1,10 +1,10 @@
 //! The filling of the run-time tables. What is in them already is not put there again: places of the same shape, equal
 //! attributes, and default values that follow each other somewhere as they are needed.
 
-use super::compile::{effective_limits, object_len, series_len};
+use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::Attributes;
 use super::tables::{Place, Series};
-use super::{Counts, DefaultValue, Object, image_size};
+use super::{Counts, DefaultValue, Object, Rule, image_size};
 
 /// Room for tables, and how much of it is filled.
 pub(super) struct Filling {
@@ -44,18 +44,18 @@ impl Filling {
         while row < rows.len() {
             let entries = object_len(rows, row);
             let series = rows.split_at(row).1.split_at(entries * series_len(rows, row)).0;
-            self.add_series(series, entries, offset as u16);
+            self.add_series(rows, series, entries, offset as u16);
             (row, offset) = (row + series.len(), offset + image_size(series));
         }
     }
 
-    /// Objects of so many entries, the first at this place in the image.
-    const fn add_series(&mut self, rows: &[Object], entries: usize, offset: u16) {
+    /// Objects of so many entries among `all` rows, the first at this place in the image.
+    const fn add_series(&mut self, all: &[Object], rows: &[Object], entries: usize, offset: u16) {
         let given = self.write_defaults(rows);
         self.series[self.filled.series] = Series {
             index: rows[0].index,
             offset,
-            first: self.add_places(rows.split_at(entries).0) as u16,
+            first: self.add_places(all, rows.split_at(entries).0, offset) as u16,
             defaults: self.add_defaults(given) as u16,
             given: given as u16,
             objects: (rows.len() / entries) as u8,
@@ -65,12 +65,19 @@ impl Filling {
     }
 
     /// The number of the first of them: where the same places have been before, or behind all others.
-    const fn add_places(&mut self, object: &[Object]) -> usize {
-        let (start, mut row, mut offset) = (self.filled.places, 0, 0);
+    const fn add_places(&mut self, all: &[Object], object: &[Object], start_of_object: u16) -> usize {
+        let (start, mut row, mut next) = (self.filled.places, 0, 0);
         while row < object.len() {
             let attributes = self.add_attributes(attributes(&object[row])) as u8;
+            let offset = match object[row].rule {
+                Rule::EventTimerOf(number) => {
+                    let timer = image_size(all.split_at(event_timer(all, number)).0);
+                    (timer as u16).wrapping_sub(start_of_object)
+                }
+                _ => next,
+            };
             self.places[start + row] = Place { sub: object[row].sub, attributes, offset };
-            (row, offset) = (row + 1, offset + object[row].stored_size() as u16);
+            (row, next) = (row + 1, next + object[row].stored_size() as u16);
         }
         let mut first = 0;
         while !self.has_places(first, start, object.len()) {

@@ -16,6 +16,8 @@
 use super::entry::{Attributes, little_endian};
 use super::{Entry, Field};
 use crate::NodeId;
+use crate::device::PDOS;
+use crate::pdo::Direction;
 use crate::sdo::Abort;
 
 /// Objects of one shape with indexes that follow each other.
@@ -41,19 +43,34 @@ pub(crate) struct Place {
     pub(crate) sub: u8,
     /// Number of its attributes.
     pub(crate) attributes: u8,
-    /// From the start of the object.
+    /// From the start of the object, modulo 2^16: another name of a value has its place, which is before the object.
     pub(crate) offset: u16,
 }
 
-/// What [`compile`](super::compile) makes of tables of rows: room for `S` series, `P` places, `A` attributes and `V` bytes
-/// of default values.
+/// The communication objects of the PDOs of a dictionary one way, ascending.
 #[derive(Clone, Copy, Debug)]
-pub struct Tables<const S: usize, const P: usize, const A: usize, const V: usize> {
-    /// Those of each dictionary together.
+pub(crate) struct Pdos {
+    pub(crate) count: u8,
+    pub(crate) indexes: [u16; PDOS],
+}
+
+impl Pdos {
+    fn as_slice(&self) -> &[u16] {
+        self.indexes.get(..usize::from(self.count)).unwrap_or(&self.indexes)
+    }
+}
+
+/// What [`compile`](super::compile) makes of `D` tables of rows: room for `S` series, `P` places, `A` attributes and `V`
+/// bytes of default values.
+#[derive(Clone, Copy, Debug)]
+pub struct Tables<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize> {
+    /// Those of the dictionaries, one after the other.
     pub(crate) series: [Series; S],
     pub(crate) places: [Place; P],
     pub(crate) attributes: [Attributes; A],
     pub(crate) defaults: [u8; V],
+    pub(crate) tpdos: [Pdos; D],
+    pub(crate) rpdos: [Pdos; D],
 }
 
 /// One dictionary.
@@ -63,6 +80,8 @@ pub struct Dictionary {
     pub(super) places: &'static [Place],
     pub(super) attributes: &'static [Attributes],
     pub(super) defaults: &'static [u8],
+    pub(super) tpdos: &'static Pdos,
+    pub(super) rpdos: &'static Pdos,
 }
 
 impl Dictionary {
@@ -101,13 +120,12 @@ impl Dictionary {
         self.defaults.get(first..first + usize::from(series.given)).unwrap_or_default()
     }
 
-    /// The indexes of all objects from `first` up to the one before `end`.
-    pub(crate) fn between(&self, first: u16, end: u16) -> impl Iterator<Item = u16> + use<> {
-        let end_of = |series: &Series| series.index.saturating_add(series.objects.into());
-        let series = self.series.partition_point(|series| end_of(series) <= first);
-        let entries = Entries { series, ..self.entries() };
-        let indexes = entries.filter(|entry| entry.sub == 0).map(|entry| entry.index);
-        indexes.take_while(move |&index| index < end).filter(move |&index| index >= first)
+    /// The indexes of the communication objects of its PDOs one way.
+    pub(crate) fn pdos(&self, direction: Direction) -> &'static [u16] {
+        match direction {
+            Direction::Transmit => self.tpdos.as_slice(),
+            Direction::Receive => self.rpdos.as_slice(),
+        }
     }
 
     /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.
@@ -182,7 +200,7 @@ impl Dictionary {
         let Place { offset, attributes, .. } = self.places[place];
         let size = self.attributes[attributes as usize].kind.size();
         let object = series.offset + (index - series.index) * self.stride(series);
-        Field { offset: object + offset, size }
+        Field { offset: object.wrapping_add(offset), size }
     }
 }
 
