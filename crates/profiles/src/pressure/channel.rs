@@ -166,19 +166,6 @@ fn shift(digits: u8) -> f32 {
 mod tests {
     use super::*;
 
-    #[test]
-    #[allow(clippy::cast_possible_truncation)]
-    fn digits_shift_by_powers_of_ten() {
-        for digits in 0..=u8::MAX {
-            assert_eq!(shift(digits).to_bits(), (10_f64.powi(digits.into()) as f32).to_bits(), "{digits}");
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
     const BOTH: u8 = STATUS_ABOVE | STATUS_BELOW;
     const ANY: Span<f32> = Span { start: f32::MIN, end: f32::MAX };
 
@@ -282,5 +269,13 @@ mod tests {
         assert_eq!(channel.sample(8.0, true).process_value32, 102, "a quarter of the way");
         channel.apply(&average(8));
         assert_eq!(channel.sample(16.0, true).process_value32, 16, "another filter starts afresh");
+    }
+
+    #[test]
+    #[allow(clippy::cast_possible_truncation)]
+    fn digits_shift_by_powers_of_ten() {
+        for digits in 0..=u8::MAX {
+            assert_eq!(shift(digits).to_bits(), (10_f64.powi(digits.into()) as f32).to_bits(), "{digits}");
+        }
     }
 }
