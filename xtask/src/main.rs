@@ -9,12 +9,12 @@ mod images;
 mod native;
 mod plots;
 mod python;
-mod sign;
 mod sim;
 mod steps;
 mod target;
 mod test;
 mod timing;
+mod tool;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -51,6 +51,13 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
+    /// Set the write protection of the bootloader and the read-out protection of a chip at a debug probe (docs/update.md)
+    #[command(disable_help_flag = true)]
+    Protect {
+        /// Arguments of the tool
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
+    },
     /// Let libFuzzer look for inputs that break a rule (docs/evidence.md)
     Fuzz(fuzz::Flags),
     /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
@@ -73,7 +80,8 @@ fn main() -> ExitCode {
         Command::Sim { flags } => sim::run(&flags),
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
-        Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
+        Command::Sign { arguments } => tool::forward("sign", &arguments).map(|()| ExitCode::SUCCESS),
+        Command::Protect { arguments } => tool::forward("protect", &arguments).map(|()| ExitCode::SUCCESS),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),

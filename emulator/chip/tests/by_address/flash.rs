@@ -175,20 +175,6 @@ fn a_protected_sector_is_neither_erased_nor_programmed() {
 }
 
 #[test]
-fn protection_is_set_with_the_option_bytes() {
-    let mut rig = unlocked();
-    assert_eq!(rig.read(OPTCR) >> 16 & 0xFF, 0xFF);
-    rig.write(OPTKEYR, 0x0819_2A3B);
-    rig.write(OPTKEYR, 0x4C5D_6E7F);
-    let value = rig.read(OPTCR) & !(0b11 << 16);
-    rig.write(OPTCR, value | 2);
-    wait_ready(&mut rig);
-    assert_eq!(rig.chip.flash_mut().write_protected() & 0xFF, 0b11);
-    rig.chip.reset(true, rig.now);
-    assert_eq!(rig.chip.flash_mut().write_protected() & 0xFF, 0b11, "it survives");
-}
-
-#[test]
 fn end_of_operation_raises_its_interrupt_when_enabled() {
     let mut rig = unlocked();
     rig.write(CR, SER | 2 << 3 | X32 | 1 << 24);

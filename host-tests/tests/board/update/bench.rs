@@ -28,7 +28,7 @@ pub(super) const HEADER: u32 = 0x0801_0000;
 pub(super) const VERSION_B: Version = Version { major: 9, minor: 8, patch: 7 };
 /// How long a client waits for a response, the shortest that is known (python-canopen).
 const TIME_OUT: Time = Time::from_millis(300);
-/// What the bootloader owes while a sector erases.
+/// What the bootloader owes, whatever the flash does.
 pub(super) const PROMPT: Time = Time::from_millis(20);
 const STEP: Time = Time::from_micros(100);
 

@@ -1,4 +1,4 @@
-//! `cargo xtask sign`: the signing tool, wherever it is called from.
+//! Tools that have flags of their own, run from wherever `cargo xtask` is called.
 
 use std::ffi::OsString;
 
@@ -7,10 +7,10 @@ use anyhow::{Context, Result};
 use crate::command::{cargo, root, run};
 
 /// Runs the tool in the directory of the caller, so that paths mean what they say.
-pub(crate) fn run_tool(arguments: &[OsString]) -> Result<()> {
+pub(crate) fn forward(tool: &str, arguments: &[OsString]) -> Result<()> {
     let here = std::env::current_dir().context("there is no current directory")?;
     let manifest = root().join("Cargo.toml");
     let mut command = cargo();
-    command.args(["run", "--quiet", "-p", "sign", "--manifest-path"]).arg(manifest).arg("--").args(arguments);
+    command.args(["run", "--quiet", "-p", tool, "--manifest-path"]).arg(manifest).arg("--").args(arguments);
     run(command.current_dir(here))
 }
