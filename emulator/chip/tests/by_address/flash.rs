@@ -7,10 +7,8 @@ use crate::support::Rig;
 
 const FLASH: u32 = 0x4002_3C00;
 const KEYR: u32 = FLASH + 0x04;
-const OPTKEYR: u32 = FLASH + 0x08;
 const SR: u32 = FLASH + 0x0C;
 const CR: u32 = FLASH + 0x10;
-const OPTCR: u32 = FLASH + 0x14;
 const BSY: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 const PG: u32 = 1;
