@@ -92,6 +92,12 @@ impl Bench {
         Client::new(self).write(CONTROL, &[command])
     }
 
+    /// A frame that nobody answers, and time for what it does.
+    pub(super) fn tell(&mut self, id: u16, bytes: &[u8]) {
+        self.master.send(&mut self.world, id, bytes);
+        self.run(Time::from_millis(50));
+    }
+
     /// Into the bootloader, which answers next.
     pub(super) fn stop(&mut self) {
         assert_eq!(self.command(STOP), Err(Failure::Silence), "not acknowledged");

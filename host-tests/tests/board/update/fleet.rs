@@ -31,7 +31,7 @@ struct Adapter {
 }
 
 /// A board that is switched off in one operation of its flash, and on again.
-struct Outage {
+pub(super) struct Outage {
     board: usize,
     /// The number of the operation.
     operation: u64,

@@ -3,6 +3,7 @@
 mod bench;
 mod corrupted;
 mod cuts;
+mod device;
 mod fleet;
 mod protected;
 
