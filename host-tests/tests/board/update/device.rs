@@ -66,6 +66,11 @@ fn lss_moves_it_until_the_next_start() {
     lss(&mut bench, [4, 1, 0, 0, 0, 0, 0, 0]);
     assert_eq!(lss(&mut bench, [0x5E, 0, 0, 0, 0, 0, 0, 0]), [[0x5E, 1, 0, 0, 0, 0, 0, 0]]);
     assert_eq!(lss(&mut bench, [0x11, 5, 0, 0, 0, 0, 0, 0]), [[0x11, 0, 0, 0, 0, 0, 0, 0]]);
+    assert_eq!(
+        lss(&mut bench, [0x17, 0, 0, 0, 0, 0, 0, 0]),
+        [[0x17, 2, 0, 0, 0, 0, 0, 0]],
+        "nothing is stored"
+    );
     lss(&mut bench, [4, 0, 0, 0, 0, 0, 0, 0]);
     bench.tell(NMT, &[RESET_COMMUNICATION, 1]);
     bench.node = 5;
@@ -73,6 +78,20 @@ fn lss_moves_it_until_the_next_start() {
     bench.command(START).unwrap();
     bench.node = 1;
     assert_eq!(bench.identification_of_running(), version_a().header.code_crc());
+}
+
+#[test]
+fn lss_changes_its_bit_rate() {
+    const OF_500_KBIT: u8 = 2;
+    let mut bench = in_bootloader();
+    let master = Master::join(&mut bench.world);
+    master.lss(&mut bench.world, &[4, 1, 0, 0, 0, 0, 0, 0]);
+    let answer = master.lss(&mut bench.world, &[0x13, 0, OF_500_KBIT, 0, 0, 0, 0, 0]);
+    assert_eq!(answer, [[0x13, 0, 0, 0, 0, 0, 0, 0]]);
+    master.lss(&mut bench.world, &[0x15, 100, 0, 0, 0, 0, 0, 0]);
+    bench.run(Time::from_millis(300));
+    assert_eq!(bench.read(DEVICE_TYPE).unwrap(), BOOT);
+    assert_eq!(bench.world.summary(1.0, 0).bus.bit_rate, 500);
 }
 
 #[test]
