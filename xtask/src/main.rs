@@ -6,7 +6,9 @@ mod coverage;
 mod eds;
 mod fuzz;
 mod images;
+mod mutants;
 mod native;
+mod own_tool;
 mod plots;
 mod python;
 mod sim;
@@ -14,7 +16,7 @@ mod steps;
 mod target;
 mod test;
 mod timing;
-mod tool;
+mod tools;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -64,6 +66,8 @@ enum Command {
     Bench(bench::Options),
     /// Print which lines of the pure crates the tests run
     Coverage,
+    /// Change the code of the pure crates and print what no test notices (docs/evidence.md)
+    Mutants(mutants::Flags),
     /// Print what each task of the firmware takes at worst, and when it ends at the latest
     Timing,
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
@@ -80,11 +84,12 @@ fn main() -> ExitCode {
         Command::Sim { flags } => sim::run(&flags),
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
-        Command::Sign { arguments } => tool::forward("sign", &arguments).map(|()| ExitCode::SUCCESS),
-        Command::Protect { arguments } => tool::forward("protect", &arguments).map(|()| ExitCode::SUCCESS),
+        Command::Sign { arguments } => own_tool::run("sign", &arguments).map(|()| ExitCode::SUCCESS),
+        Command::Protect { arguments } => own_tool::run("protect", &arguments).map(|()| ExitCode::SUCCESS),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),
+        Command::Mutants(flags) => mutants::print(&flags).map(|()| ExitCode::SUCCESS),
         Command::Timing => timing::print().map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };
