@@ -26,7 +26,6 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-    #[inline(never)]
     fn on_sdo(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
