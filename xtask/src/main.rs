@@ -6,6 +6,7 @@ mod coverage;
 mod eds;
 mod fuzz;
 mod images;
+mod mutants;
 mod native;
 mod plots;
 mod python;
@@ -15,6 +16,7 @@ mod steps;
 mod target;
 mod test;
 mod timing;
+mod tools;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -57,6 +59,8 @@ enum Command {
     Bench(bench::Options),
     /// Print which lines of the pure crates the tests run
     Coverage,
+    /// Change the code of the pure crates and print what no test notices (docs/evidence.md)
+    Mutants(mutants::Flags),
     /// Print what each task of the firmware takes at worst, and when it ends at the latest
     Timing,
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
@@ -77,6 +81,7 @@ fn main() -> ExitCode {
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),
+        Command::Mutants(flags) => mutants::print(&flags).map(|()| ExitCode::SUCCESS),
         Command::Timing => timing::print().map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };

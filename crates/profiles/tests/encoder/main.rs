@@ -2,7 +2,9 @@
 
 mod bench;
 mod commissioning;
+mod input;
 mod motion;
+mod parameters;
 mod power;
 mod preset;
 mod random;
