@@ -19,7 +19,10 @@ pub(crate) fn check_panics() -> Result<()> {
     panics()?;
     let forgetful = tool().args(["panics", "--forget", "defmt_rtt"]).output()?;
     let says = String::from_utf8_lossy(&forgetful.stderr);
-    ensure!(!forgetful.status.success() && says.contains("defmt_rtt"), "a panic that is not known was not found:\n{says}");
+    ensure!(
+        !forgetful.status.success() && says.contains("defmt_rtt"),
+        "a panic that is not known was not found:\n{says}"
+    );
     Ok(())
 }
 
@@ -32,6 +35,8 @@ pub(crate) fn stack(paths: bool) -> Result<()> {
 
 fn tool() -> Command {
     let mut command = cargo();
-    command.args(["run", "--quiet", "--profile", "sim", "-p", "callgraph", "--", "--images"]).arg(images::dir());
+    command
+        .args(["run", "--quiet", "--profile", "sim", "-p", "callgraph", "--", "--images"])
+        .arg(images::dir());
     command
 }

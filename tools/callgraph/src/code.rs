@@ -61,22 +61,25 @@ impl Decoder {
                 function.name
             );
             for instruction in instructions.iter() {
-                let detail = self.0.insn_detail(instruction)?;
-                let arch = detail.arch_detail();
-                let arm = arch.arm().context("not an instruction of Arm")?;
-                let operands: Vec<_> = arm.operands().collect();
-                let mnemonic = instruction.mnemonic().unwrap_or_default();
-                let step = Step {
-                    at: u32::try_from(instruction.address())?,
-                    mnemonic: mnemonic.trim_end_matches(".w"),
-                    operands: &operands,
-                    is_branch: detail.groups().iter().any(|group| BRANCHES.contains(group)),
-                    writes_back: arm.writeback(),
-                };
-                reader.take(&step).with_context(|| format!("{instruction} in {}", function.name))?;
+                self.take(&mut reader, instruction)
+                    .with_context(|| format!("{instruction} in {}", function.name))?;
             }
         }
         Ok(reader.body)
+    }
+
+    fn take(&self, reader: &mut Reader<'_>, instruction: &Insn<'_>) -> Result<()> {
+        let detail = self.0.insn_detail(instruction)?;
+        let arch = detail.arch_detail();
+        let arm = arch.arm().context("not an instruction of Arm")?;
+        let operands: Vec<_> = arm.operands().collect();
+        reader.take(&Step {
+            at: u32::try_from(instruction.address())?,
+            mnemonic: instruction.mnemonic().unwrap_or_default().trim_end_matches(".w"),
+            operands: &operands,
+            is_branch: detail.groups().iter().any(|group| BRANCHES.contains(group)),
+            writes_back: arm.writeback(),
+        })
     }
 }
 

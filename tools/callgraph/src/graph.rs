@@ -11,7 +11,7 @@ use crate::image::Image;
 pub(crate) struct Graph(BTreeMap<u32, Body>);
 
 /// The deepest that the stack gets below a function, and through which functions.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Depth {
     pub(crate) bytes: u32,
     /// From the outermost: start and bytes of each.
@@ -36,29 +36,31 @@ impl Graph {
 
     /// The deepest use of the stack from this function on. A function that calls itself, by whatever way, has none.
     pub(crate) fn depth(&self, image: &Image<'_>, start: u32) -> Result<Depth> {
-        let mut known = BTreeMap::new();
-        self.search(image, start, &mut known)?;
-        known.remove(&start).flatten().context("not in the image")
+        self.search(image, start, &mut BTreeMap::new())
     }
 
     /// `None` in `known` stands for a function whose search has not ended.
-    fn search(&self, image: &Image<'_>, start: u32, known: &mut BTreeMap<u32, Option<Depth>>) -> Result<u32> {
+    fn search(
+        &self,
+        image: &Image<'_>,
+        start: u32,
+        known: &mut BTreeMap<u32, Option<Depth>>,
+    ) -> Result<Depth> {
         let name = || image.function_at(start).map_or("?", |function| function.name.as_str());
         if let Some(depth) = known.get(&start) {
-            return Ok(depth.as_ref().with_context(|| format!("{} calls itself", name()))?.bytes);
+            return depth.clone().with_context(|| format!("{} calls itself", name()));
         }
         known.insert(start, None);
-        let body = self.0.get(&start).with_context(|| format!("nothing is known of {}", name()))?;
-        let mut deepest = (0, None);
-        for way in &body.ways {
-            let below = self.search(image, way.to, known).with_context(|| format!("called by {}", name()))?;
-            deepest = deepest.max((below, Some(way.to)));
+        let mut below = Depth::default();
+        for way in self.ways(start) {
+            let other = self.search(image, way.to, known).with_context(|| format!("called by {}", name()))?;
+            below = below.max(other);
         }
         let own = self.frame(image, start)?;
-        let below = deepest.1.and_then(|to| known.get(&to).cloned().flatten()).unwrap_or_default();
         let path = [(start, own)].into_iter().chain(below.path).collect();
-        known.insert(start, Some(Depth { bytes: own + below.bytes, path }));
-        Ok(own + below.bytes)
+        let depth = Depth { bytes: own + below.bytes, path };
+        known.insert(start, Some(depth.clone()));
+        Ok(depth)
     }
 
     /// What the compiler has noted, or what the instructions take: that is more where the compiler has moved a part of the

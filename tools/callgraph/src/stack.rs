@@ -85,24 +85,28 @@ impl Analysis<'_> {
     /// The stack that is in use when the interrupts are enabled, or that `idle` takes.
     fn thread(&self) -> Result<Level> {
         let main = self.image.function("main")?.start;
+        let called = || self.graph.ways(main).map(|way| way.to);
         let is_start_up =
             |start| self.image.function_at(start).is_some_and(|function| function.name.contains(START_UP));
-        let start_up = self.graph.ways(main).map(|way| way.to).find(|&to| is_start_up(to));
+        let start_up = called().find(|&start| is_start_up(start));
         let start_up = start_up.with_context(|| format!("main does not call {START_UP}"))?;
-        let end =
-            Depth { path: vec![(start_up, self.graph.frame(self.image, start_up)?)], ..Depth::default() };
-        let idle = self.graph.ways(main).map(|way| way.to).filter(|&to| to != start_up);
-        let mut deepest = Depth { bytes: end.path[0].1, ..end };
-        for other in idle {
-            let depth = self.graph.depth(self.image, other)?;
-            if depth.bytes > deepest.bytes {
-                deepest = depth;
-            }
+        let mut deepest = self.alone(start_up)?;
+        for start in called().filter(|&start| start != start_up) {
+            deepest = deepest.max(self.graph.depth(self.image, start)?);
         }
-        let own = self.graph.frame(self.image, main)?;
-        deepest.bytes += own;
-        deepest.path.insert(0, (main, own));
-        Ok(self.level("idle, or the end of the start-up".into(), 0, deepest))
+        let Depth { bytes, path } = self.alone(main)?;
+        let path = path.into_iter().chain(deepest.path).collect();
+        Ok(self.level(
+            "idle, or the end of the start-up".into(),
+            0,
+            Depth { bytes: bytes + deepest.bytes, path },
+        ))
+    }
+
+    /// A function that calls nothing at that moment.
+    fn alone(&self, start: u32) -> Result<Depth> {
+        let bytes = self.graph.frame(self.image, start)?;
+        Ok(Depth { bytes, path: vec![(start, bytes)] })
     }
 
     /// Of each priority the deepest task, the lowest priority first; then whatever else is in the vectors.
@@ -111,32 +115,19 @@ impl Analysis<'_> {
         let known: BTreeSet<u32> = tasks.keys().chain([&HARD_FAULT]).map(starts).collect::<Result<_>>()?;
         let vectors = self.image.handlers()?;
         ensure!(known.is_subset(&vectors), "a task is in no vector");
-        let mut levels: BTreeMap<u8, Level> = BTreeMap::new();
-        for (&name, &priority) in tasks {
-            self.deepen(
-                levels.entry(priority),
-                format!("priority {priority}, {name}"),
-                self.image.function(name)?.start,
-            )?;
+        let unexpected = vectors.difference(&known).map(|&start| (u8::MAX, "unexpected".to_owned(), start));
+        let mut handlers: Vec<_> = unexpected.collect();
+        for (name, &priority) in tasks {
+            let start = self.image.function(name)?.start;
+            handlers.push((priority, format!("priority {priority}, {name}"), start));
         }
-        for &other in vectors.difference(&known) {
-            let name = self.image.function_at(other).map_or("?", |function| &function.name);
-            self.deepen(levels.entry(u8::MAX), format!("unexpected, {name}"), other)?;
+        let mut levels: BTreeMap<u8, Level> = BTreeMap::new();
+        for (priority, name, start) in handlers {
+            let level = self.level(name, EXCEPTION, self.graph.depth(self.image, start)?);
+            if levels.get(&priority).is_none_or(|deepest| deepest.bytes < level.bytes) {
+                levels.insert(priority, level);
+            }
         }
         Ok(levels.into_values().collect())
-    }
-
-    fn deepen(
-        &self,
-        level: std::collections::btree_map::Entry<'_, u8, Level>,
-        name: String,
-        start: u32,
-    ) -> Result<()> {
-        let next = self.level(name, EXCEPTION, self.graph.depth(self.image, start)?);
-        let level = level.or_insert_with(|| next.clone());
-        if next.bytes > level.bytes {
-            *level = next;
-        }
-        Ok(())
     }
 }

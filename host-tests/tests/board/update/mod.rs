@@ -122,11 +122,11 @@ fn an_application_that_crashes_again_and_again_stays_reachable() {
 #[test]
 fn the_bootloader_stays_within_the_bound_of_its_stack() {
     let mut bench = Bench::new("--bitrate 250", 250_000, 126);
-    let image = bench.application();
     bench.machine().write(HEADER, &[0xFF; 1024]).unwrap();
     bench.power_cycle();
     bench.run(SECOND);
-    bench.download(&image).unwrap();
+    bench.clear();
+    bench.download(&version_a().to_bytes()).unwrap();
     assert_eq!(bench.wait_for_flash(), Status::GOOD);
     assert_bound(&bench.world, &["bootloader"]);
 }
