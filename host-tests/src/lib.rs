@@ -5,6 +5,6 @@ pub mod domain;
 pub mod lift417;
 pub mod lss;
 pub mod network;
-pub mod pressure;
 pub mod sdo;
+pub mod station;
 pub mod tables;

@@ -9,8 +9,8 @@ use canopen::{Duration, Frame, NodeId};
 use host_tests::bench::raw;
 use host_tests::lss::Master;
 use host_tests::network::{Network, from_bus};
-use host_tests::pressure::PressureNode;
 use host_tests::sdo::Client;
+use host_tests::station::PressureNode;
 use node::{Measurement, Parcel, Personality, Protocol, REVISION, VENDOR_ID};
 
 const NODES: u8 = 127;
@@ -28,8 +28,8 @@ fn pascal(number: u8) -> f64 {
 }
 
 fn unconfigured() -> Network<PressureNode> {
-    let nodes =
-        (1..=NODES).map(|number| PressureNode::new(None, serial_number(number), raw(pascal(number), 298.15)));
+    let nodes = (1..=NODES)
+        .map(|number| PressureNode::pressure(None, serial_number(number), raw(pascal(number), 298.15)));
     let mut network = Network::new(nodes);
     network.start();
     network.run(Duration::from_millis(5));

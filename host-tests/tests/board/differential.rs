@@ -8,7 +8,7 @@ use canopen::{Duration, Frame, NodeId};
 use fastrand::Rng;
 use host_tests::bench;
 use host_tests::network::{Network, from_bus};
-use host_tests::pressure::PressureNode;
+use host_tests::station::PressureNode;
 use sim::world::World;
 
 use crate::support::{LSS_REQUEST, LSS_RESPONSE, Master, SDO_REQUEST, SDO_RESPONSE, SECOND, SYNC, world};
@@ -105,7 +105,7 @@ fn said_on_the_board(world: &mut World, master: &Master, script: &[Line]) -> Sai
 
 fn said_in_this_process(serial_number: u32, script: &[Line]) -> Said {
     let raw = bench::raw(100_000.0, 298.15);
-    let mut network = Network::new([PressureNode::new(NodeId::new(ID), serial_number, raw)]);
+    let mut network = Network::new([PressureNode::pressure(NodeId::new(ID), serial_number, raw)]);
     network.start();
     network.run(Duration::from_millis(1000));
     while network.hear().is_some() {}

@@ -14,7 +14,7 @@ use crate::controller::Controller;
 use crate::device::VirtualDevice;
 use crate::installer::Site;
 use crate::log::last;
-use crate::node::LiftNode;
+use crate::node::{LiftNode, lift_node};
 use crate::table::{self, BARRIERS, CONTROLLER, DISPLAY, DOORS, DRIVE, LOAD, POSITION};
 use crate::world::World;
 
@@ -84,7 +84,7 @@ impl SmallLift {
     pub(crate) fn new() -> SmallLift {
         let world = World { car: 3_000.0, doors: [WIDTH; 2], ..World::default() };
         let world = Rc::new(RefCell::new(world));
-        let node = |id| Any::Node(Box::new(LiftNode::new(id, &world)));
+        let node = |id| Any::Node(Box::new(lift_node(id, &world)));
         let virtual_devices = virtual_devices(&world).map(|device| Any::Virtual(Box::new(device)));
         let mut network = Network::new([node(POSITION), node(LOAD)].into_iter().chain(virtual_devices));
         network.start();
@@ -135,7 +135,7 @@ impl SmallLift {
     }
 
     pub(crate) fn is_lit(&self) -> bool {
-        matches!(&self.network.stations[LOAD_NODE].unit, Any::Node(node) if node.is_lit())
+        matches!(&self.network.stations[LOAD_NODE].unit, Any::Node(node) if node.protocol.lamps()[0])
     }
 
     /// A value that the display has.

@@ -1,7 +1,7 @@
 //! LSS: three nodes without a node-ID are found, numbered, stored and boot.
 
 use host_tests::bench::raw;
-use host_tests::pressure::PressureNode;
+use host_tests::station::PressureNode;
 use node::{Personality, REVISION, VENDOR_ID};
 use tokio::time::{Duration, sleep};
 use zencan_client::common::NodeId;
@@ -13,7 +13,7 @@ use crate::bus::Port;
 const SERIAL_NUMBERS: [u32; 3] = [0x8000_0001, 0x0000_1234, 0xDEAD_BEEF];
 
 fn nodes() -> Port<PressureNode> {
-    Port::new(SERIAL_NUMBERS.map(|serial| PressureNode::new(None, serial, raw(0.0, 298.15))))
+    Port::new(SERIAL_NUMBERS.map(|serial| PressureNode::pressure(None, serial, raw(0.0, 298.15))))
 }
 
 fn identity(serial: u32) -> LssIdentity {

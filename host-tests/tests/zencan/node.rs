@@ -3,7 +3,7 @@
 use canopen::NodeId;
 use canopen::dictionary::{Access, DefaultValue, Object, Type};
 use host_tests::bench::raw;
-use host_tests::pressure::PressureNode;
+use host_tests::station::PressureNode;
 use node::State;
 use node::pressure::OBJECTS;
 use tokio::time::{Duration, sleep};
@@ -22,7 +22,7 @@ const SERIAL: u32 = 4711;
 type Client = SdoClient<Port<PressureNode>, Port<PressureNode>>;
 
 fn pressure_node() -> PressureNode {
-    PressureNode::new(NodeId::new(ID), SERIAL, raw(250_000.0, 298.15))
+    PressureNode::pressure(NodeId::new(ID), SERIAL, raw(250_000.0, 298.15))
 }
 
 fn node() -> (Port<PressureNode>, Client) {

@@ -1,36 +1,63 @@
-//! The pressure node as a station of a network: both halves, its parameter store, and readings that do not change.
+//! A node as a station of a network: both halves, its parameter store, and what its sensors read.
 
 use canopen::{Duration, Frame, Instant, NodeId, Transmit};
 use node::{BitRate, Measurement, Protocol, RawEncoder, RawSample, Request, Setup, Start};
+use profiles::lift::panel::BUTTONS;
 
 use crate::bench::{Flash, deliver, empty_store, setup};
 use crate::network::Unit;
 
 const SAMPLE_PERIOD: Duration = Duration::from_millis(1);
 
-/// A pressure node.
+/// What one sample reads: both analogue channels, the encoder and the buttons.
+pub type Readings = (RawSample, RawEncoder, [bool; BUTTONS]);
+
+/// What a station measures.
+pub trait Sensors {
+    /// What its sensors read now.
+    fn read(&mut self, now: Instant) -> Readings;
+}
+
+/// A pressure that does not change.
+impl Sensors for RawSample {
+    fn read(&mut self, _: Instant) -> Readings {
+        (*self, RawEncoder::default(), [false; BUTTONS])
+    }
+}
+
+/// A node, and what it measures.
 #[derive(Debug)]
-pub struct PressureNode {
+pub struct Station<S> {
     /// The CANopen half.
     pub protocol: Protocol,
     /// The sampling half.
     pub measurement: Measurement,
     /// What it stores.
     pub store: Flash,
-    raw: RawSample,
+    sensors: S,
     next_sample: Instant,
 }
 
+/// A pressure node whose readings do not change.
+pub type PressureNode = Station<RawSample>;
+
 impl PressureNode {
-    /// A node with this serial number and these readings. Without a node-ID it waits for LSS.
+    /// A pressure node with this serial number. Without a node-ID it waits for LSS.
     #[must_use]
-    pub fn new(node_id: Option<NodeId>, serial_number: u32, raw: RawSample) -> PressureNode {
-        let setup = Setup { node_id, bit_rate: BitRate::FASTEST, serial_number, ..setup() };
-        PressureNode {
-            protocol: Protocol::new(&setup),
+    pub fn pressure(node_id: Option<NodeId>, serial_number: u32, raw: RawSample) -> PressureNode {
+        Station::new(&Setup { node_id, bit_rate: BitRate::FASTEST, serial_number, ..setup() }, raw)
+    }
+}
+
+impl<S: Sensors> Station<S> {
+    /// A node that has stored nothing yet.
+    #[must_use]
+    pub fn new(setup: &Setup, sensors: S) -> Station<S> {
+        Station {
+            protocol: Protocol::new(setup),
             measurement: Measurement::new(Start::First),
             store: empty_store(),
-            raw,
+            sensors,
             next_sample: Instant::NEVER,
         }
     }
@@ -41,12 +68,13 @@ impl PressureNode {
         if let Some(parameters) = self.protocol.take_parameters() {
             self.measurement.apply(&parameters);
         }
-        let snapshot = self.measurement.sample(&self.raw, &RawEncoder::default(), [false; 2]);
+        let (raw, encoder, buttons) = self.sensors.read(now);
+        let snapshot = self.measurement.sample(&raw, &encoder, buttons);
         self.protocol.publish(&snapshot, now, out);
     }
 }
 
-impl Unit for PressureNode {
+impl<S: Sensors> Unit for Station<S> {
     fn start(&mut self, now: Instant, out: &mut impl Transmit) {
         self.protocol.start(now, out);
         self.next_sample = now;
