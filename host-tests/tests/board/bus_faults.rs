@@ -89,22 +89,22 @@ fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
     let mut world = world("--bitrate 125");
     let babbler = Master::join_at(&mut world, BIT_RATE);
     let before = run(&mut world, SECOND * 2).nodes[0].clone();
-    let mut during = before.clone();
     for step in 0..MINUTES * 600 {
         let waiting = if step == 0 { 2 * FRAMES } else { FRAMES };
         (0..waiting).for_each(|_| babbler.send(&mut world, MORE_URGENT, &[0x55; 8]));
-        during = run(&mut world, Time::from_millis(100)).nodes[0].clone();
+        world.run_until(world.now() + Time::from_millis(100));
     }
-    let samples = during.sampling.samples - before.sampling.samples;
-    assert_eq!(samples, MINUTES * 60_000, "{during:?}");
-    assert!(during.heard.heartbeats - before.heard.heartbeats <= 1, "it found a gap: {during:?}");
+    let during = run(&mut world, Time::ZERO);
+    let node = &during.nodes[0];
+    assert_eq!(node.sampling.samples - before.sampling.samples, MINUTES * 60_000, "{during}");
+    assert!(node.heard.heartbeats - before.heard.heartbeats <= 1, "it found a gap: {during}");
+    assert_eq!((node.receiving.lost, during.bus.errors), (0, 0), "{during}");
     world.close_port(babbler.port);
     let back = run(&mut world, SECOND * 2).nodes[0].clone();
     let after = run(&mut world, SECOND * 5);
     let node = &after.nodes[0];
     assert_eq!(node.heard.heartbeats - back.heard.heartbeats, 5, "{after}");
-    assert_eq!((node.heard.boot_ups, node.receiving.lost, after.bus.errors), (1, 0, 0), "{after}");
-    assert!(node.incidents.is_empty(), "{after}");
+    assert!(node.heard.boot_ups == 1 && node.incidents.is_empty(), "{after}");
 }
 
 /// A babbling node leaves no gap on the bus for half a minute: what the node wants to send waits, and nothing is lost but
