@@ -1,12 +1,12 @@
 //! `cargo xtask coverage`: which lines of the pure crates the tests run, by cargo-llvm-cov.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::command::{cargo, root, run, target_dir};
-use crate::native;
+use crate::command::{cargo, root, run};
+use crate::{native, tools};
 
 /// The crates that are measured, and those whose tests count as well.
 const PURE: [&str; 5] = ["canopen", "profiles", "storage", "update", "node"];
@@ -28,7 +28,7 @@ pub(crate) fn print() -> Result<()> {
     for package in PURE.iter().chain(&TESTS) {
         command.args(["-p", package]);
     }
-    command.args(["--ignore-filename-regex", IGNORED]).env("PATH", with_tool()?);
+    command.args(["--ignore-filename-regex", IGNORED]).env("PATH", tools::with("cargo-llvm-cov")?);
     if std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0") {
         native::ensure_packages(&native::missing_packages(&["llvm-22"]), "its llvm-cov reads the counters")?;
         let tool = |name: &str| Path::new(DEBIAN_LLVM).join(name);
@@ -38,17 +38,4 @@ pub(crate) fn print() -> Result<()> {
             .context("llvm-cov is missing; with rustup: rustup component add llvm-tools")?;
     }
     run(&mut command)
-}
-
-/// The search path with cargo-llvm-cov in it, which is installed below the build directory when it is missing.
-fn with_tool() -> Result<std::ffi::OsString> {
-    let tools = target_dir().join("tools");
-    if !tools.join("bin/cargo-llvm-cov").exists() {
-        eprintln!("installing cargo-llvm-cov to {}", tools.display());
-        run(cargo().args(["install", "--quiet", "--locked", "cargo-llvm-cov", "--root"]).arg(&tools))?;
-    }
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let folders: Vec<PathBuf> =
-        std::iter::once(tools.join("bin")).chain(std::env::split_paths(&path)).collect();
-    Ok(std::env::join_paths(folders)?)
 }

@@ -7,15 +7,17 @@ mod coverage;
 mod eds;
 mod fuzz;
 mod images;
+mod mutants;
 mod native;
+mod own_tool;
 mod plots;
 mod python;
-mod sign;
 mod sim;
 mod steps;
 mod target;
 mod test;
 mod timing;
+mod tools;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -52,12 +54,21 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
+    /// Set the write protection of the bootloader and the read-out protection of a chip at a debug probe (docs/update.md)
+    #[command(disable_help_flag = true)]
+    Protect {
+        /// Arguments of the tool
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
+    },
     /// Let libFuzzer look for inputs that break a rule (docs/evidence.md)
     Fuzz(fuzz::Flags),
     /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
     Bench(bench::Options),
     /// Print which lines of the pure crates the tests run
     Coverage,
+    /// Change the code of the pure crates and print what no test notices (docs/evidence.md)
+    Mutants(mutants::Flags),
     /// Print what each task of the firmware takes at worst, and when it ends at the latest
     Timing,
     /// Print which code of the images can panic, and why it does not
@@ -82,10 +93,12 @@ fn main() -> ExitCode {
         Command::Sim { flags } => sim::run(&flags),
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
-        Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
+        Command::Sign { arguments } => own_tool::run("sign", &arguments).map(|()| ExitCode::SUCCESS),
+        Command::Protect { arguments } => own_tool::run("protect", &arguments).map(|()| ExitCode::SUCCESS),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),
+        Command::Mutants(flags) => mutants::print(&flags).map(|()| ExitCode::SUCCESS),
         Command::Timing => timing::print().map(|()| ExitCode::SUCCESS),
         Command::Panics => callgraph::panics().map(|()| ExitCode::SUCCESS),
         Command::Stack { paths } => callgraph::stack(paths).map(|()| ExitCode::SUCCESS),

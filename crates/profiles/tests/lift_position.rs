@@ -3,7 +3,9 @@
 
 use std::num::{NonZeroU16, NonZeroU32};
 
-use profiles::encoder::{Area, Coding, Format, Frame, OVERFLOW, RawEncoder, SensorType, UNDERFLOW};
+use profiles::encoder::{
+    Area, Coding, Command, Format, Frame, OVERFLOW, RawEncoder, SensorType, UNDERFLOW, WARNING_FREQUENCY,
+};
 use profiles::lift::position::{
     INVERTED, Parameters, PositionUnits, Snapshot, Source, UNKNOWN, UnitParameters,
 };
@@ -233,4 +235,69 @@ fn the_way_outlives_a_loss_of_power() {
     car.units = PositionUnits::new(profiles::encoder::Start::Kept(car.units.kept()));
     car.apply();
     assert_eq!(car.position(), before);
+}
+
+#[test]
+fn direction_and_unknown_are_bit_3() {
+    assert_eq!((INVERTED, UNKNOWN), (8, 8));
+}
+
+#[test]
+fn a_source_is_the_number_of_a_channel() {
+    let sources = [0, 1, 2, 3].map(Source::from_code);
+    assert_eq!(sources, [None, Some(Source::First), Some(Source::Second), None]);
+}
+
+/// Of the 819 200 positions of 4096 revolutions of 200 mm.
+#[test]
+fn the_offset_is_the_one_nearest_to_zero() {
+    let parameters = with_sensor(SensorType::MultiTurn, 1);
+    for (position, preset, offset) in [
+        (0, 0, 0),
+        (0, 5, 5),
+        (5, 0, -5),
+        (0, 409_599, 409_599),
+        (0, 409_600, -409_600),
+        (0, 819_199, -1),
+        (819_199, 0, 1),
+    ] {
+        assert_eq!(parameters.preset(0, position, preset), Some(offset), "{position} to {preset}");
+    }
+}
+
+#[test]
+fn the_range_is_what_the_electronic_count_tells_apart() {
+    let mut parameters = with_sensor(SensorType::IncrementalCounted, 4096);
+    parameters.sensors.channels[0].counted = NonZeroU16::new(10).unwrap();
+    let car = Car::new(parameters, 0.0);
+    assert_eq!(car.parameters.preset(0, 0, 1999), Some(-1), "ten turns of 200 mm");
+    assert_eq!(car.parameters.preset(0, 0, 2000), None);
+}
+
+#[test]
+fn what_is_set_for_an_encoder_of_cia_406_does_not_count() {
+    // The second does not resolve the step of 1 mm.
+    for resolution in [4096, 199] {
+        let plain = with_sensor(SensorType::IncrementalCounted, resolution);
+        let mut other = plain;
+        other.sensors.operating = u16::MAX;
+        other.sensors.module.offset = 12_345;
+        other.sensors.channels[0].area = Area { low: 5, high: 1 };
+        let mut cars = [plain, other].map(|parameters| Car::new(parameters, 0.0));
+        cars[1].parameters.sensors.channels[0].preset = Command { value: 777, count: 1 };
+        cars.iter_mut().for_each(Car::apply);
+        let [plain, other] = cars.map(|mut car| [0.0, 100.0, 1234.5].map(|way| car.drive(way)));
+        assert_eq!(plain, other);
+    }
+}
+
+#[test]
+fn a_car_that_is_faster_than_its_sensor_is_a_warning() {
+    for (fastest, warnings) in [(51, 0), (50, WARNING_FREQUENCY)] {
+        let mut parameters = with_sensor(SensorType::IncrementalCounted, 4096);
+        parameters.sensors.channels[0].fastest = fastest;
+        let mut car = Car::new(parameters, 0.0);
+        // 51.2 steps.
+        assert_eq!(car.drive(FAST).units[0].warnings, warnings);
+    }
 }

@@ -70,6 +70,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_record_says_what_it_was_made_of() {
+        let record = DeviceRecord::new(5, 250, 3).unwrap();
+        assert_eq!((record.node_id(), record.bit_rate_kbit(), record.personality()), (5, 250, 3));
+        assert_eq!(record.encode(), [5, 3, 250, 0]);
+    }
+
+    #[test]
     fn every_record_that_can_be_made_decodes_to_itself() {
         for node_id in 0..=255 {
             for rate in 0..=1100 {

@@ -89,4 +89,15 @@ mod tests {
         }
         assert_eq!(unguarded(ERASED), None);
     }
+
+    #[test]
+    fn a_commit_word_never_reads_as_erased() {
+        let mut check = Check::new(FIRST);
+        // After the word that is what the register holds, the register is 0 and the CRC all ones.
+        let word = !CRC.checksum(&FIRST.to_le_bytes());
+        check.add(word);
+        let bytes = [FIRST.to_le_bytes(), word.to_le_bytes()].concat();
+        assert_eq!(CRC.checksum(&bytes), ERASED);
+        assert_eq!(check.commit_word(), 0);
+    }
 }

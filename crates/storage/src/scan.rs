@@ -168,3 +168,40 @@ impl Scan {
         self.groups.iter_mut().for_each(|entry| entry.suspect = true);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::format::{Check, ERASED, guarded};
+    use crate::memory::Memory;
+
+    /// A page of 64 bytes with one transaction of these records.
+    fn scan(records: &[u32]) -> Scan {
+        let len = u16::try_from(records.len()).unwrap();
+        let mut words = [&[CLEAN, ERASED, MARK, guarded(1), guarded(len)], records].concat();
+        let mut check = Check::new(FIRST);
+        for word in &words[3..] {
+            check.add(*word);
+        }
+        words.extend([check.commit_word(), MARK]);
+        words.resize(16, ERASED);
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        Scan::of(&mut Memory(bytes.as_slice()), Page { start: 0, size: 64 }).unwrap()
+    }
+
+    fn head(group: Group) -> u32 {
+        u32::from_le_bytes([group.id(), KIND_VALUE, 9, 0])
+    }
+
+    #[test]
+    fn a_record_ends_where_its_transaction_ends_at_the_latest() {
+        for (len, fits) in [(0, true), (1, true), (8, true), (9, false), (u32::MAX, false)] {
+            let scan = scan(&[head(Group::Device), len, 0x1111, 0x2222]);
+            let content = scan.groups.get(Group::Device).content;
+            assert_eq!(matches!(content, Content::Value(slot) if slot.len == len), fits, "{len} bytes");
+            assert!(scan.tidy);
+        }
+    }
+}

@@ -143,7 +143,7 @@ fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
 
 /// Whether generation `x` comes after `y`. They are never far apart, so this holds across the wrap.
 fn follows(x: u16, y: u16) -> bool {
-    x != y && x.wrapping_sub(y) < 0x8000
+    x.wrapping_sub(y).cast_signed() > 0
 }
 
 /// The state of a group. A page in use that says it was left means that its successor cannot be read; with no page in

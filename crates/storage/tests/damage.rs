@@ -209,6 +209,31 @@ fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
 }
 
 #[test]
+fn a_length_that_leads_out_of_the_page_is_damage() {
+    let device = Device::on_one_page();
+    let room = (512 - 8 - 5 * 4) / 4;
+    for words in (room + 1..room + 10).chain([1000, u16::MAX]) {
+        let mut flash = device.flash.clone();
+        // Generation and length of the first transaction, each beside its complement.
+        let head =
+            [7, words].map(|value: u16| [value.to_le_bytes(), (!value).to_le_bytes()].concat()).concat();
+        (512 + 12..).zip(head).for_each(|(at, to)| flash.disturb(at, |_| to));
+        assert_eq!(read(&mut flash, PAGES).0, device.newest());
+    }
+}
+
+#[test]
+fn what_the_start_has_found_is_told_after_it_was_mended_too() {
+    let device = Device::new(Device::on_one_page().saves[..2].to_vec());
+    let mut flash = device.flash.clone();
+    flash.disturb(24, |byte| byte ^ 1);
+    let store = start(&mut flash, PAGES).unwrap();
+    let health = Group::ALL.map(|group| store.health(group));
+    assert_eq!(health, [Health::Lost, Health::Good, Health::Lost, Health::Lost]);
+    assert_eq!(read(&mut flash, PAGES).1, [Health::Good; 4], "the next start finds nothing");
+}
+
+#[test]
 fn the_closing_mark_of_a_move_is_not_needed_once_the_old_page_says_that_it_was_left() {
     let device = Device::just_moved();
     let bytes = device.flash.bytes();

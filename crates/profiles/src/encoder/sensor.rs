@@ -194,6 +194,30 @@ mod tests {
     }
 
     #[test]
+    fn a_position_goes_on_between_sensors_whose_readings_mean_the_same() {
+        let encoder = Sensor {
+            kind: SensorType::Incremental,
+            resolution: NonZeroU32::new(4000).unwrap(),
+            counted: NonZeroU16::new(100).unwrap(),
+            format: Format::COMMON,
+            index: true,
+            fastest: 0,
+        };
+        let rod = Sensor { kind: SensorType::LinearAbsolute, ..encoder };
+        let finer = NonZeroU32::new(4001).unwrap();
+        let format =
+            Format::new(12, 13, super::super::Coding::Binary, false, super::super::Parity::None).unwrap();
+        for sensor in [encoder, rod] {
+            let (counted, index, fastest) = (NonZeroU16::MIN, false, 5);
+            assert!(sensor.is_like(&Sensor { counted, index, fastest, ..sensor }));
+            assert!(!sensor.is_like(&Sensor { resolution: finer, ..sensor }));
+            let of_another_code = Sensor { format, ..sensor };
+            assert_eq!(sensor.is_like(&of_another_code), !sensor.kind.is_absolute());
+        }
+        assert!(!encoder.is_like(&Sensor { kind: SensorType::IncrementalCounted, ..encoder }));
+    }
+
+    #[test]
     fn every_type_resolves_what_it_says() {
         let expected = [
             (SensorType::SingleTurn, 8192, 1, 13),

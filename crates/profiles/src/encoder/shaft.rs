@@ -137,6 +137,28 @@ mod tests {
 
     use super::*;
 
+    const TEN: NonZeroU32 = NonZeroU32::new(10).unwrap();
+
+    #[test]
+    fn a_step_is_never_negative() {
+        for (total, turns, step) in
+            [(0, 0, 0), (9, 0, 9), (10, 1, 0), (-1, -1, 9), (-10, -1, 0), (-11, -2, 9), (-20, -2, 0)]
+        {
+            assert_eq!(Shaft::at(total, TEN), Shaft { turns, step }, "{total}");
+            let mut tracker = Tracker::new(TEN, 16, 0, 0);
+            tracker.correct(total);
+            assert_eq!(tracker.shaft(), Shaft { turns, step }, "{total}");
+        }
+    }
+
+    #[test]
+    fn a_tracker_tells_the_step_in_turns_of_any_length() {
+        let mut tracker = Tracker::new(TEN, 16, 1000, 25);
+        assert_eq!((tracker.step_in(TEN), tracker.step_in(NonZeroU32::new(7).unwrap())), (5, 4));
+        tracker.follow(1002);
+        assert_eq!((tracker.word(), tracker.total(), tracker.count()), (1002, 27, 2));
+    }
+
     proptest! {
         /// Against a plain sum of the movements.
         #[test]

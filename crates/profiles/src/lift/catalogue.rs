@@ -299,3 +299,6 @@ pub const PDOS: &[Pdo; 19] = &[
     fixed(385, "car position 3", 0x18E, &[object(0x6383, 3, 32, "position 3")]),
     fixed(386, "car position 4", 0x18F, &[object(0x6383, 4, 32, "position 4")]),
 ];
+
+#[cfg(test)]
+mod tests;

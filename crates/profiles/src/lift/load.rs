@@ -207,6 +207,20 @@ mod tests {
     }
 
     #[test]
+    fn the_line_goes_through_both_points() {
+        let points = [Point { pressure: 2.0e5, load: 100.0 }, Point { pressure: 6.0e5, load: 300.0 }];
+        let own = Parameters { points, ..hydraulic() };
+        assert!(own.is_calibrated());
+        let loads = [2.0e5, 4.0e5, 6.0e5].map(|pascal| LoadUnit::new(&own).sample(&raw(pascal)).load);
+        assert_eq!(loads, [100, 200, 300]);
+    }
+
+    #[test]
+    fn signals_are_the_bits_0_to_3() {
+        assert_eq!([ZERO_LOAD, HALF_LOAD, FULL_LOAD, OVERLOAD], [1, 2, 4, 8]);
+    }
+
+    #[test]
     fn every_signal_has_its_limit() {
         for (load, expected) in [
             (0, ZERO_LOAD),
@@ -230,6 +244,7 @@ mod tests {
         assert_eq!(signals(1000, &[50, 0, 0, 660]), OVERLOAD);
         assert_eq!(signals(10, &[50, 0, 0, 0]), ZERO_LOAD, "one limit is in no order");
         assert_eq!(signals(700, &[0, 0, 0, 660]), OVERLOAD);
+        assert_eq!(signals(10, &[50, 0, 0, 50]), ZERO_LOAD, "equal limits do not fall");
     }
 
     #[test]
@@ -248,6 +263,15 @@ mod tests {
             assert!(snapshot.is_broken);
         }
         assert_eq!(unit.sample(&raw(2.0e5)).load, 0);
+    }
+
+    #[test]
+    fn a_ratio_that_is_none_or_an_input_at_a_rail_is_enough_to_be_broken() {
+        let open = RawSample { pressure: 640, ..raw(0.0) };
+        let rail = RawSample { pressure: 65_520, supply: 70_000, ..raw(0.0) };
+        for broken in [open, rail] {
+            assert!(LoadUnit::new(&hydraulic()).sample(&broken).is_broken);
+        }
     }
 
     #[test]

@@ -79,3 +79,50 @@ impl Lift {
         self.position.kept()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pressure::FactoryCalibration;
+
+    const FACTORY: FactoryCalibration = FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
+    /// 5 bar.
+    const PRESSURE: RawSample = RawSample {
+        pressure: 32_000,
+        supply: 64_000,
+        temperature: 0,
+        vrefint: 0,
+        thermistor: 0,
+        count: 16,
+        factory: FACTORY,
+    };
+
+    fn raw(counter: u16) -> RawLift {
+        let encoder = RawEncoder { counter, ..RawEncoder::default() };
+        RawLift { encoder, pressure: PRESSURE, buttons: [true, false] }
+    }
+
+    #[test]
+    fn every_virtual_device_measures_with_its_own_parameters() {
+        let mut parameters = Parameters::default();
+        parameters.load.offset = 7.0;
+        let mut lift = Lift::default();
+        lift.apply(&parameters);
+        lift.sample(&raw(0));
+        let snapshot = lift.sample(&raw(4096));
+        assert_eq!(snapshot.position.units[0].position, 200, "a turn of 200 mm");
+        assert_eq!(snapshot.load.load, 507);
+        assert_eq!(snapshot.button, panel::Contact { button: 0, is_pressed: true });
+    }
+
+    #[test]
+    fn the_position_outlives_a_loss_of_power() {
+        let mut lift = Lift::default();
+        lift.apply(&Parameters::default());
+        lift.sample(&raw(0));
+        lift.sample(&raw(4096));
+        let mut lift = Lift::new(Start::Kept(lift.kept()));
+        lift.apply(&Parameters::default());
+        assert_eq!(lift.sample(&raw(0)).position.units[0].position, 200);
+    }
+}

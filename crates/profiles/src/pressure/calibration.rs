@@ -93,11 +93,10 @@ impl PressureCalibration {
     pub fn is_valid(&self) -> bool {
         let (low, high) = (COLDEST - self.reference, HOTTEST - self.reference);
         let range = self.end - self.start;
-        let is_rising = range > 0.0 && range.is_finite();
-        let has_span =
-            self.span.extremes(low, high).iter().all(|span| *span > 0.0 && (range / span).is_finite());
+        let slopes = self.span.extremes(low, high).map(|span| range / span);
+        let has_span = slopes.iter().all(|slope| *slope > 0.0 && slope.is_finite());
         let has_zero = self.zero.extremes(low, high).iter().all(|zero| zero.is_finite());
-        is_rising && has_span && has_zero && low <= 0.0 && high >= 0.0 && self.break_low < self.break_high
+        range > 0.0 && has_span && has_zero && low <= 0.0 && high >= 0.0 && self.break_low < self.break_high
     }
 }
 
@@ -147,6 +146,15 @@ mod tests {
     }
 
     #[test]
+    fn a_ratio_beyond_its_limits_is_a_break() {
+        for (ratio, is_break) in
+            [(0.0, true), (0.024, true), (0.025, false), (0.5, false), (0.975, false), (0.976, true)]
+        {
+            assert_eq!(DRIFTING.is_break(ratio), is_break, "{ratio}");
+        }
+    }
+
+    #[test]
     fn what_gives_no_single_rising_pressure_is_not_valid() {
         let good = PressureCalibration::default();
         assert!(good.is_valid() && DRIFTING.is_valid());
@@ -157,11 +165,14 @@ mod tests {
         let vertex = PressureCalibration { span: touching, ..good };
         let hot = PressureCalibration { span: Polynomial { linear: -0.009, ..good.span }, ..good };
         let falling = PressureCalibration { start: 2e6, ..good };
+        let falling_twice = PressureCalibration { start: 2e6, ..falling_span };
         let flat = PressureCalibration { start: 1e6, ..good };
         let not_finite = PressureCalibration { zero: Polynomial::constant(f32::NAN), ..good };
+        let no_slope = PressureCalibration { span: Polynomial::constant(f32::INFINITY), ..good };
         let too_steep = PressureCalibration { span: Polynomial::constant(1e-38), ..good };
         let too_wide = PressureCalibration { start: f32::MIN, end: f32::MAX, ..good };
         let elsewhere = PressureCalibration { reference: 0.0, ..good };
+        let hotter = PressureCalibration { reference: 400.0, ..good };
         let always_broken = PressureCalibration { break_low: 0.975, ..good };
         let bad = [
             no_span,
@@ -169,11 +180,14 @@ mod tests {
             vertex,
             hot,
             falling,
+            falling_twice,
             flat,
             not_finite,
+            no_slope,
             too_steep,
             too_wide,
             elsewhere,
+            hotter,
             always_broken,
         ];
         assert!(bad.iter().all(|calibration| !calibration.is_valid()));

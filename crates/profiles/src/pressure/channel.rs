@@ -115,9 +115,7 @@ impl Channel {
         let valid = valid && field_value.is_finite();
         let field_value = finite(field_value);
         let scaled = self.filter.next(field_value) * p.scaling_factor + p.scaling_offset;
-        let exact = p.unit.of(scaled) + p.offset;
-        let valid = valid && exact.is_finite();
-        let process_value = finite(exact);
+        let process_value = finite(p.unit.of(scaled) + p.offset);
         // In single precision on purpose: the nearest single to 0.29 times 100 is 29, while the same product in double
         // precision is 28.999999 and would be cut to 28.
         let shifted = process_value * self.shift;
@@ -151,7 +149,7 @@ fn truncate32(value: f32) -> i32 {
     value as i32
 }
 
-/// Whether no integer format is clipped; what fits 16 bits fits 32. Not a number fits nothing.
+/// Whether no format is clipped; what fits 16 bits fits 32, and is no overflow. Not a number fits nothing.
 fn fits16(value: f32) -> bool {
     value > f32::from(i16::MIN) - 1.0 && value < f32::from(i16::MAX) + 1.0
 }
@@ -159,4 +157,114 @@ fn fits16(value: f32) -> bool {
 #[allow(clippy::cast_possible_truncation)]
 fn shift(digits: u8) -> f32 {
     i8::try_from(digits).map_or(f32::INFINITY, |digits| power_of_ten(digits) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOTH: u8 = STATUS_ABOVE | STATUS_BELOW;
+    const ANY: Span<f32> = Span { start: f32::MIN, end: f32::MAX };
+
+    /// Field value and process value are the same number.
+    fn plain() -> ChannelParameters {
+        ChannelParameters::new(Unit::pressure(0x0022_0000).unwrap(), ANY)
+    }
+
+    fn sample(parameters: &ChannelParameters, field_value: f32) -> ChannelValues {
+        Channel::new(parameters).sample(field_value, true)
+    }
+
+    #[test]
+    fn a_field_value_is_scaled_in_pascal_and_offset_in_the_unit() {
+        let (scaling_factor, scaling_offset) = (2.0, 50_000.0);
+        let own = ChannelParameters { scaling_factor, scaling_offset, offset: 0.25, digits: 2, ..plain() };
+        let bar = ChannelParameters { unit: Unit::BAR, ..own };
+        // 2 * 1 bar + 0.5 bar, + 0.25 bar, with two digits.
+        let expected = ChannelValues {
+            field_value: 100_000.0,
+            process_value: 2.75,
+            process_value16: 275,
+            process_value32: 275,
+            status: 0,
+        };
+        assert_eq!(sample(&bar, 100_000.0), expected);
+    }
+
+    #[test]
+    fn integers_are_cut_towards_zero_and_clipped_beyond_16_bits() {
+        for (value, cut16, cut32, status) in [
+            (1.9, 1, 1, 0),
+            (-1.9, -1, -1, 0),
+            (32_767.99, 32_767, 32_767, 0),
+            (32_768.0, 32_767, 32_768, STATUS_INVALID),
+            (-32_768.99, -32_768, -32_768, 0),
+            (-32_769.0, -32_768, -32_769, STATUS_INVALID),
+            (1e10, i16::MAX, i32::MAX, STATUS_INVALID),
+            (-1e10, i16::MIN, i32::MIN, STATUS_INVALID),
+        ] {
+            let values = sample(&plain(), value);
+            let got = (values.process_value16, values.process_value32, values.status);
+            assert_eq!(got, (cut16, cut32, status), "{value}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_measurement_is_invalid_and_a_number_all_the_same() {
+        for (value, is_from_an_intact_sensor, number) in [
+            (5.0, false, 5.0),
+            (f32::NAN, true, 0.0),
+            (f32::INFINITY, true, f32::MAX),
+            (f32::NEG_INFINITY, true, f32::MIN),
+        ] {
+            let values = Channel::new(&plain()).sample(value, is_from_an_intact_sensor);
+            assert_eq!((values.field_value, values.process_value), (number, number));
+            assert_eq!(values.status, STATUS_INVALID, "{value}");
+        }
+        let overflowing = ChannelParameters { scaling_factor: 10.0, ..plain() };
+        let values = sample(&overflowing, f32::MAX);
+        assert_eq!((values.process_value, values.status), (f32::MAX, STATUS_INVALID));
+    }
+
+    #[test]
+    fn a_value_at_the_limit_is_inside() {
+        let own = ChannelParameters { span: Span { start: -10.0, end: 10.0 }, ..plain() };
+        for (value, status) in [(-10.5, STATUS_BELOW), (-10.0, 0), (0.0, 0), (10.0, 0), (10.5, STATUS_ABOVE)]
+        {
+            assert_eq!(sample(&own, value).status, status, "{value}");
+        }
+        let upside_down = ChannelParameters { span: Span { start: 10.0, end: -10.0 }, ..plain() };
+        assert_eq!(sample(&upside_down, 0.0).status, BOTH);
+    }
+
+    #[test]
+    fn every_format_has_a_span_and_one_is_enough() {
+        let (low, high) = (Span { start: -3.0, end: -1.0 }, Span { start: 1.0, end: 3.0 });
+        let (low16, high16) = (Span { start: -3, end: -1 }, Span { start: 1, end: 3 });
+        let (low32, high32) = (Span { start: -3, end: -1 }, Span { start: 1, end: 3 });
+        for (span, span16, span32, status) in [
+            (low, plain().span16, plain().span32, STATUS_ABOVE),
+            (plain().span, low16, plain().span32, STATUS_ABOVE),
+            (plain().span, plain().span16, low32, STATUS_ABOVE),
+            (low, low16, plain().span32, STATUS_ABOVE),
+            (low, plain().span16, low32, STATUS_ABOVE),
+            (plain().span, high16, high32, STATUS_BELOW),
+            (high, low16, plain().span32, BOTH),
+            (plain().span, low16, high32, BOTH),
+        ] {
+            let own = ChannelParameters { span, span16, span32, ..plain() };
+            assert_eq!(sample(&own, 0.0).status, status, "{own:?}");
+        }
+    }
+
+    #[test]
+    fn new_parameters_hold_from_the_next_sample_and_the_filter_goes_on() {
+        let average = |constant| ChannelParameters { filter_type: 1, filter_constant: constant, ..plain() };
+        let mut channel = Channel::new(&average(4));
+        channel.sample(0.0, true);
+        channel.apply(&ChannelParameters { offset: 100.0, ..average(4) });
+        assert_eq!(channel.sample(8.0, true).process_value32, 102, "a quarter of the way");
+        channel.apply(&average(8));
+        assert_eq!(channel.sample(16.0, true).process_value32, 16, "another filter starts afresh");
+    }
 }

@@ -115,17 +115,19 @@ impl Thermistor {
     fn is_valid(&self) -> bool {
         let ends = [self.series / real(CODES), 1.0, self.series * real(CODES)];
         let falls = |log: f32| self.b + 3.0 * self.c * log * log > 0.0 && self.reciprocal(log).is_finite();
-        self.series > 0.0 && self.break_low < self.break_high && ends.map(libm::logf).into_iter().all(falls)
+        // Without a resistor, or with a negative one, there is no logarithm.
+        self.break_low < self.break_high && ends.map(libm::logf).into_iter().all(falls)
     }
 }
 
 /// Sensor and reference are read against the same VDDA, so their quotient times the reference's reading at 3.3 V is the
-/// sensor's reading at 3.3 V (RM0390, 13.10), for which the factory's two points hold. `None` without them.
+/// sensor's reading at 3.3 V (RM0390, 13.10), for which the factory's two points hold. Without a reference or two points
+/// it is no number.
 fn internal(raw: &RawSample) -> Option<f32> {
-    let points = raw.factory;
-    if raw.vrefint == 0 || points.ts_cal1 == points.ts_cal2 || raw.is_rail(raw.temperature) {
+    if raw.is_rail(raw.temperature) {
         return None;
     }
+    let points = raw.factory;
     let at_3300_mv = real(raw.temperature) / real(raw.vrefint) * f32::from(points.vrefint_cal);
     let (low, high) = (f32::from(points.ts_cal1), f32::from(points.ts_cal2));
     Some(TS_CAL1_KELVIN + (at_3300_mv - low) * (TS_CAL2_KELVIN - TS_CAL1_KELVIN) / (high - low))
@@ -194,10 +196,35 @@ mod tests {
     }
 
     #[test]
+    fn without_a_reference_or_factory_points_there_is_no_temperature() {
+        let own = TemperatureCalibration::default();
+        assert_eq!(own.temperature(&RawSample { vrefint: 0, ..RAW }), None);
+        for (ts_cal1, ts_cal2) in [(1000, 1000), (940, 940), (0xFFFF, 0xFFFF)] {
+            let factory = FactoryCalibration { ts_cal1, ts_cal2, ..RAW.factory };
+            assert_eq!(own.temperature(&RawSample { factory, ..RAW }), None);
+        }
+    }
+
+    #[test]
+    fn coefficients_that_give_no_positive_temperature_give_none() {
+        for own in [
+            Thermistor { a: -1.0, ..Thermistor::default() },
+            Thermistor { c: f32::MAX, ..Thermistor::default() },
+        ] {
+            assert_eq!(own.temperature(&RAW), None);
+        }
+    }
+
+    #[test]
     fn a_thermistor_beyond_its_limits_is_broken() {
         // 1 % and 99 % of 16 * 4096.
         for (sum, is_intact) in [(655, false), (656, true), (64_880, true), (64_881, false)] {
             assert_eq!(thermistor(sum).is_some(), is_intact, "{sum}");
+        }
+        let quarters = Thermistor { break_low: 0.25, break_high: 0.75, ..Thermistor::default() };
+        for (sum, is_intact) in [(16_383, false), (16_384, true), (49_152, true), (49_153, false)] {
+            let raw = RawSample { thermistor: sum, ..RAW };
+            assert_eq!(quarters.temperature(&raw).is_some(), is_intact, "{sum}");
         }
         let thermometer = Thermometer::Thermistor;
         let wide = Thermistor { break_low: 0.0, break_high: 1.0, ..Thermistor::default() };
@@ -228,6 +255,9 @@ mod tests {
             Thermistor { b: 0.0, ..thermistor },
             Thermistor { b: -1e-4, ..thermistor },
             Thermistor { c: -1e-6, ..thermistor },
+            // Wrong at the highest resistance only, 41 Mohm; at the lowest only, 2.4 uohm.
+            Thermistor { c: -5e-7, ..thermistor },
+            Thermistor { c: -1e-6, series: 0.01, ..thermistor },
             Thermistor { a: f32::INFINITY, ..thermistor },
             Thermistor { series: 0.0, ..thermistor },
             Thermistor { series: -1.0, ..thermistor },

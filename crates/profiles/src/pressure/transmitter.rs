@@ -138,3 +138,93 @@ impl Transmitter {
         self.until_check -= 1;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pressure::{FactoryCalibration, Polynomial, STATUS_ABOVE, STATUS_BELOW, STATUS_INVALID};
+
+    /// An intact sensor at 5 bar and 30 degC.
+    const GOOD: RawSample = RawSample {
+        pressure: 16 * 1000,
+        supply: 16 * 2000,
+        temperature: 16 * 940,
+        vrefint: 16 * 1500,
+        thermistor: 0,
+        count: 16,
+        factory: FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 },
+    };
+    /// The wire of the transducer is open: 1 % of the supply.
+    const OPEN: RawSample = RawSample { pressure: 16 * 20, ..GOOD };
+
+    #[test]
+    fn an_intact_sensor_is_measured() {
+        let snapshot = Transmitter::default().sample(&GOOD);
+        assert_eq!(snapshot.conditions, Conditions::default());
+        assert!((snapshot.pressure.process_value - 5.0).abs() < 1e-5);
+        assert!((snapshot.temperature.process_value - 30.0).abs() < 1e-3);
+        assert_eq!((snapshot.pressure.status, snapshot.temperature.status), (0, 0));
+    }
+
+    #[test]
+    fn a_break_is_looked_for_once_a_second() {
+        let mut transmitter = Transmitter::default();
+        transmitter.sample(&GOOD);
+        for _ in 1..1000 {
+            assert!(!transmitter.sample(&OPEN).conditions.sensor_break);
+        }
+        let found = transmitter.sample(&OPEN);
+        assert!(found.conditions.sensor_break && found.pressure.status & STATUS_INVALID != 0);
+        for _ in 1..1000 {
+            assert!(transmitter.sample(&GOOD).conditions.sensor_break);
+        }
+        assert!(!transmitter.sample(&GOOD).conditions.sensor_break);
+    }
+
+    #[test]
+    fn every_fault_makes_its_own_channel_invalid() {
+        let rail = RawSample { pressure: 16 * 4095, supply: 16 * 4094, ..GOOD };
+        let no_temperature = RawSample { temperature: 0, ..GOOD };
+        for (raw, pressure, temperature) in [
+            (OPEN, STATUS_INVALID | STATUS_BELOW, 0),
+            (rail, STATUS_INVALID | STATUS_ABOVE, 0),
+            (no_temperature, 0, STATUS_INVALID | STATUS_BELOW),
+        ] {
+            // With limits that this rail does not pass, so that it is a rail and nothing else.
+            let mut parameters = Parameters::default();
+            parameters.calibration.pressure.break_high = 1.1;
+            let snapshot = Transmitter::new(&parameters).sample(&raw);
+            assert_eq!((snapshot.pressure.status, snapshot.temperature.status), (pressure, temperature));
+            let conditions = Conditions {
+                sensor_break: raw == OPEN,
+                pressure_rail: raw == rail,
+                temperature_rail: raw == no_temperature,
+            };
+            assert_eq!(snapshot.conditions, conditions);
+        }
+    }
+
+    #[test]
+    fn new_parameters_hold_from_the_next_sample() {
+        let mut transmitter = Transmitter::default();
+        transmitter.sample(&GOOD);
+        let mut parameters = Parameters::default();
+        parameters.calibration.pressure.end = 2_000_000.0;
+        parameters.pressure.offset = 1.0;
+        parameters.temperature.offset = -1.0;
+        transmitter.apply(&parameters);
+        let snapshot = transmitter.sample(&GOOD);
+        assert!((snapshot.pressure.process_value - 11.0).abs() < 1e-5);
+        assert!((snapshot.temperature.process_value - 29.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_calibration_is_valid_when_both_are() {
+        let good = Calibration::default();
+        assert!(good.is_valid());
+        let pressure = PressureCalibration { span: Polynomial::constant(0.0), ..good.pressure };
+        let temperature = TemperatureCalibration { factor: 0.0, ..good.temperature };
+        assert!(!Calibration { pressure, ..good }.is_valid());
+        assert!(!Calibration { temperature, ..good }.is_valid());
+    }
+}

@@ -89,6 +89,33 @@ mod tests {
     }
 
     #[test]
+    fn every_unit_is_what_its_definition_says() {
+        for (code, pascal) in [
+            (0x0022_0000, 1.0),
+            (0x004E_0000, 100_000.0),
+            (0x00AB_0000, 6_894.757),
+            (0x00A0_0000, 133.3224),
+            (0x00A1_0000, 98_066.5),
+            (0x00A2_0000, 9.806_375),
+            (0x00A4_0000, 101_325.0),
+        ] {
+            let two = Unit::pressure(code).unwrap().of(2.0 * pascal);
+            assert!((two - 2.0).abs() < 1e-6, "{code:08X}: {two}");
+        }
+        // Water freezes and boils.
+        for (code, freezing, boiling) in [
+            (0x0005_0000, 273.15, 373.15),
+            (0x002D_0000, 0.0, 100.0),
+            (0x00AC_0000, 32.0, 212.0),
+            (0xFD2D_0000, 0.0, 100_000.0),
+        ] {
+            let unit = Unit::temperature(code).unwrap();
+            let [cold, hot] = [273.15, 373.15].map(|kelvin| unit.of(kelvin));
+            assert!((cold - freezing).abs() < 0.1 && (hot - boiling).abs() < 0.1, "{code:08X}: {cold} {hot}");
+        }
+    }
+
+    #[test]
     fn a_prefix_divides() {
         let millibar = Unit::pressure(0xFD4E_0000).unwrap().of(101_325.0);
         let kilopascal = Unit::pressure(0x0322_0000).unwrap().of(101_325.0);

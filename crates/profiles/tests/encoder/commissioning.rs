@@ -81,6 +81,45 @@ fn a_stuck_bit_is_found_over_two_turns() {
 }
 
 #[test]
+fn a_bit_that_sticks_later_is_found_over_the_next_two_turns() {
+    let format = Format::new(4, 8, Coding::Binary, false, Parity::None).unwrap();
+    let mut bench = diagnosed(SensorType::MultiTurn);
+    bench.change(|parameters| parameters.format = format);
+    let mut last = Progress::Off;
+    for total in 0..=512 {
+        last = bench.receive(Some(frame(format, total))).channels[0].commissioning;
+    }
+    assert_eq!(last, Progress::GoodOverTurns);
+    for total in 513..1100 {
+        let mut frame = frame(format, total);
+        frame.bits &= !4;
+        last = bench.receive(Some(frame)).channels[0].commissioning;
+    }
+    assert_eq!(last, Progress::StuckBit);
+}
+
+#[test]
+fn a_movement_is_two_turns_without_a_rest() {
+    for (rest, expected) in [(100, Progress::GoodOverTurns), (101, Progress::GoodAtRest)] {
+        let mut bench = diagnosed(SensorType::MultiTurn);
+        (0..1000).for_each(|_| _ = bench.stay());
+        // A turn and a half, a rest, and a turn.
+        (0..1536).for_each(|_| _ = bench.step(8));
+        (0..rest).for_each(|_| assert_eq!(progress(&mut bench), Progress::GoodAtRest));
+        (0..1024).for_each(|_| _ = bench.step(8));
+        assert_eq!(progress(&mut bench), expected, "after {rest} ms");
+    }
+}
+
+#[test]
+fn two_turns_of_a_rod_are_8192_steps() {
+    let mut bench = diagnosed(SensorType::LinearAbsolute);
+    (0..1000).for_each(|_| _ = bench.stay());
+    (0..8191).for_each(|_| assert_eq!(bench.step(1).channels[0].commissioning, Progress::GoodAtRest));
+    assert_eq!(bench.step(1).channels[0].commissioning, Progress::GoodOverTurns);
+}
+
+#[test]
 fn an_index_that_does_not_come_is_found() {
     let mut bench = diagnosed(SensorType::Incremental);
     bench.stay();

@@ -1,8 +1,11 @@
 //! The whole encoder, from what the hardware reads to the snapshot.
 
 mod bench;
+mod bits;
 mod commissioning;
+mod input;
 mod motion;
+mod parameters;
 mod power;
 mod preset;
 mod random;

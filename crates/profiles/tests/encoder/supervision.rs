@@ -6,7 +6,7 @@ use profiles::encoder::{
     WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
 };
 
-use crate::bench::{Bench, frame, one};
+use crate::bench::{Bench, frame, one, two};
 
 #[test]
 fn two_bad_frames_are_tolerated_and_the_third_is_a_position_error() {
@@ -29,6 +29,14 @@ fn two_bad_frames_are_tolerated_and_the_third_is_a_position_error() {
         assert_eq!(snapshot.conditions.sensor_break, state == SENSOR_NO_SIGNAL);
         assert_eq!(bench.go(1300).channels[0].position, 1300, "back");
     }
+}
+
+#[test]
+fn two_sensors_with_the_same_fault_do_not_cancel_out() {
+    let mut bench = Bench::new(two(SensorType::MultiTurn, SensorType::SingleTurn));
+    bench.stay();
+    (0..2).for_each(|_| assert_eq!(bench.receive(None).alarms, 0));
+    assert_eq!(bench.receive(None).alarms, ALARM_POSITION);
 }
 
 #[test]
@@ -64,7 +72,8 @@ fn a_sensor_comes_back_from_where_it_can_have_moved() {
 
 #[test]
 fn conditions_must_last_to_count_and_to_go() {
-    let fine = Board { supply: Some(5000), current: Some(100), battery: Some(3000), ..Board::default() };
+    // At the limits is within them.
+    let fine = Board { supply: Some(4500), current: Some(200), battery: Some(2400), ..Board::default() };
     let cases: [(Board, Conditions, u16); 5] = [
         (Board { supply: Some(4499), ..fine }, Conditions { voltage: true, ..Conditions::default() }, 0),
         (Board { supply: Some(5501), ..fine }, Conditions { voltage: true, ..Conditions::default() }, 0),

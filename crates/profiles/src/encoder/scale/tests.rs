@@ -176,3 +176,15 @@ fn a_way_needs_a_step_that_the_sensor_resolves() {
     assert_eq!(along(linear(100_000), 1, 50_000), None);
     assert_eq!(along(rotary(1, 1), 1, u32::MAX), None, "not even one unit");
 }
+
+#[test]
+fn nothing_is_not_given() {
+    let per_revolution = NonZeroU32::new(4096).unwrap();
+    let shaft = Native::Rotary { per_revolution, revolutions: NonZeroU32::MIN };
+    let rod = Native::Linear { step: per_revolution, steps: NonZeroU64::new(1 << 25).unwrap() };
+    for native in [shaft, rod] {
+        assert!(!native.gives_per_revolution(0) && native.gives_per_revolution(1));
+        assert!(!native.gives_step(0) && native.gives_step(u32::MAX));
+        assert!(!native.gives_range(0) && native.gives_range(1));
+    }
+}
