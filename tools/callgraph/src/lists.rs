@@ -40,7 +40,7 @@ pub(crate) const KNOWN: [Known; 6] = [
     },
     Known {
         image: "bootloader",
-        function: "bsp::hardware::program_flash::ProgramFlash as embedded_storage::nor_flash::ReadNorFlash",
+        function: "bsp::hardware::flash::Flash",
         panic: "<[u8]>::copy_from_slice",
         reason: "the same",
     },
