@@ -75,6 +75,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     /// An integer of at most 32 bits; 0 where the dictionary has no such entry.
+    #[inline(never)]
     pub(super) fn number(&self, index: u16, sub: u8) -> u32 {
         self.number_or(index, sub, 0)
     }
