@@ -40,7 +40,7 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
-        entry.check_value(bytes)?;
+        entry.check_value(value)?;
         self.admit(&entry, value, bytes)?;
         if !entry.rule().is_computed() && !entry.rule().is_command() {
             entry.field.set(&mut self.image, bytes);
