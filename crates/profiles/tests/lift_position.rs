@@ -238,6 +238,11 @@ fn the_way_outlives_a_loss_of_power() {
 }
 
 #[test]
+fn direction_and_unknown_are_bit_3() {
+    assert_eq!((INVERTED, UNKNOWN), (8, 8));
+}
+
+#[test]
 fn a_source_is_the_number_of_a_channel() {
     let sources = [0, 1, 2, 3].map(Source::from_code);
     assert_eq!(sources, [None, Some(Source::First), Some(Source::Second), None]);
@@ -271,16 +276,19 @@ fn the_range_is_what_the_electronic_count_tells_apart() {
 
 #[test]
 fn what_is_set_for_an_encoder_of_cia_406_does_not_count() {
-    let plain = with_sensor(SensorType::IncrementalCounted, 4096);
-    let mut other = plain;
-    other.sensors.operating = u16::MAX;
-    other.sensors.module.offset = 12_345;
-    other.sensors.channels[0].area = Area { low: 5, high: 1 };
-    let mut cars = [plain, other].map(|parameters| Car::new(parameters, 0.0));
-    cars[1].parameters.sensors.channels[0].preset = Command { value: 777, count: 1 };
-    cars.iter_mut().for_each(Car::apply);
-    let [plain, other] = cars.map(|mut car| [0.0, 100.0, 1234.5].map(|way| car.drive(way)));
-    assert_eq!(plain, other);
+    // The second does not resolve the step of 1 mm.
+    for resolution in [4096, 199] {
+        let plain = with_sensor(SensorType::IncrementalCounted, resolution);
+        let mut other = plain;
+        other.sensors.operating = u16::MAX;
+        other.sensors.module.offset = 12_345;
+        other.sensors.channels[0].area = Area { low: 5, high: 1 };
+        let mut cars = [plain, other].map(|parameters| Car::new(parameters, 0.0));
+        cars[1].parameters.sensors.channels[0].preset = Command { value: 777, count: 1 };
+        cars.iter_mut().for_each(Car::apply);
+        let [plain, other] = cars.map(|mut car| [0.0, 100.0, 1234.5].map(|way| car.drive(way)));
+        assert_eq!(plain, other);
+    }
 }
 
 #[test]

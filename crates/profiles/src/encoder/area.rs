@@ -42,9 +42,9 @@ impl Default for Module {
 #[must_use]
 pub fn area_state(area: &Area, module: &Module, position: u32, native: i64) -> u8 {
     let position = i64::from(position);
-    let native = i32::try_from(native).unwrap_or(if native < 0 { i32::MIN } else { i32::MAX });
+    let native = native.clamp(i32::MIN.into(), i32::MAX.into());
     let bit = |set: bool, mask: u8| if set { mask } else { 0 };
-    bit(native < module.low || native > module.high, OUT_OF_RANGE)
+    bit(native < module.low.into() || native > module.high.into(), OUT_OF_RANGE)
         | bit(position > area.high.into(), OVERFLOW)
         | bit(position < area.low.into(), UNDERFLOW)
 }

@@ -216,6 +216,11 @@ mod tests {
     }
 
     #[test]
+    fn signals_are_the_bits_0_to_3() {
+        assert_eq!([ZERO_LOAD, HALF_LOAD, FULL_LOAD, OVERLOAD], [1, 2, 4, 8]);
+    }
+
+    #[test]
     fn every_signal_has_its_limit() {
         for (load, expected) in [
             (0, ZERO_LOAD),

@@ -93,11 +93,10 @@ impl PressureCalibration {
     pub fn is_valid(&self) -> bool {
         let (low, high) = (COLDEST - self.reference, HOTTEST - self.reference);
         let range = self.end - self.start;
-        let is_rising = range > 0.0 && range.is_finite();
         let slopes = self.span.extremes(low, high).map(|span| range / span);
         let has_span = slopes.iter().all(|slope| *slope > 0.0 && slope.is_finite());
         let has_zero = self.zero.extremes(low, high).iter().all(|zero| zero.is_finite());
-        is_rising && has_span && has_zero && low <= 0.0 && high >= 0.0 && self.break_low < self.break_high
+        range > 0.0 && has_span && has_zero && low <= 0.0 && high >= 0.0 && self.break_low < self.break_high
     }
 }
 
@@ -166,6 +165,7 @@ mod tests {
         let vertex = PressureCalibration { span: touching, ..good };
         let hot = PressureCalibration { span: Polynomial { linear: -0.009, ..good.span }, ..good };
         let falling = PressureCalibration { start: 2e6, ..good };
+        let falling_twice = PressureCalibration { start: 2e6, ..falling_span };
         let flat = PressureCalibration { start: 1e6, ..good };
         let not_finite = PressureCalibration { zero: Polynomial::constant(f32::NAN), ..good };
         let no_slope = PressureCalibration { span: Polynomial::constant(f32::INFINITY), ..good };
@@ -180,6 +180,7 @@ mod tests {
             vertex,
             hot,
             falling,
+            falling_twice,
             flat,
             not_finite,
             no_slope,

@@ -65,6 +65,24 @@ fn the_limits_of_the_module_are_in_steps_of_the_sensor() {
 }
 
 #[test]
+fn beyond_its_word_a_counted_position_goes_on_and_an_absolute_one_is_what_the_sensor_says() {
+    let around_zero = |kind| {
+        let module = Module { offset: 0, low: -100, high: 100 };
+        Bench::new(Parameters { module, index: false, ..one(kind) })
+    };
+    for kind in COUNTED {
+        let mut bench = around_zero(kind);
+        let states = [0, 30_000, 60_000, 65_536].map(|total| bench.go(total).channels[0].area);
+        assert_eq!(states.map(|state| state & OUT_OF_RANGE), [0, OUT_OF_RANGE, OUT_OF_RANGE, OUT_OF_RANGE]);
+    }
+    for kind in ABSOLUTE {
+        let mut bench = around_zero(kind);
+        let states = [0, 1, -1].map(|total| bench.go(total).channels[0].area & OUT_OF_RANGE);
+        assert_eq!(states, [0, 0, OUT_OF_RANGE], "-1 is the last step of the code");
+    }
+}
+
+#[test]
 fn of_a_single_turn_encoder_the_bits_of_a_turn_count() {
     let mut parameters = one(SensorType::SingleTurn);
     parameters.module = Module { offset: 0, low: 0, high: 8191 };

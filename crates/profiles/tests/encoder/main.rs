@@ -1,6 +1,7 @@
 //! The whole encoder, from what the hardware reads to the snapshot.
 
 mod bench;
+mod bits;
 mod commissioning;
 mod input;
 mod motion;
