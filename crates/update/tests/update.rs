@@ -45,6 +45,7 @@ fn the_machine_says_what_it_does_and_the_bootloader_stays_responsive() {
     }
     let erasing = seen.iter().filter(|next| **next == Next::Erasing).count();
     assert!(erasing >= 4, "two sectors, each for several polls: {seen:?}");
+    assert!(seen.contains(&Next::Step), "then it is read, whether it is erased: {seen:?}");
     assert_eq!((updater.phase(), updater.status()), (Phase::Cleared, Status::GOOD));
     updater.begin(None).unwrap();
     updater.receive(&image_b().bytes()).unwrap();
