@@ -66,6 +66,17 @@ fn the_machine_says_what_it_does_and_the_bootloader_stays_responsive() {
 }
 
 #[test]
+fn a_program_is_identified_once_it_was_found_good() {
+    let mut flash = flash_with(&image_a(), 1);
+    let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
+    assert_eq!(updater.identification(), None);
+    download(&mut updater, &image_b().bytes()).unwrap();
+    assert_eq!(updater.identification(), Some(image_b().header.code_crc()));
+    updater.clear().unwrap();
+    assert_eq!(updater.identification(), None, "it is lost");
+}
+
+#[test]
 fn no_step_programs_more_than_64_words_but_the_last_of_the_copy() {
     let mut flash = flash_with(&image_a(), 1);
     stage(&mut flash, &image_b().bytes()).unwrap();
