@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | 2 | `receive` | a FIFO of three places fills in 141 us at 1 Mbit/s |
 //! | 1 | `wake` | the time base: ends the sleep of `idle` |
-//! | 0 | `idle` | everything else, in steps of a few milliseconds at most; the signature alone takes longer |
+//! | 0 | `idle` | everything else, in steps of a few milliseconds at most |
 #![no_std]
 #![no_main]
 

@@ -1,13 +1,15 @@
 //! The bootloader on the bus: the CANopen device, the update, and what one asks of the other.
 
+use core::iter::{empty, once};
+
 use bsp::back_off::BackOff;
 use bsp::bit_timing::BitTiming;
 use bsp::bus_state::BusState;
 use bsp::can::Controller;
-use bsp::filters::{Bank, Fifo, Pair};
+use bsp::filters;
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
-use canopen::{Action, Device, Duration, Instant, NodeId};
+use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
 use update::{Next, Phase, Updater};
 
 use crate::dictionary::{DICTIONARY, IMAGE_SIZE};
@@ -19,11 +21,6 @@ use crate::target::TARGET;
 /// Where a node without an application is found, whatever it was before.
 const NODE_ID: Option<NodeId> = NodeId::new(126);
 const KBIT: u16 = 250;
-
-/// CAN-IDs of what it hears (CiA 301, 7.3.3; CiA 305).
-const NMT: u16 = 0x000;
-const SDO_REQUEST: u16 = 0x600;
-const LSS_REQUEST: u16 = 0x7E5;
 
 /// The loop comes by at least this often: a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -110,7 +107,7 @@ impl Session {
         self.fulfil(out);
         match (self.reset, next) {
             (Some(latest), _) => Then::Reset(latest),
-            (None, Next::Step | Next::LongStep) => Then::Again,
+            (None, Next::Step) => Then::Again,
             (None, Next::Erasing) => Then::Sleep(due.min(now + ERASE_POLL)),
             (None, Next::Nothing) => Then::Sleep(due.min(now + PERIOD).min(self.back_off.due())),
         }
@@ -191,9 +188,8 @@ impl Session {
 
     /// NMT, SDO and LSS, all of them to FIFO 1: there is nothing else, and a client waits for its answers.
     fn filter(&mut self) {
-        let server = self.device.node_id().map_or(LSS_REQUEST, |id| SDO_REQUEST + u16::from(id.get()));
-        let passing = [[NMT, LSS_REQUEST], [server; 2]];
-        let banks = passing.map(|ids| Bank { fifo: Fifo::Services, pairs: ids.map(Pair::exactly) });
+        let ids = once(CanId::NMT).chain(self.device.service_ids());
+        let banks = filters::pack(empty(), ids.map(CanId::get));
         self.can.set_filters(&banks);
     }
 }

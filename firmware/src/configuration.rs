@@ -2,9 +2,8 @@
 
 use core::mem::MaybeUninit;
 
-use bsp::flash::ParameterFlash;
 use bsp::reset_cause::ResetCause;
-use bsp::{Sums, board, crash, factory, memory};
+use bsp::{ParameterFlash, Sums, board, crash, factory, memory};
 use node::{BitRate, FactoryCalibration, NodeId, Personality, Protocol, RawSample, Setup};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 

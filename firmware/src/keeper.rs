@@ -2,7 +2,7 @@
 //! core for 16 us with every word, so everything else runs between two words.
 
 use bsp::Clock;
-use bsp::flash::ParameterFlash;
+use bsp::ParameterFlash;
 use canopen::sdo::Abort;
 use node::Parcel;
 use storage::Store;

@@ -8,9 +8,9 @@ mod fuzz;
 mod images;
 mod mutants;
 mod native;
+mod own_tool;
 mod plots;
 mod python;
-mod sign;
 mod sim;
 mod steps;
 mod target;
@@ -53,6 +53,13 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
+    /// Set the write protection of the bootloader and the read-out protection of a chip at a debug probe (docs/update.md)
+    #[command(disable_help_flag = true)]
+    Protect {
+        /// Arguments of the tool
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
+    },
     /// Let libFuzzer look for inputs that break a rule (docs/evidence.md)
     Fuzz(fuzz::Flags),
     /// Count the instructions of every operation, ours beside zencan-node and CANopenNode (docs/performance.md)
@@ -77,7 +84,8 @@ fn main() -> ExitCode {
         Command::Sim { flags } => sim::run(&flags),
         Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
         Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
-        Command::Sign { arguments } => sign::run_tool(&arguments).map(|()| ExitCode::SUCCESS),
+        Command::Sign { arguments } => own_tool::run("sign", &arguments).map(|()| ExitCode::SUCCESS),
+        Command::Protect { arguments } => own_tool::run("protect", &arguments).map(|()| ExitCode::SUCCESS),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
         Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
         Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),

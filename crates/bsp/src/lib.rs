@@ -18,6 +18,7 @@ pub mod crash_record;
 pub mod debounce;
 pub mod extension;
 pub mod filters;
+pub mod flash_area;
 pub mod handover;
 pub mod kept;
 pub mod losses;

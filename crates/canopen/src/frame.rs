@@ -21,9 +21,9 @@ impl Frame {
         (id <= 0x7FF).then_some(Frame { id, remote: false, len, data })
     }
 
-    /// A data frame of the first `len` bytes; a length above eight is cut.
+    /// A data frame of the first `len` bytes, at most eight.
     pub(crate) fn data_frame(id: CanId, len: u8, data: [u8; 8]) -> Frame {
-        Frame { id: id.get(), remote: false, len: len.min(8), data }
+        Frame { id: id.get(), remote: false, len, data }
     }
 
     /// The data bytes, then zeros.

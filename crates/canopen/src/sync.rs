@@ -19,10 +19,10 @@ pub(crate) struct WrongLength;
 pub(crate) struct Settings {
     /// 1005h.
     pub(crate) cob_id: u32,
-    /// 1006h: how often it comes; zero when nobody cares.
-    pub(crate) period: Duration,
-    /// 1007h: how long after it synchronous PDOs are good; zero for up to the next.
-    pub(crate) window: Duration,
+    /// 1006h: how often it comes, in us; 0 when nobody cares.
+    pub(crate) period: u32,
+    /// 1007h: how long after it synchronous PDOs are good, in us; 0 for up to the next.
+    pub(crate) window: u32,
     /// 1019h: 0 for no counter.
     pub(crate) overflow: u8,
 }
@@ -40,10 +40,9 @@ pub(crate) struct Consumer {
 
 impl Consumer {
     pub(crate) const fn new() -> Consumer {
-        let none = Duration(0);
         Consumer {
             id: CanId::of_service(0x080, 0),
-            settings: Settings { cob_id: 0x80, period: none, window: none, overflow: 0 },
+            settings: Settings { cob_id: 0x80, period: 0, window: 0, overflow: 0 },
             due: Instant::NEVER,
             window_end: Instant::NEVER,
             is_missing: false,
@@ -79,9 +78,9 @@ impl Consumer {
             _ => return Err(WrongLength),
         };
         let Settings { period, window, .. } = self.settings;
-        self.window_end = if window.is_zero() { Instant::NEVER } else { now + window };
+        self.window_end = if window == 0 { Instant::NEVER } else { now + Duration(window.into()) };
         // Half a period late is too late.
-        self.due = if period.is_zero() { Instant::NEVER } else { now + Duration(period.0 + period.0 / 2) };
+        self.due = if period == 0 { Instant::NEVER } else { now + Duration(u64::from(period) * 3 / 2) };
         Ok(Sync { counter })
     }
 

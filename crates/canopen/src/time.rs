@@ -15,7 +15,7 @@ impl Duration {
 
     /// `n` units of 100 us, the unit of inhibit times.
     #[must_use]
-    pub const fn from_inhibit(n: u32) -> Duration {
+    pub const fn from_inhibit(n: u16) -> Duration {
         Duration(n as u64 * 100)
     }
 
@@ -26,7 +26,8 @@ impl Duration {
     }
 }
 
-/// Microseconds since start-up. 64 bits do not wrap in the life of a machine.
+/// Microseconds since start-up. 64 bits do not wrap in the life of a machine. Nothing comes after
+/// [`NEVER`](Instant::NEVER): adding to it gives no meaningful instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Instant(pub u64);
 
@@ -38,6 +39,6 @@ impl Instant {
 impl Add<Duration> for Instant {
     type Output = Instant;
     fn add(self, span: Duration) -> Instant {
-        Instant(self.0.saturating_add(span.0))
+        Instant(self.0.wrapping_add(span.0))
     }
 }

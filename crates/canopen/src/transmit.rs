@@ -1,6 +1,6 @@
 //! Where frames go: the driver's transmit queue as the protocol sees it.
 
-use crate::{Duration, Frame};
+use crate::{Duration, Frame, Instant};
 
 /// The queue has no room; the sender keeps what it wanted to send and tries again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,18 +18,23 @@ pub trait Transmit {
     fn room(&self) -> usize;
 }
 
-/// A queue that can be shut: it then takes nothing, and the senders try again later.
-pub(crate) struct Gate<'a, T> {
+/// One call of the device: when it is, and the way to the queue. That can be shut: it then takes nothing, and the senders
+/// try again later.
+pub(crate) struct Turn<'a, T> {
+    pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
 }
 
-impl<T: Transmit> Transmit for Gate<'_, T> {
-    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
-        if self.is_open { self.out.send(frame) } else { Err(QueueFull) }
+impl<T: Transmit> Turn<'_, T> {
+    /// Queues a frame; whether there was room.
+    #[inline(never)]
+    pub(crate) fn send(&mut self, frame: Frame) -> bool {
+        self.is_open && self.out.send(frame).is_ok()
     }
 
-    fn room(&self) -> usize {
+    /// How many frames `send` would take now.
+    pub(crate) fn room(&self) -> usize {
         if self.is_open { self.out.room() } else { 0 }
     }
 }

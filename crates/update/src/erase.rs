@@ -17,15 +17,6 @@ pub(crate) struct Erase {
     rest: Range<u32>,
 }
 
-/// Whether there is more to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Erasing {
-    /// Step again.
-    Goes,
-    /// All is erased.
-    Done,
-}
-
 impl Erase {
     pub(crate) fn new(area: Area) -> Erase {
         Erase { area, begun: 0, at_work: false, rest: area.start()..area.end() }
@@ -36,11 +27,11 @@ impl Erase {
         self.at_work
     }
 
-    /// Sectors are never skipped because they read as erased: an erase that was cut can look like that.
-    pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<Erasing, Refusal> {
+    /// Whether all is erased. Sectors are never skipped because they read as erased: an erase that was cut can look like that.
+    pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
         self.at_work = flash.is_busy().map_err(|_| Refusal::NotCleared)?;
         if self.at_work {
-            return Ok(Erasing::Goes);
+            return Ok(false);
         }
         match self.area.sectors().nth(self.begun) {
             Some(sector) => self.begin(flash, sector.start),
@@ -48,21 +39,17 @@ impl Erase {
         }
     }
 
-    fn begin<F: Flash>(&mut self, flash: &mut F, sector: u32) -> Result<Erasing, Refusal> {
+    fn begin<F: Flash>(&mut self, flash: &mut F, sector: u32) -> Result<bool, Refusal> {
         flash.start_erase(sector).map_err(|_| Refusal::NotCleared)?;
         (self.begun, self.at_work) = (self.begun.saturating_add(1), true);
-        Ok(Erasing::Goes)
+        Ok(false)
     }
 
-    fn prove<F: Flash>(&mut self, flash: &mut F) -> Result<Erasing, Refusal> {
+    fn prove<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
         let mut erased = true;
         self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
             erased &= bytes.iter().all(|byte| *byte == 0xFF);
         })?;
-        match (erased, self.rest.is_empty()) {
-            (false, _) => Err(Refusal::NotCleared),
-            (true, false) => Ok(Erasing::Goes),
-            (true, true) => Ok(Erasing::Done),
-        }
+        if erased { Ok(self.rest.is_empty()) } else { Err(Refusal::NotCleared) }
     }
 }

@@ -8,7 +8,7 @@ use crate::flash::{Flash, read_step};
 use crate::header::{HEADER, HEADER_LEN, Header};
 use crate::key::KEY_LEN;
 use crate::refusal::Refusal;
-use crate::signature::Message;
+use crate::signature::{Message, Verification};
 use crate::target::{Target, image_len};
 
 /// The header at the start of `area`.
@@ -63,31 +63,42 @@ impl CrcCheck {
     }
 }
 
-/// A check of everything that can be said of the staged image under way.
+/// A check of everything that can be said of the staged image under way: what is in it, then who has signed it.
 pub(crate) struct FullCheck {
     header: Header,
     crc: CrcCheck,
     message: Message,
+    signature: Option<Verification>,
 }
 
 impl FullCheck {
     pub(crate) fn new<F: Flash>(flash: &mut F, target: &Target) -> Result<FullCheck, Refusal> {
         let header = candidate(flash, target)?;
         let crc = CrcCheck::new(&header, target.layout.staging());
-        Ok(FullCheck { header, crc, message: Message::of(&header) })
+        Ok(FullCheck { header, crc, message: Message::of(&header), signature: None })
     }
 
-    /// Whether only the signature is left to be judged.
-    pub(crate) fn step<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
-        self.crc.step(flash, |bytes| self.message.add(bytes))
-    }
-
-    /// The long step: the signature.
-    pub(crate) fn finish(self, key: &[u8; KEY_LEN]) -> Result<Header, Refusal> {
-        if self.message.has_signature(self.header.signature(), key) {
-            Ok(self.header)
-        } else {
-            Err(Refusal::Signature)
+    /// The header, once all is known to be good.
+    pub(crate) fn step<F: Flash>(
+        &mut self,
+        flash: &mut F,
+        key: &[u8; KEY_LEN],
+    ) -> Result<Option<Header>, Refusal> {
+        match &mut self.signature {
+            None => self.read(flash, key).map(|()| None),
+            Some(signature) => match signature.step() {
+                None => Ok(None),
+                Some(true) => Ok(Some(self.header)),
+                Some(false) => Err(Refusal::Signature),
+            },
         }
+    }
+
+    fn read<F: Flash>(&mut self, flash: &mut F, key: &[u8; KEY_LEN]) -> Result<(), Refusal> {
+        if self.crc.step(flash, |bytes| self.message.add(bytes))? {
+            let signature = self.message.end(self.header.signature(), key);
+            self.signature = Some(signature.ok_or(Refusal::Signature)?);
+        }
+        Ok(())
     }
 }

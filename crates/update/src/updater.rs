@@ -1,10 +1,8 @@
 //! The update as a machine that is polled: each poll does one bounded step.
 
-use core::mem;
-
 use crate::commit::{Commit, Record};
 use crate::copy::Copy;
-use crate::erase::{Erase, Erasing};
+use crate::erase::Erase;
 use crate::flash::Flash;
 use crate::header::Header;
 use crate::image::FullCheck;
@@ -20,11 +18,9 @@ pub enum Next {
     Nothing,
     /// The flash erases by itself, 0.5 to 2 s for a sector; poll again in a millisecond or so.
     Erasing,
-    /// A step of at most 64 words programmed or 1 KiB read: 1 ms typical, 7 ms most.
+    /// A step of at most 64 words programmed, 1 KiB read, or a part of the check of the signature: 1 ms typical, 7 ms
+    /// most.
     Step,
-    /// The check of the signature: 30 to 60 ms of computing at 144 MHz. Answer the bus from an interrupt meanwhile, or
-    /// let the master wait so long.
-    LongStep,
 }
 
 /// How far an update is.
@@ -58,14 +54,13 @@ pub struct Updater<F> {
     identification: Option<u32>,
 }
 
+#[expect(clippy::large_enum_variant, reason = "there is one machine, and no heap")]
 enum State {
     Idle,
     Clearing(Erase),
     Cleared,
     Receiving(Receiver),
     Checking(FullCheck, Then),
-    /// All but the signature was found good.
-    Hashed(FullCheck, Then),
     Committed,
     /// The application area is being erased for this image.
     Erasing(Erase, Header),
@@ -99,7 +94,7 @@ impl<F: Flash> Updater<F> {
             State::Clearing(_) => Phase::Clearing,
             State::Cleared => Phase::Cleared,
             State::Receiving(_) => Phase::Receiving,
-            State::Checking(..) | State::Hashed(..) => Phase::Checking,
+            State::Checking(..) => Phase::Checking,
             State::Committed => Phase::Committed,
             State::Erasing(..) | State::Copying(_) => Phase::Copying,
             State::Installed => Phase::Installed,
@@ -120,7 +115,6 @@ impl<F: Flash> Updater<F> {
     pub fn next(&self) -> Next {
         match &self.state {
             State::Clearing(erase) | State::Erasing(erase, _) if erase.is_at_work() => Next::Erasing,
-            State::Hashed(..) => Next::LongStep,
             _ if self.is_busy() => Next::Step,
             _ => Next::Nothing,
         }
@@ -200,9 +194,7 @@ impl<F: Flash> Updater<F> {
 
     /// One step of what was begun, if anything was. Returns what the next one will do.
     pub fn poll(&mut self) -> Next {
-        if self.is_busy() {
-            let state = mem::replace(&mut self.state, State::Idle);
-            let outcome = self.step(state);
+        if let Some(outcome) = self.step().transpose() {
             // Whoever wants to know reads the status.
             let _ = self.settle(outcome);
         }
@@ -241,35 +233,40 @@ impl<F: Flash> Updater<F> {
         }
     }
 
-    fn step(&mut self, state: State) -> Result<State, Refusal> {
+    /// What follows, when what was begun has come to its end.
+    fn step(&mut self) -> Result<Option<State>, Refusal> {
         let (flash, target) = (&mut self.flash, &self.target);
-        match state {
-            State::Clearing(mut erase) => match erase.step(flash)? {
-                Erasing::Done => Ok(State::Cleared),
-                Erasing::Goes => Ok(State::Clearing(erase)),
-            },
-            State::Checking(mut check, then) => match check.step(flash) {
-                Ok(false) => Ok(State::Checking(check, then)),
-                Ok(true) => Ok(State::Hashed(check, then)),
-                Err(refusal) => self.give_up(then, refusal),
-            },
-            State::Hashed(check, then) => match check.finish(&target.key) {
-                Ok(header) => self.accept(then, header),
-                Err(refusal) => self.give_up(then, refusal),
-            },
-            State::Erasing(mut erase, header) => match erase.step(flash)? {
-                Erasing::Done => Ok(State::Copying(Copy::new(header, target))),
-                Erasing::Goes => Ok(State::Erasing(erase, header)),
-            },
-            State::Copying(mut copy) => {
+        match &mut self.state {
+            State::Clearing(erase) => Ok(erase.step(flash)?.then_some(State::Cleared)),
+            State::Checking(check, then) => {
+                let (then, checked) = (*then, check.step(flash, &target.key));
+                self.follow(then, checked)
+            }
+            State::Erasing(erase, header) => {
+                Ok(erase.step(flash)?.then(|| State::Copying(Copy::new(*header, target))))
+            }
+            State::Copying(copy) => {
                 if !copy.step(flash)? {
-                    return Ok(State::Copying(copy));
+                    return Ok(None);
                 }
-                self.record().done(&mut self.flash).map(|()| State::Installed)
+                self.record().done(&mut self.flash).map(|()| Some(State::Installed))
             }
             State::Idle | State::Cleared | State::Receiving(_) | State::Committed | State::Installed => {
-                Ok(state)
+                Ok(None)
             }
+        }
+    }
+
+    /// What a step of the check has found.
+    fn follow(
+        &mut self,
+        then: Then,
+        checked: Result<Option<Header>, Refusal>,
+    ) -> Result<Option<State>, Refusal> {
+        match checked {
+            Ok(None) => Ok(None),
+            Ok(Some(header)) => self.accept(then, header).map(Some),
+            Err(refusal) => self.give_up(then, refusal).map(Some),
         }
     }
 

@@ -52,8 +52,8 @@ fn the_machine_says_what_it_does_and_the_bootloader_stays_responsive() {
     assert_eq!((updater.phase(), updater.next()), (Phase::Receiving, Next::Nothing));
     updater.finish().unwrap();
     assert_eq!((updater.phase(), updater.next()), (Phase::Checking, Next::Step));
-    assert_eq!(updater.poll(), Next::LongStep);
-    assert_eq!(updater.poll(), Next::Nothing);
+    let steps = 1 + std::iter::from_fn(|| (updater.poll() == Next::Step).then_some(())).count();
+    assert_eq!(steps, 1 + 65, "the code in one piece, then the signature in many");
     assert_eq!((updater.phase(), updater.status()), (Phase::Committed, Status::GOOD));
     updater.install().unwrap();
     while updater.phase() == Phase::Checking {

@@ -122,10 +122,10 @@ impl Node for Ours {
 
 impl Ours {
     fn new() -> Ours {
-        let device = Device::new(&dictionary::DICTIONARY, NodeId::new(ID), Keeper(Domain::new()));
-        let mut ours = Ours { device, driver: Driver { room: black_box(usize::MAX) } };
-        ours.device.start(Instant(0), &mut ours.driver);
-        ours
+        Ours {
+            device: Device::new(&dictionary::DICTIONARY, NodeId::new(ID), Keeper(Domain::new())),
+            driver: Driver { room: black_box(usize::MAX) },
+        }
     }
 
     /// Does what the device leaves to its caller.
@@ -145,5 +145,7 @@ impl Ours {
 #[entry]
 fn main() -> ! {
     static mut NODE: MaybeUninit<Ours> = MaybeUninit::uninit();
-    bench_images::run(NODE.write(Ours::new()))
+    let node = NODE.write(Ours::new());
+    node.device.start(Instant(0), &mut node.driver);
+    bench_images::run(node)
 }

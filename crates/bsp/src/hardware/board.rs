@@ -5,11 +5,12 @@ use stm32f4xx_hal::pac::{DBGMCU, Peripherals, RCC};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 
+use super::ParameterFlash;
 use super::backup::BackupMemory;
 use super::can::{Controller, Transmitter};
 use super::digital::{Buttons, Lamps};
 use super::encoder::{self, Encoder};
-use super::flash::{Flash, ParameterFlash};
+use super::flash::Flash;
 use super::led::Led;
 use super::sampling::{Parts, Sampling};
 use super::ssi::{self, Ssi};

@@ -1,14 +1,11 @@
-//! The flash as memory for parameters and programs: words of 32 bits, sectors (RM0390, 3).
+//! The flash controller: words of 32 bits, sectors (RM0390, 3).
 //!
 //! The driver of stm32f4xx-hal programs byte by byte, erases several sectors for one and leaves error flags behind.
 
-use core::ops::Range;
-
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
 use stm32f4xx_hal::pac::FLASH;
 
-use super::memory;
-use crate::sectors;
+use crate::flash_area::FlashArea;
 
 /// What unlocks the control register (RM0390, 3.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
@@ -27,6 +24,12 @@ pub enum Error {
     Flags(u32),
 }
 
+impl From<NorFlashErrorKind> for Error {
+    fn from(kind: NorFlashErrorKind) -> Error {
+        Error::Place(kind)
+    }
+}
+
 impl NorFlashError for Error {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
@@ -43,10 +46,30 @@ impl Flash {
         Flash(flash)
     }
 
+    /// Copies what is there.
+    pub(super) fn read(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        let address = area.address(offset, bytes.len(), 1)?;
+        // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
+        // value too.
+        let there = unsafe { core::slice::from_raw_parts(address as *const u8, bytes.len()) };
+        bytes.copy_from_slice(there);
+        Ok(())
+    }
+
+    /// Programs whole words.
+    pub(super) fn write(&mut self, area: &FlashArea, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        let address = area.address(offset, bytes.len(), 4)?;
+        for (word, place) in bytes.as_chunks().0.iter().zip((address..).step_by(4)) {
+            self.program(place, u32::from_le_bytes(*word))?;
+        }
+        self.forget_cached();
+        Ok(())
+    }
+
     /// Programs one word and waits for it: 16 us, at most 100. Code that is fetched from flash stands still meanwhile.
     ///
     /// `address` must be in flash, outside of the program, and a multiple of four.
-    pub(super) fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {
+    fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {
         self.prepare();
         self.0.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
         // SAFETY: the callers give addresses of an area that holds no code and no value of this program.
@@ -56,7 +79,8 @@ impl Flash {
         self.end()
     }
 
-    fn erase(&mut self, sector: u8) -> Result<(), Error> {
+    /// Erases a sector and waits for it: 0.25 s for the smallest, 2 s at most.
+    pub(super) fn erase(&mut self, sector: u8) -> Result<(), Error> {
         self.start_erase(sector);
         self.wait();
         self.end()
@@ -107,78 +131,5 @@ impl Flash {
         self.0.acr().modify(|_, w| w.dcrst().set_bit());
         self.0.acr().modify(|_, w| w.dcrst().clear_bit());
         self.0.acr().modify(|_, w| w.dcen().bit(was_on));
-    }
-}
-
-/// The two pages of the parameter store as NOR flash; offset 0 is their start.
-pub struct ParameterFlash(Flash);
-
-impl ParameterFlash {
-    /// Takes the controller for the parameter pages.
-    #[must_use]
-    pub(crate) fn new(flash: Flash) -> ParameterFlash {
-        ParameterFlash(flash)
-    }
-
-    fn range() -> Range<u32> {
-        memory::parameters()
-    }
-
-    /// The address of a span of the area that starts and ends on a boundary.
-    fn address(offset: u32, len: usize, boundary: u32) -> Result<u32, Error> {
-        let area = Self::range();
-        let len = u32::try_from(len).map_err(|_| Error::Place(NorFlashErrorKind::OutOfBounds))?;
-        if !offset.is_multiple_of(boundary) || !len.is_multiple_of(boundary) {
-            return Err(Error::Place(NorFlashErrorKind::NotAligned));
-        }
-        let end = offset.checked_add(len).filter(|&end| end <= area.end - area.start);
-        end.map(|_| area.start + offset).ok_or(Error::Place(NorFlashErrorKind::OutOfBounds))
-    }
-}
-
-impl ErrorType for ParameterFlash {
-    type Error = Error;
-}
-
-impl ReadNorFlash for ParameterFlash {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
-        let address = Self::address(offset, bytes.len(), 1)?;
-        // SAFETY: `address` has checked that all of it lies in the area: flash, readable for ever, and nobody programs it
-        // meanwhile, as that takes this value too.
-        let area = unsafe { core::slice::from_raw_parts(address as *const u8, bytes.len()) };
-        bytes.copy_from_slice(area);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        Self::range().len()
-    }
-}
-
-impl NorFlash for ParameterFlash {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = memory::PARAMETER_PAGE as usize;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
-        let len = to.checked_sub(from).ok_or(Error::Place(NorFlashErrorKind::OutOfBounds))?;
-        let start = Self::address(from, len as usize, memory::PARAMETER_PAGE)?;
-        for address in (start..start + len).step_by(Self::ERASE_SIZE) {
-            let sector = sectors::starting_at(address).ok_or(Error::Place(NorFlashErrorKind::NotAligned))?;
-            self.0.erase(sector.number)?;
-        }
-        self.0.forget_cached();
-        Ok(())
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
-        let address = Self::address(offset, bytes.len(), 4)?;
-        let (words, _) = bytes.as_chunks::<4>();
-        for (word, place) in words.iter().zip((address..).step_by(4)) {
-            self.0.program(place, u32::from_le_bytes(*word))?;
-        }
-        self.0.forget_cached();
-        Ok(())
     }
 }

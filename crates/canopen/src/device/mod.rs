@@ -26,25 +26,27 @@ use crate::dictionary::Dictionary;
 use crate::lss::{BitRate, Configuration, Slave};
 use crate::nmt::State;
 use crate::pdo::{PdoSet, Rpdo, Scanner, Tpdo};
-use crate::sdo::{Response, Server};
+use crate::sdo::Server;
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
 /// How many PDOs a device can have each way; which of them it has, the dictionary says.
-pub(crate) const TPDOS: usize = 8;
-pub(crate) const RPDOS: usize = 8;
+pub(crate) const PDOS: usize = 8;
 
 /// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
 #[derive(Debug)]
 pub struct Device<A, const N: usize> {
     server: Server,
-    /// A response that found the queue full, and when to try again.
-    response: Option<(Response, Instant)>,
+    /// When to try again to send a reply of the server that found the queue full.
+    reply_due: Instant,
     /// When to go on with a block that found the queue full.
     block_due: Instant,
     lss: Slave,
-    /// As `response`, of LSS.
-    lss_response: Option<(crate::lss::Response, Instant)>,
-    switching: Option<lss::Switching>,
+    /// The last response of LSS, and when to try again if it found the queue full.
+    lss_reply: [u8; 8],
+    lss_reply_due: Instant,
+    switching: lss::Switching,
+    /// When its next step is due.
+    switching_due: Instant,
     core: Core<A, N>,
 }
 
@@ -61,14 +63,17 @@ struct Core<A, const N: usize> {
     watches: heartbeat::Consumer,
     sync: sync::Consumer,
     emcy: emcy::Producer,
-    tpdos: [Tpdo; TPDOS],
-    rpdos: [Rpdo; RPDOS],
-    /// The CAN-IDs of those that are valid, in one place: each frame of anybody is compared with them.
-    rpdo_ids: [u16; RPDOS],
+    tpdos: [Tpdo; PDOS],
+    rpdos: [Rpdo; PDOS],
+    /// What CAN-IDs those that are valid have, a bit for each value of five bits of them: it keeps away most frames of
+    /// anybody else.
+    rpdo_filter: u32,
     scanner: Scanner,
-    /// The PDOs that are valid, and the RPDOs that have a fault.
+    /// The PDOs that are valid, those of them that the SYNC concerns, and the RPDOs that have a fault.
     valid_tpdos: PdoSet,
+    synchronous_tpdos: PdoSet,
     valid_rpdos: PdoSet,
+    synchronous_rpdos: PdoSet,
     faulty_rpdos: PdoSet,
     /// Cached next deadlines; `STALE` after a change that may have moved them.
     process_due: Instant,
@@ -77,9 +82,6 @@ struct Core<A, const N: usize> {
     jobs: store::Jobs,
     unsound: store::Unsound,
 }
-
-/// The CAN-ID of no frame.
-const NO_ID: u16 = u16::MAX;
 
 /// A deadline in the past: the next poll looks at everything.
 const STALE: Instant = Instant(0);
@@ -93,37 +95,40 @@ impl<A: Application, const N: usize> Device<A, N> {
         application: A,
     ) -> Device<A, N> {
         let node_id = node_id.into();
-        let core = Core {
-            dictionary,
-            node_id,
-            state: State::Initialising,
-            image: [0; N],
-            application,
-            heartbeat: heartbeat::Producer::new(),
-            watches: heartbeat::Consumer::new(),
-            sync: sync::Consumer::new(),
-            emcy: emcy::Producer::new(),
-            tpdos: [const { Tpdo::new() }; TPDOS],
-            rpdos: [const { Rpdo::new() }; RPDOS],
-            rpdo_ids: [NO_ID; RPDOS],
-            scanner: Scanner::new(),
-            valid_tpdos: PdoSet::EMPTY,
-            valid_rpdos: PdoSet::EMPTY,
-            faulty_rpdos: PdoSet::EMPTY,
-            process_due: Instant::NEVER,
-            services_due: Instant::NEVER,
-            pending: state::Pending::new(),
-            jobs: store::Jobs::new(),
-            unsound: store::Unsound::default(),
-        };
         Device {
             server: Server::new(),
-            response: None,
+            reply_due: Instant::NEVER,
             block_due: Instant::NEVER,
             lss: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
-            lss_response: None,
-            switching: None,
-            core,
+            lss_reply: [0; 8],
+            lss_reply_due: Instant::NEVER,
+            switching: lss::Switching::No,
+            switching_due: Instant::NEVER,
+            core: Core {
+                dictionary,
+                node_id,
+                state: State::Initialising,
+                image: [0; N],
+                application,
+                heartbeat: heartbeat::Producer::new(),
+                watches: heartbeat::Consumer::new(),
+                sync: sync::Consumer::new(),
+                emcy: emcy::Producer::new(),
+                tpdos: [const { Tpdo::new() }; PDOS],
+                rpdos: [const { Rpdo::new() }; PDOS],
+                rpdo_filter: 0,
+                scanner: Scanner::new(),
+                valid_tpdos: PdoSet::EMPTY,
+                synchronous_tpdos: PdoSet::EMPTY,
+                valid_rpdos: PdoSet::EMPTY,
+                synchronous_rpdos: PdoSet::EMPTY,
+                faulty_rpdos: PdoSet::EMPTY,
+                process_due: Instant::NEVER,
+                services_due: Instant::NEVER,
+                pending: state::Pending::new(),
+                jobs: store::Jobs::new(),
+                unsound: store::Unsound::default(),
+            },
         }
     }
 

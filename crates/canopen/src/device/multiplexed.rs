@@ -1,12 +1,11 @@
 //! Multiplexed PDOs in the device: which objects the producer watches, and where a received one goes.
 
-use super::{Application, Core, TPDOS};
+use super::{Application, Core};
 use crate::dictionary::{Entry, Mapping};
 use crate::emcy::Fault;
-use crate::pdo::{Address, Addressing, Layout, Mpdo, ScannerSettings, Watched};
+use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
 use crate::sdo::Multiplexer;
 use crate::{Instant, NodeId};
-use heapless::Vec;
 
 /// Object scanner list (CiA 301, 7.5.2.44): which objects are sent in source address mode.
 const SCANNER_LIST: u16 = 0x1FA0;
@@ -18,42 +17,44 @@ const LONGEST: u8 = 4;
 impl<A: Application, const N: usize> Core<A, N> {
     /// Gives the producer its settings and its objects, after any change that may concern it.
     pub(super) fn configure_scanner(&mut self, settings: Option<ScannerSettings>) {
-        let mut scanner = core::mem::replace(&mut self.scanner, crate::pdo::Scanner::new());
+        self.scanner.configure(settings);
         match settings.map(|settings| settings.addressing) {
-            Some(Addressing::Source) => scanner.configure(settings, self.listed()),
-            _ => scanner.configure(settings, self.not_mapped()),
+            Some(Addressing::Source) => self.watch_listed(),
+            Some(Addressing::Destination) => self.watch_unmapped(),
+            None => return,
         }
         if self.state.has_pdos() {
-            scanner.start();
+            self.scanner.start();
         }
-        self.scanner = scanner;
     }
 
     /// All that can be sent and that is mapped into no TPDO. One that is switched off counts too: who does not want its
     /// content sent does not want it in another way.
-    fn not_mapped(&self) -> impl Iterator<Item = Watched> {
-        let mut layouts = Vec::<Layout, TPDOS>::new();
-        for layout in self.tpdo_layouts() {
-            // A table with more TPDOs than there is room for does not compile.
-            let _ = layouts.push(layout);
+    fn watch_unmapped(&mut self) {
+        for entry in self.dictionary.entries() {
+            self.watch_entry(&entry);
         }
-        let is_mapped = move |entry: &Entry| layouts.iter().any(|layout| layout.contains(entry.field));
-        let entries = self.dictionary.entries();
-        let free = entries.filter(move |entry| is_sendable(entry) && !is_mapped(entry));
-        free.map(|entry| Watched::new(multiplexer(&entry), entry.field))
+        self.leave_out_mapped();
     }
 
     /// What the scanner list names: blocks of sub-indexes of one object.
-    fn listed(&self) -> impl Iterator<Item = Watched> {
-        let count = self.number(SCANNER_LIST, 0).to_le_bytes()[0];
-        let blocks = (1..=count).map(|sub| self.number(SCANNER_LIST, sub).to_le_bytes());
-        blocks.flat_map(move |[first, low, high, size]| {
-            let index = u16::from_le_bytes([low, high]);
-            (0..size).filter_map(move |i| {
-                let entry = self.dictionary.find(index, first.checked_add(i)?).ok()?;
-                is_sendable(&entry).then(|| Watched::new(multiplexer(&entry), entry.field))
-            })
-        })
+    fn watch_listed(&mut self) {
+        let [count, ..] = self.number(SCANNER_LIST, 0).to_le_bytes();
+        for line in 0..count {
+            let [first, low, high, size] = self.number(SCANNER_LIST, line + 1).to_le_bytes();
+            for sub in first..first.saturating_add(size) {
+                if let Ok(entry) = self.dictionary.find(u16::from_le_bytes([low, high]), sub) {
+                    self.watch_entry(&entry);
+                }
+            }
+        }
+    }
+
+    fn watch_entry(&mut self, entry: &Entry) {
+        if entry.attributes.mapping == Mapping::Tpdo && entry.field.size <= LONGEST {
+            let at = Multiplexer { index: entry.index(), sub: entry.sub() };
+            self.scanner.watch(Watched::new(at, entry.field));
+        }
     }
 
     /// Takes a received multiplexed PDO of a kind that the RPDO is for.
@@ -93,10 +94,12 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
         let count = self.number(DISPATCHING_LIST, 0).to_le_bytes()[0];
-        let mut lines = (1..=count).filter_map(|sub| self.dispatching_line(sub));
-        let target = lines.find_map(|line| line.target(mpdo.at, sender));
-        if let Some(at) = target {
-            self.store_mpdo(at, mpdo.data);
+        for line in 0..count {
+            let target = self.dispatching_line(line + 1).and_then(|line| line.target(mpdo.at, sender));
+            if let Some(at) = target {
+                self.store_mpdo(at, mpdo.data);
+                return;
+            }
         }
     }
 
@@ -125,12 +128,4 @@ impl DispatchingLine {
         let sub = self.local.sub.checked_add(offset)?;
         is_meant.then_some(Multiplexer { index: self.local.index, sub })
     }
-}
-
-fn is_sendable(entry: &Entry) -> bool {
-    entry.attributes.mapping == Mapping::Tpdo && entry.field.size <= LONGEST
-}
-
-fn multiplexer(entry: &Entry) -> Multiplexer {
-    Multiplexer { index: entry.index(), sub: entry.sub() }
 }

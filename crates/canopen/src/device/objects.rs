@@ -1,32 +1,31 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
+use super::pdos::low_half;
 use super::{Application, Core, Job, Part, STALE};
 use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
 use crate::nmt::State;
-use crate::sdo::{Abort, Multiplexer, Objects, Readable, Writable};
-use crate::{Duration, Instant, emcy, sync};
+use crate::sdo::{Abort, Multiplexer, Objects, Writable};
+use crate::{Instant, emcy, sync};
 
 impl<A: Application, const N: usize> Objects for Core<A, N> {
     const IS_SMALL: bool = A::SERVICES_ONLY;
 
-    fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort> {
-        let entry = self.entry(at)?;
+    fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
+        let entry = self.dictionary.find(at.index, at.sub)?;
         if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
-        let stream = stream_of(&entry);
-        let bytes = match (entry.rule(), stream) {
-            (_, Some(stream)) => self.content(stream)?,
-            _ if A::SERVICES_ONLY => stored(&entry, &self.image),
-            (Rule::ErrorCount, _) => core::slice::from_ref(self.emcy.history().count()),
-            (Rule::ErrorEntry, _) => self.emcy.history().error(at.sub).ok_or(Abort::NoData)?,
-            _ => stored(&entry, &self.image),
-        };
-        Ok(Readable { bytes, stream })
-    }
-
-    fn content(&self, stream: u8) -> Result<&[u8], Abort> {
-        self.application.read_domain(stream)
+        match (entry.attributes.kind, entry.rule()) {
+            (Type::Domain, Rule::Application(number)) => self.application.read_domain(number),
+            (Type::VisibleString(_), _) => Ok(text(entry.field.get(&self.image))),
+            _ if A::SERVICES_ONLY => Ok(entry.field.get(&self.image)),
+            (_, Rule::ErrorCount) => Ok(core::slice::from_ref(self.emcy.history().count())),
+            (_, Rule::ErrorEntry) => {
+                let error = self.emcy.history().error(at.sub).ok_or(Abort::NoData)?;
+                Ok(error)
+            }
+            _ => Ok(entry.field.get(&self.image)),
+        }
     }
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
@@ -60,17 +59,8 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
-    /// The entry, or the one that it is another name of.
-    fn entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
-        match entry.rule() {
-            Rule::EventTimerOf(number) => self.dictionary.find(0x1800 | u16::from(number), 5),
-            _ => Ok(entry),
-        }
-    }
-
     fn writable_entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
-        let entry = self.entry(at)?;
+        let entry = self.dictionary.find(at.index, at.sub)?;
         if entry.attributes.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
     }
 
@@ -117,11 +107,13 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::Setting => self.begin_deferred(Job::Set(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
-            Rule::PdoCobId | Rule::PdoPredefined => self.admit_pdo_cob_id(entry, value),
-            Rule::PdoType => self.admit_pdo_type(entry, value),
-            Rule::PdoInhibit | Rule::PdoSyncStart if self.pdo_is_valid(entry) => Err(Abort::InvalidValue),
-            Rule::PdoCount => self.admit_pdo_count(entry, value),
-            Rule::PdoSlot => self.admit_pdo_slot(entry, value),
+            Rule::PdoCobId
+            | Rule::PdoPredefined
+            | Rule::PdoType
+            | Rule::PdoInhibit
+            | Rule::PdoSyncStart
+            | Rule::PdoCount
+            | Rule::PdoSlot => self.admit_pdo(entry, value),
             _ => Ok(()),
         }
     }
@@ -132,13 +124,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         match entry.rule() {
             Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
-            Rule::HeartbeatTime => self.heartbeat.set_period(Duration::from_millis(value.into()), now),
+            Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             _ if A::SERVICES_ONLY => (),
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
             }
-            Rule::EmcyInhibit => self.emcy.set_inhibit(Duration::from_inhibit(value)),
+            Rule::EmcyInhibit => self.emcy.set_inhibit(low_half(value)),
             Rule::EmcyCobId => self.emcy.configure(value),
             Rule::HeartbeatWatch => self.configure_watch(entry.sub(), now),
             Rule::ScannerLine => self.configure_pdos(now),
@@ -147,6 +139,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             | Rule::PdoType
             | Rule::PdoInhibit
             | Rule::PdoEventTimer
+            | Rule::EventTimerOf(_)
             | Rule::PdoSyncStart => self.configure_pdo(entry, now),
             _ => (),
         }
@@ -158,13 +151,9 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 }
 
-/// The value as an upload gives it: a string ends where its zeros begin.
-fn stored<'a>(entry: &Entry, image: &'a [u8]) -> &'a [u8] {
-    let value = entry.field.get(image);
-    match entry.attributes.kind {
-        Type::VisibleString(_) => value.split(|&byte| byte == 0).next().unwrap_or(value),
-        _ => value,
-    }
+/// A string as an upload gives it: it ends where its zeros begin.
+fn text(value: &[u8]) -> &[u8] {
+    value.split(|&byte| byte == 0).next().unwrap_or(value)
 }
 
 /// The number of the stream that a domain is: the application's.

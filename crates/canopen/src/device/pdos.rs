@@ -3,48 +3,44 @@
 //! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
 //! entries, count, COB-ID valid.
 
-use super::{Application, Core, NO_ID};
+use super::{Application, Core};
 use crate::dictionary::{Dictionary, Entry, Rule};
 use crate::pdo::{
     Addressing, Content, Direction, Layout, MappedObject, RpdoSettings, ScannerSettings, Settings,
     Transmission, locate,
 };
 use crate::sdo::Abort;
-use crate::{CanId, CobId, Duration, Instant};
+use crate::{CobId, Instant};
 
-/// A PDO by the index of one of its objects.
+/// A PDO of the dictionary, by the index of its communication object.
 ///
 /// A dictionary places its PDOs at any of the 512 numbers. In the device they have the first places, in the order of
 /// their numbers ([`Core::place`]).
 #[derive(Clone, Copy, Debug)]
 struct Pdo {
-    direction: Direction,
-    /// From 0 to 511.
-    number: u16,
+    communication: u16,
 }
 
 impl Pdo {
+    /// To which an entry belongs.
     fn of(entry: &Entry) -> Pdo {
-        Pdo::at(entry.index())
-    }
-
-    fn at(index: u16) -> Pdo {
-        let direction = if index & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive };
-        Pdo { direction, number: index & 0x01FF }
-    }
-
-    fn communication(self) -> u16 {
-        self.number | if self.direction == Direction::Transmit { 0x1800 } else { 0x1400 }
+        match entry.rule() {
+            Rule::EventTimerOf(number) => Pdo { communication: 0x1800 | u16::from(number) },
+            _ => Pdo { communication: entry.index() & !0x0200 },
+        }
     }
 
     fn mapping(self) -> u16 {
-        self.number | if self.direction == Direction::Transmit { 0x1A00 } else { 0x1600 }
+        self.communication | 0x0200
+    }
+
+    fn direction(self) -> Direction {
+        if self.communication & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive }
     }
 
     /// Those that a dictionary has, one way.
     fn all(dictionary: &Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
-        let first = Pdo { direction, number: 0 };
-        dictionary.between(first.communication(), first.mapping()).map(Pdo::at)
+        dictionary.pdos(direction).iter().map(|&communication| Pdo { communication })
     }
 }
 
@@ -70,12 +66,12 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
     fn place(&self, pdo: Pdo) -> Option<u8> {
-        let mut ranked = (0..).zip(Pdo::all(self.dictionary, pdo.direction));
-        ranked.find(|(_, other)| other.number == pdo.number).map(|(place, _)| place)
+        let mut ranked = (0..).zip(self.dictionary.pdos(pdo.direction()));
+        ranked.find(|(_, index)| **index == pdo.communication).map(|(place, _)| place)
     }
 
     fn apply(&mut self, pdo: Pdo, place: u8, now: Instant) {
-        match pdo.direction {
+        match pdo.direction() {
             Direction::Transmit => self.configure_tpdo(pdo, place),
             Direction::Receive => self.configure_rpdo(pdo, place, now),
         }
@@ -84,6 +80,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn configure_tpdo(&mut self, pdo: Pdo, place: u8) {
         let settings = self.tpdo_settings(pdo);
         self.valid_tpdos.set(place, settings.is_some());
+        let is_synchronous = settings.as_ref().is_some_and(|settings| settings.transmission.is_synchronous());
+        self.synchronous_tpdos.set(place, is_synchronous);
         if let Some(tpdo) = self.tpdos.get_mut(usize::from(place)) {
             tpdo.configure(settings);
             if self.state.has_pdos() {
@@ -95,29 +93,37 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn configure_rpdo(&mut self, pdo: Pdo, place: u8, now: Instant) {
         let settings = self.rpdo_settings(pdo);
         self.valid_rpdos.set(place, settings.is_some());
-        let number = usize::from(place);
-        if let (Some(rpdo), Some(id)) = (self.rpdos.get_mut(number), self.rpdo_ids.get_mut(number)) {
+        self.synchronous_rpdos.set(place, settings.as_ref().is_some_and(RpdoSettings::is_synchronous));
+        if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
             rpdo.configure(settings);
-            *id = rpdo.id().map_or(NO_ID, CanId::get);
         }
+        self.update_rpdo_filter();
         self.forget_rpdo_faults(place, now);
     }
 
     fn tpdo_settings(&self, pdo: Pdo) -> Option<Settings> {
-        let parameter = |sub| self.number(pdo.communication(), sub);
-        let mut settings = Settings::new(self.cob_id_value(pdo), low_byte(parameter(2)))?;
-        settings.inhibit = Duration::from_inhibit(parameter(3));
-        settings.event = Duration::from_millis(parameter(5).into());
-        settings.sync_start = low_byte(parameter(6));
+        let (cob_id, transmission) = self.transmission(pdo)?;
         let Content::Objects(layout) = self.content(pdo)? else { return None };
-        settings.layout = layout;
-        Some(settings)
+        Some(Settings {
+            id: cob_id.id,
+            answers_remote: !cob_id.bit30,
+            transmission,
+            inhibit: low_half(self.parameter(pdo, 3)),
+            event: low_half(self.parameter(pdo, 5)),
+            sync_start: low_byte(self.parameter(pdo, 6)),
+            layout,
+        })
     }
 
     fn rpdo_settings(&self, pdo: Pdo) -> Option<RpdoSettings> {
-        let parameter = |sub| self.number(pdo.communication(), sub);
-        let deadline = Duration::from_millis(parameter(5).into());
-        RpdoSettings::new(self.cob_id_value(pdo), low_byte(parameter(2)), deadline, self.content(pdo)?)
+        let (cob_id, transmission) = self.transmission(pdo)?;
+        let deadline = low_half(self.parameter(pdo, 5));
+        RpdoSettings::new(cob_id.id, transmission, deadline, self.content(pdo)?)
+    }
+
+    /// COB-ID and transmission type of a PDO that is valid.
+    fn transmission(&self, pdo: Pdo) -> Option<(CobId, Transmission)> {
+        Some((self.cob_id(pdo)?, Transmission::parse(low_byte(self.parameter(pdo, 2)))?))
     }
 
     /// Whether every mapping names objects that can be mapped. A stored one may be of an older dictionary.
@@ -131,123 +137,130 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn scanner_settings(&self) -> Option<ScannerSettings> {
         Pdo::all(self.dictionary, Direction::Transmit).find_map(|pdo| {
             let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
-            let parameter = |sub| self.number(pdo.communication(), sub);
-            let settings = Settings::new(self.cob_id_value(pdo), low_byte(parameter(2)))?;
-            let inhibit = Duration::from_inhibit(parameter(3));
-            let event = Duration::from_millis(parameter(5).into());
-            Some(ScannerSettings { id: settings.id, addressing, own: self.node_id?, inhibit, event })
+            let (cob_id, _) = self.transmission(pdo)?;
+            let inhibit = low_half(self.parameter(pdo, 3));
+            let event = low_half(self.parameter(pdo, 5));
+            Some(ScannerSettings { id: cob_id.id, addressing, own: self.node_id?, inhibit, event })
         })
     }
 
     /// What the mapping makes of the PDO; `None` when it names what cannot be mapped.
     fn content(&self, pdo: Pdo) -> Option<Content> {
-        let count = self.number(pdo.mapping(), 0);
-        match Addressing::from_count(low_byte(count)) {
+        let count = self.mapped(pdo);
+        match Addressing::from_count(count) {
             Some(addressing) => Some(Content::Multiplexed(addressing)),
             None => self.layout(pdo, count).ok().map(Content::Objects),
         }
     }
 
-    /// What is mapped into each TPDO, whether it is valid or not.
-    pub(super) fn tpdo_layouts(&self) -> impl Iterator<Item = Layout> {
-        Pdo::all(self.dictionary, Direction::Transmit).filter_map(|pdo| match self.content(pdo)? {
-            Content::Objects(layout) => Some(layout),
-            Content::Multiplexed(_) => None,
-        })
+    /// What is mapped into each TPDO, whether it is valid or not, is not for the multiplexed one.
+    pub(super) fn leave_out_mapped(&mut self) {
+        for pdo in Pdo::all(self.dictionary, Direction::Transmit) {
+            if let Some(Content::Objects(layout)) = self.content(pdo) {
+                self.scanner.leave_out(&layout);
+            }
+        }
     }
 
-    fn is_multiplexed(&self, pdo: Pdo) -> bool {
-        Addressing::from_count(low_byte(self.number(pdo.mapping(), 0))).is_some()
+    /// The number of mapped objects.
+    fn mapped(&self, pdo: Pdo) -> u8 {
+        low_byte(self.number(pdo.mapping(), 0))
     }
 
     /// The layout of the first `count` mapping entries.
-    fn layout(&self, pdo: Pdo, count: u32) -> Result<Layout, Abort> {
+    fn layout(&self, pdo: Pdo, count: u8) -> Result<Layout, Abort> {
         let mut layout = Layout::default();
-        for sub in (1..=u8::MAX).take(usize::from(low_byte(count))) {
-            let mapped = MappedObject::parse(self.number(pdo.mapping(), sub));
-            layout.push(locate(self.dictionary, mapped, pdo.direction)?)?;
+        for slot in 0..count {
+            let mapped = MappedObject::parse(self.number(pdo.mapping(), slot + 1));
+            layout.push(locate(self.dictionary, mapped, pdo.direction())?)?;
         }
         Ok(layout)
     }
 
-    /// A PDO without objects is one that is not valid.
-    fn cob_id_value(&self, pdo: Pdo) -> u32 {
-        self.number_or(pdo.communication(), 1, u32::MAX)
+    fn parameter(&self, pdo: Pdo, sub: u8) -> u32 {
+        self.number(pdo.communication, sub)
     }
 
+    /// The COB-ID of a PDO that is valid; one without objects is not.
     fn cob_id(&self, pdo: Pdo) -> Option<CobId> {
-        CobId::parse(self.cob_id_value(pdo))
+        CobId::parse(self.number_or(pdo.communication, 1, u32::MAX)).filter(|cob_id| !cob_id.bit31)
     }
 
-    fn is_valid(&self, pdo: Pdo) -> bool {
-        self.cob_id(pdo).is_some_and(|cob_id| !cob_id.bit31)
-    }
-
-    pub(super) fn pdo_is_valid(&self, entry: &Entry) -> bool {
-        self.is_valid(Pdo::of(entry))
+    /// Whether the rules of a PDO object allow a value: most change only while the PDO is not valid.
+    pub(super) fn admit_pdo(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        let pdo = Pdo::of(entry);
+        let present = self.cob_id(pdo);
+        match entry.rule() {
+            Rule::PdoCobId | Rule::PdoPredefined => self.admit_cob_id(pdo, present, entry, value),
+            Rule::PdoType => self.admit_type(pdo, present, low_byte(value)),
+            Rule::PdoInhibit | Rule::PdoSyncStart if present.is_some() => Err(Abort::InvalidValue),
+            Rule::PdoCount | Rule::PdoSlot if present.is_some() => Err(Abort::Access),
+            Rule::PdoCount => self.admit_count(pdo, low_byte(value)),
+            Rule::PdoSlot => self.admit_slot(pdo, value),
+            _ => Ok(()),
+        }
     }
 
     /// The CAN-ID changes only while the PDO does not exist; to exist, it needs a CAN-ID that is free for PDOs, a
     /// mapping, and remote frames if its type lives on them. A multiplexed PDO is sent by event.
     ///
     /// A CAN-ID that a profile has pre-defined never changes, and is free for this PDO whatever CiA 301 says of it.
-    pub(super) fn admit_pdo_cob_id(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
-        let pdo = Pdo::of(entry);
+    fn admit_cob_id(&self, pdo: Pdo, present: Option<CobId>, entry: &Entry, value: u32) -> Result<(), Abort> {
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
         let is_predefined = entry.rule() == Rule::PdoPredefined;
         if is_predefined && CobId::parse(self.default_number(entry)).is_none_or(|own| own.id != new.id) {
             return Err(Abort::InvalidValue);
         }
-        let moves = self.cob_id(pdo).is_some_and(|old| !old.bit31 && old.id != new.id);
-        let transmission = Transmission::parse(low_byte(self.number(entry.index(), 2)));
+        let moves = present.is_some_and(|old| old.id != new.id);
+        let transmission = Transmission::parse(low_byte(self.parameter(pdo, 2)));
         let contradicts = new.bit30 && transmission.is_some_and(Transmission::needs_remote);
-        let is_empty = self.number(pdo.mapping(), 0) == 0;
-        let is_not_sent =
-            self.is_multiplexed(pdo) && !transmission.is_some_and(Transmission::is_event_driven);
+        let mapped = self.mapped(pdo);
+        let is_not_sent = Addressing::from_count(mapped).is_some()
+            && !transmission.is_some_and(Transmission::is_event_driven);
         let is_taken = !is_predefined && new.id.is_restricted();
-        let cannot_exist = moves || contradicts || is_empty || is_not_sent || is_taken;
+        let cannot_exist = moves || contradicts || mapped == 0 || is_not_sent || is_taken;
         if !new.bit31 && cannot_exist { Err(Abort::InvalidValue) } else { Ok(()) }
     }
 
     /// An RPDO cannot be asked for, so it has no type that lives on remote frames.
-    pub(super) fn admit_pdo_type(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
-        let pdo = Pdo::of(entry);
-        let transmission = Transmission::parse(low_byte(value)).ok_or(Abort::InvalidValue)?;
-        let no_remote = self.cob_id(pdo).is_some_and(|cob_id| !cob_id.bit31 && cob_id.bit30);
-        let is_receive = pdo.direction == Direction::Receive;
-        let is_not_sent = self.is_multiplexed(pdo) && !transmission.is_event_driven() && self.is_valid(pdo);
-        if is_not_sent || transmission.needs_remote() && (no_remote || is_receive) {
+    fn admit_type(&self, pdo: Pdo, present: Option<CobId>, kind: u8) -> Result<(), Abort> {
+        let transmission = Transmission::parse(kind).ok_or(Abort::InvalidValue)?;
+        let no_remote = pdo.direction() == Direction::Receive || present.is_some_and(|cob_id| cob_id.bit30);
+        let is_multiplexed = present.is_some() && Addressing::from_count(self.mapped(pdo)).is_some();
+        let is_not_sent = is_multiplexed && !transmission.is_event_driven();
+        if is_not_sent || transmission.needs_remote() && no_remote {
             return Err(Abort::InvalidValue);
         }
         Ok(())
     }
 
     /// A mapping is switched on as a whole: only now is its length known.
-    pub(super) fn admit_pdo_count(&self, entry: &Entry, count: u32) -> Result<(), Abort> {
-        let pdo = Pdo::of(entry);
-        if self.is_valid(pdo) {
-            return Err(Abort::Access);
-        }
-        if Addressing::from_count(low_byte(count)).is_some() {
+    fn admit_count(&self, pdo: Pdo, count: u8) -> Result<(), Abort> {
+        if Addressing::from_count(count).is_some() {
             return Ok(());
         }
-        let has_room = count == 0 || self.dictionary.find(entry.index(), low_byte(count)).is_ok();
+        let has_room = count == 0 || self.dictionary.find(pdo.mapping(), count).is_ok();
         if has_room { self.layout(pdo, count).map(|_| ()) } else { Err(Abort::ValueTooHigh) }
     }
 
-    pub(super) fn admit_pdo_slot(&self, entry: &Entry, value: u32) -> Result<(), Abort> {
-        let pdo = Pdo::of(entry);
-        if self.is_valid(pdo) || self.number(entry.index(), 0) != 0 {
+    fn admit_slot(&self, pdo: Pdo, value: u32) -> Result<(), Abort> {
+        if self.mapped(pdo) != 0 {
             return Err(Abort::Access);
         }
         if value == 0 {
             return Ok(());
         }
-        locate(self.dictionary, MappedObject::parse(value), pdo.direction).map(|_| ())
+        locate(self.dictionary, MappedObject::parse(value), pdo.direction()).map(|_| ())
     }
 }
 
 /// Entries whose type is UNSIGNED8 have no more.
 fn low_byte(value: u32) -> u8 {
     value.to_le_bytes()[0]
+}
+
+/// Entries whose type is UNSIGNED16 have no more.
+pub(super) fn low_half(value: u32) -> u16 {
+    let [low, high, ..] = value.to_le_bytes();
+    u16::from_le_bytes([low, high])
 }

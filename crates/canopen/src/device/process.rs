@@ -2,43 +2,45 @@
 
 use super::{Application, Core, Device, STALE};
 use crate::nmt::Command;
-use crate::pdo::{Rpdo, Tpdo};
+use crate::pdo::{PdoSet, Rpdo, Tpdo};
+use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize> Device<A, N> {
     /// A frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let out = &mut self.gate(out);
+        let turn = &mut self.turn(now, out);
         if frame.id() == CanId::NMT.get() {
-            self.on_nmt(frame, now, out);
+            self.on_nmt(frame, turn);
         } else if self.core.state.has_pdos() && !A::SERVICES_ONLY {
-            self.core.on_pdo_frame(frame, now, out);
+            self.core.on_pdo_frame(frame, turn);
         }
     }
 
-    fn on_nmt(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    #[inline(never)]
+    fn on_nmt(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let own = self.core.node_id.filter(|_| !self.core.is_initialising());
         let Some(command) = own.and_then(|own| Command::parse(frame.data(), own)) else { return };
         self.command(command);
-        self.send_process(now, out);
+        self.send_process(turn);
     }
 
     /// Sends what is due. Returns the instant of the next call.
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
-        let out = &mut self.gate(out);
-        self.send_process(now, out)
+        let turn = &mut self.turn(now, out);
+        self.send_process(turn)
     }
 
-    pub(super) fn send_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+    pub(super) fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
         let core = &mut self.core;
         if A::SERVICES_ONLY {
             return Instant::NEVER;
         }
-        if now >= core.process_due {
-            core.poll_sync(now);
-            core.poll_rpdos(now);
-            core.each_tpdo(|tpdo, image| tpdo.poll(image, now, out));
-            core.scanner.poll(&core.image, now, out);
+        if turn.now >= core.process_due {
+            core.poll_sync(turn.now);
+            core.poll_rpdos(turn.now);
+            core.each_tpdo(core.valid_tpdos, |tpdo, image| tpdo.poll(image, turn));
+            core.scanner.poll(&core.image, turn);
             let pdos = core.next_tpdo().min(core.next_rpdo()).min(core.scanner.due());
             core.process_due = pdos.min(core.sync.due());
         }
@@ -47,11 +49,11 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// The application has updated values in the image: sends what a change triggers.
     pub fn changed(&mut self, now: Instant, out: &mut impl Transmit) {
-        let out = &mut self.gate(out);
-        self.start_by_itself(now, out);
+        let turn = &mut self.turn(now, out);
+        self.start_by_itself(turn);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
-            self.core.each_tpdo(|tpdo, image| tpdo.on_change(image, now, out));
-            self.core.scanner.on_change(&self.core.image, now, out);
+            self.core.each_tpdo(self.core.valid_tpdos, |tpdo, image| tpdo.on_change(image, turn));
+            self.core.scanner.on_change(&self.core.image, turn);
             self.core.process_due = self.core.process_due.min(self.core.scanner.due());
         }
     }
@@ -65,17 +67,17 @@ impl<A: Application, const N: usize> Device<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
-    fn on_pdo_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    fn on_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         if self.sync.accepts(frame) {
-            self.on_sync(frame, now, out);
+            self.on_sync(frame, turn);
         } else if frame.is_remote() {
-            self.each_tpdo(|tpdo, image| {
+            self.each_tpdo(self.valid_tpdos, |tpdo, image| {
                 if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
-                    tpdo.on_remote(image, now, out);
+                    tpdo.on_remote(image, turn);
                 }
             });
         } else {
-            self.on_rpdo(frame, now);
+            self.on_rpdo(frame, turn.now);
         }
     }
 
@@ -84,9 +86,9 @@ impl<A: Application, const N: usize> Core<A, N> {
         valid.map(Tpdo::due).fold(Instant::NEVER, Instant::min)
     }
 
-    /// Visits the TPDOs that are valid. What one of them could not send at once moves the next deadline.
-    pub(super) fn each_tpdo(&mut self, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
-        for number in self.valid_tpdos.iter() {
+    /// Visits some TPDOs. What one of them could not send at once moves the next deadline.
+    pub(super) fn each_tpdo(&mut self, tpdos: PdoSet, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
+        for number in tpdos.iter() {
             let Some(tpdo) = self.tpdos.get_mut(usize::from(number)) else { return };
             visit(tpdo, &self.image);
             if tpdo.is_pending() {

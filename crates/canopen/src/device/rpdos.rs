@@ -1,6 +1,6 @@
 //! RPDOs in the device: reception, deadlines, and the faults of each.
 
-use super::{Application, Core, RPDOS};
+use super::{Application, Core};
 use crate::emcy::Fault;
 use crate::pdo::{Reception, Rpdo};
 use crate::{Frame, Instant};
@@ -8,11 +8,18 @@ use crate::{Frame, Instant};
 impl<A: Application, const N: usize> Core<A, N> {
     /// Takes a data frame that may be one of the RPDOs. A good one clears the faults of its PDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
-        for (number, place) in (0..).zip(0..RPDOS) {
-            if self.rpdo_ids.get(place) == Some(&frame.id()) {
-                self.take_rpdo(number, frame, now);
-            }
+        if self.rpdo_filter & filter_bit(frame.id()) == 0 {
+            return;
         }
+        for number in self.valid_rpdos.iter() {
+            self.take_rpdo(number, frame, now);
+        }
+    }
+
+    /// After a change of their settings.
+    pub(super) fn update_rpdo_filter(&mut self) {
+        let ids = self.rpdos.iter().filter_map(Rpdo::id);
+        self.rpdo_filter = ids.fold(0, |filter, id| filter | filter_bit(id.get()));
     }
 
     fn take_rpdo(&mut self, number: u8, frame: &Frame, now: Instant) {
@@ -64,4 +71,9 @@ impl<A: Application, const N: usize> Core<A, N> {
         let valid = self.valid_rpdos.iter().filter_map(|number| self.rpdos.get(usize::from(number)));
         valid.map(Rpdo::due).fold(Instant::NEVER, Instant::min)
     }
+}
+
+/// The bit of a CAN-ID in the filter: the lowest five bits, which in the pre-defined connection set are of the node-ID.
+fn filter_bit(id: u16) -> u32 {
+    1 << (id & 31)
 }

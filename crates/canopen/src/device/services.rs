@@ -1,9 +1,8 @@
 //! Services: SDO, heartbeat, EMCY and LSS.
 
-use super::{Application, Device, STALE};
+use super::{Application, Device};
 use crate::lss;
-use crate::sdo::Response;
-use crate::transmit::RETRY;
+use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Frame, Instant, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
@@ -16,96 +15,97 @@ const RESERVED_ROOM: usize = 10;
 impl<A: Application, const N: usize> Device<A, N> {
     /// A frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let out = &mut self.gate(out);
+        let turn = &mut self.turn(now, out);
         if frame.id() == self.core.service(SDO_REQUEST).get() {
-            self.on_sdo(frame, now, out);
+            self.on_sdo(frame, turn);
         } else if frame.id() == lss::REQUEST.get() {
-            self.on_lss(frame, now, out);
+            self.on_lss(frame, turn);
         } else if frame.id() & 0x780 == ERROR_CONTROL && !A::SERVICES_ONLY {
             self.core.on_heartbeat(frame, now);
         }
     }
 
     /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-    fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    #[inline(never)]
+    fn on_sdo(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
-        if let Some(taken) = self.server.take_expected(request, &mut self.core, now) {
-            if let Err(abort) = taken {
-                self.respond(Some(abort), now, out);
+        if let Some(has_reply) = self.server.take_expected(request, &mut self.core, turn.now) {
+            if has_reply {
+                self.respond(turn);
             }
             return;
         }
-        let response = self.server.answer(request, &mut self.core, now);
+        let has_reply = self.server.answer(request, &mut self.core, turn.now);
         self.core.services_due = self.core.services_due.min(self.server.deadline());
-        self.respond(response, now, out);
+        // A reply that still waits is obsolete: its client has gone on.
+        self.reply_due = Instant::NEVER;
+        if has_reply {
+            self.respond(turn);
+        }
         if !A::SERVICES_ONLY && self.server.is_sending() {
-            self.send_block(now, out);
+            self.send_block(turn);
         }
     }
 
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
-    fn send_block(&mut self, now: Instant, out: &mut impl Transmit) {
+    fn send_block(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let id = self.core.service(SDO_RESPONSE);
-        let abort = self.server.send_block(&self.core, now, |data| {
-            out.room() > RESERVED_ROOM && out.send(Frame::data_frame(id, 8, data)).is_ok()
+        let has_reply = self.server.send_block(&self.core, turn.now, |data| {
+            turn.room() > RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
         });
-        if abort.is_some() {
-            self.respond(abort, now, out);
+        if has_reply {
+            self.respond(turn);
         }
-        self.block_due = if self.server.is_sending() { now + RETRY } else { Instant::NEVER };
+        self.block_due = if self.server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
         self.core.services_due = self.core.services_due.min(self.block_due);
     }
 
-    /// Sends a response. One that still waits is obsolete: its client has gone on.
-    pub(super) fn respond(&mut self, response: Option<Response>, now: Instant, out: &mut impl Transmit) {
-        self.response = None;
-        let Some(response) = response else { return };
+    /// Sends the server's reply.
+    pub(super) fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let id = self.core.service(SDO_RESPONSE);
-        if out.send(Frame::data_frame(id, 8, response.encode())).is_err() {
-            self.response = Some((response, now + RETRY));
-            self.core.services_due = STALE;
-        }
+        let is_sent = turn.send(Frame::data_frame(id, 8, self.server.reply()));
+        self.reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };
+        self.core.services_due = self.core.services_due.min(self.reply_due);
     }
 
     /// Sends what is due. Returns the instant of the next call.
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         if now >= self.core.services_due {
             self.poll_switching(now);
-            let out = &mut self.gate(out);
-            self.poll_lss(now, out);
-            self.poll_heartbeat(now, out);
+            let turn = &mut self.turn(now, out);
+            self.poll_lss(turn);
+            self.poll_heartbeat(turn);
             if !A::SERVICES_ONLY {
                 self.poll_watches(now);
             }
             if self.core.state.has_services() {
                 if !A::SERVICES_ONLY {
-                    self.core.emcy.poll(now, out);
+                    self.core.emcy.poll(turn);
                 }
-                self.poll_sdo(now, out);
+                self.poll_sdo(turn);
             }
             self.core.services_due = self.next_service();
         }
         self.core.services_due
     }
 
-    fn poll_heartbeat(&mut self, now: Instant, out: &mut impl Transmit) {
+    fn poll_heartbeat(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         if !self.core.is_initialising() {
             let id = self.core.service(ERROR_CONTROL);
-            self.core.heartbeat.poll(id, self.core.state, now, out);
+            self.core.heartbeat.poll(id, self.core.state, turn);
         }
     }
 
-    fn poll_sdo(&mut self, now: Instant, out: &mut impl Transmit) {
-        match self.response {
-            Some((response, due)) if now >= due => self.respond(Some(response), now, out),
-            _ => (),
+    fn poll_sdo(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now >= self.reply_due {
+            self.respond(turn);
         }
-        if let Some(response) = self.server.expire(now) {
-            self.respond(Some(response), now, out);
+        if self.server.expire(turn.now) {
+            self.respond(turn);
         }
-        if !A::SERVICES_ONLY && now >= self.block_due {
-            self.send_block(now, out);
+        if !A::SERVICES_ONLY && turn.now >= self.block_due {
+            self.send_block(turn);
         }
     }
 
@@ -127,8 +127,7 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     fn next_sdo(&self) -> Instant {
-        let response = self.response.map_or(Instant::NEVER, |(_, due)| due);
-        self.server.deadline().min(response)
+        self.server.deadline().min(self.reply_due)
     }
 
     /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).

@@ -1,11 +1,13 @@
 //! NMT state, resets, and the reactions to errors.
 
+use super::pdos::low_half;
 use super::{Application, Core, Device, Job, STALE};
 use crate::dictionary::{Entry, Group};
 use crate::emcy::Fault;
 use crate::lss::BitRate;
 use crate::nmt::{Command, State};
-use crate::{CanId, Duration, Instant, NodeId, Transmit};
+use crate::transmit::Turn;
+use crate::{CanId, Instant, NodeId, Transmit};
 
 /// 1F80h: the one value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
@@ -32,6 +34,25 @@ pub enum Action {
 enum Reset {
     Communication,
     Node,
+}
+
+/// Whose default values are loaded.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Scope {
+    Everything,
+    /// The objects below 2000h.
+    Communication,
+    Group(Group),
+}
+
+impl Scope {
+    fn contains(self, entry: &Entry) -> bool {
+        match self {
+            Scope::Everything => true,
+            Scope::Communication => entry.index() < 0x2000,
+            Scope::Group(group) => entry.attributes.group == group,
+        }
+    }
 }
 
 /// What waits for the caller.
@@ -82,11 +103,11 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     /// There are values now. A device with an error, or one that its master has already told a state, does not start.
-    pub(super) fn start_by_itself(&mut self, now: Instant, out: &mut impl Transmit) {
+    pub(super) fn start_by_itself(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let Some(state) = self.core.pending.with_values.take() else { return };
         if self.core.emcy.register() == 0 {
             self.core.enter(state);
-            self.send_process(now, out);
+            self.send_process(turn);
         }
     }
 
@@ -139,7 +160,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     fn forget_transfer(&mut self) {
         self.server.reset();
-        (self.response, self.block_due) = (None, Instant::NEVER);
+        (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
     }
 
     /// Sets a fault. It is signalled once, until it is cleared.
@@ -221,7 +242,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     fn load_parameters(&mut self) {
         let everything = self.pending.reset == Reset::Node;
-        self.load_defaults(|entry| everything || entry.index() < 0x2000);
+        self.load_defaults(if everything { Scope::Everything } else { Scope::Communication });
         self.load_stored(Group::Communication);
         if everything {
             self.load_stored(Group::Application);
@@ -229,8 +250,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    pub(super) fn load_defaults(&mut self, is_meant: impl Fn(&Entry) -> bool) {
-        for entry in self.dictionary.entries().filter(|entry| is_meant(entry)) {
+    pub(super) fn load_defaults(&mut self, scope: Scope) {
+        for entry in self.dictionary.entries().filter(|entry| scope.contains(entry)) {
             let default: [u8; 4] = entry.field.load(self.dictionary.defaults());
             if entry.attributes.node_relative {
                 self.store_node_relative(entry.field, u32::from_le_bytes(default));
@@ -252,14 +273,13 @@ impl<A: Application, const N: usize> Core<A, N> {
         if !A::SERVICES_ONLY {
             self.configure_process(now);
         }
-        let period = Duration::from_millis(self.number(0x1017, 0).into());
-        self.heartbeat.boot_up(period, now);
+        self.heartbeat.boot_up(low_half(self.number(0x1017, 0)), now);
     }
 
     fn configure_process(&mut self, now: Instant) {
         self.configure_sync(now);
         self.emcy.configure(self.number_or(0x1014, 0, NO_EMCY));
-        self.emcy.set_inhibit(Duration::from_inhibit(self.number(0x1015, 0)));
+        self.emcy.set_inhibit(low_half(self.number(0x1015, 0)));
         self.configure_watches(now);
         self.configure_pdos(now);
         self.emcy.restart(now);
@@ -267,6 +287,8 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.update_error_register();
     }
 
+    // Called from many places that are in no hurry.
+    #[inline(never)]
     pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
         if self.emcy.raise(fault, now) {
             self.update_error_register();
@@ -274,6 +296,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
+    #[inline(never)]
     pub(super) fn clear(&mut self, fault: Fault, now: Instant) {
         self.emcy.clear(fault, now);
         self.update_error_register();

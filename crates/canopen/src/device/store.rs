@@ -2,10 +2,11 @@
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
+use super::state::Scope;
 use super::{Action, Application, Core, Device};
 use crate::dictionary::{Entry, Group, Rule};
 use crate::emcy::Fault;
-use crate::lss::{Configuration, Slave};
+use crate::lss::{self, Configuration, Slave};
 use crate::sdo::Abort;
 use crate::{Instant, Transmit};
 
@@ -116,27 +117,12 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// The job is done, or cannot be: whoever waits for it is answered.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) {
         let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
-        let out = &mut self.gate(out);
+        let turn = &mut self.turn(now, out);
         if lss_waits {
-            self.respond_lss(Slave::stored(result.is_ok()), now, out);
+            self.respond_lss(Slave::stored(result.is_ok()), turn);
         }
-        if let Some(response) = self.server.release(result, now) {
-            self.respond(Some(response), now, out);
-        }
-    }
-
-    pub(super) fn store_configuration(
-        &mut self,
-        configuration: Configuration,
-        now: Instant,
-        out: &mut impl Transmit,
-    ) {
-        if A::SERVICES_ONLY {
-            return self.respond_lss(Slave::stored(false), now, out);
-        }
-        match self.core.jobs.begin(Job::Configure(configuration)) {
-            Ok(()) => self.core.jobs.lss_waits = true,
-            Err(_) => self.respond_lss(Slave::stored(false), now, out),
+        if self.server.release(result, now) {
+            self.respond(turn);
         }
     }
 }
@@ -163,6 +149,13 @@ impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
         let job = Job::Save(Selection::Calibration);
         if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
+    }
+
+    /// Begins to store what LSS has configured. The response, unless it waits for the end.
+    pub(super) fn store_configuration(&mut self, configuration: Configuration) -> Option<lss::Response> {
+        let is_begun = !A::SERVICES_ONLY && self.jobs.begin(Job::Configure(configuration)).is_ok();
+        self.jobs.lss_waits |= is_begun;
+        (!is_begun).then_some(Slave::stored(false))
     }
 
     /// Begins a job for whose end the answer to the client waits.
@@ -194,7 +187,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         let fits =
             self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
         if !fits {
-            self.load_defaults(|entry| entry.attributes.group == group);
+            self.load_defaults(Scope::Group(group));
         }
         self.unsound.set(group, !(fits && is_sound));
         self.application.loaded(group, fits && is_sound);

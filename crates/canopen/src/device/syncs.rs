@@ -3,35 +3,35 @@
 use super::{Application, Core, STALE};
 use crate::emcy::Fault;
 use crate::sync::Settings;
-use crate::{Duration, Frame, Instant, Transmit};
+use crate::transmit::Turn;
+use crate::{Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn configure_sync(&mut self, now: Instant) {
-        let micros = |value: u32| Duration(value.into());
         let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
         self.sync.configure(Settings {
             cob_id: self.number_or(0x1005, 0, 0x80),
-            period: micros(self.number(0x1006, 0)),
-            window: micros(self.number(0x1007, 0)),
+            period: self.number(0x1006, 0),
+            window: self.number(0x1007, 0),
             overflow,
         });
         self.clear(Fault::SyncMissing, now);
     }
 
-    pub(super) fn on_sync(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let Ok(sync) = self.sync.take(frame, now) else {
-            self.raise(Fault::SyncLength, now);
-            self.clear(Fault::SyncLength, now);
+    pub(super) fn on_sync(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
+        let Ok(sync) = self.sync.take(frame, turn.now) else {
+            self.raise(Fault::SyncLength, turn.now);
+            self.clear(Fault::SyncLength, turn.now);
             return;
         };
         if self.sync.is_back() {
-            self.clear(Fault::SyncMissing, now);
+            self.clear(Fault::SyncMissing, turn.now);
         }
-        for number in self.valid_rpdos.iter() {
+        for number in self.synchronous_rpdos.iter() {
             let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
             rpdo.on_sync(&mut self.image);
         }
-        self.each_tpdo(|tpdo, image| tpdo.on_sync(sync, image, now, out));
+        self.each_tpdo(self.synchronous_tpdos, |tpdo, image| tpdo.on_sync(sync, image, turn));
         self.process_due = self.process_due.min(self.sync.due());
     }
 

@@ -25,6 +25,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
+    #[inline(never)]
     pub(super) fn on_heartbeat(&mut self, frame: &Frame, now: Instant) {
         if self.is_initialising() {
             return;

@@ -1,8 +1,8 @@
 //! What must be true of a table, so that everything at run time can rely on it. The panics here are compile errors.
 
-use super::compile::effective_limits;
+use super::compile::{effective_limits, event_timer};
 use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type, image_size};
-use crate::device::{RPDOS, TPDOS};
+use crate::device::PDOS;
 use crate::pdo::WATCHED;
 use crate::sdo::BUFFER;
 
@@ -13,8 +13,8 @@ use crate::sdo::BUFFER;
 /// During compilation, when a row is wrong.
 pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    assert!(pdos(rows, 0x1400) <= RPDOS, "more RPDOs than a device has");
-    assert!(pdos(rows, 0x1800) <= TPDOS, "more TPDOs than a device has");
+    assert!(pdos(rows, 0x1400) <= PDOS, "more RPDOs than a device has");
+    assert!(pdos(rows, 0x1800) <= PDOS, "more TPDOs than a device has");
     let (mut i, mut sent) = (0, 0);
     while i < rows.len() {
         check_row(&rows[i]);
@@ -28,7 +28,12 @@ pub const fn check(rows: &[Object]) {
         let is_pdo = matches!(rows[i].index, 0x1400..=0x15FF | 0x1800..=0x19FF);
         assert!(!is_pdo || rows[i].sub > 0 || has(rows, rows[i].key() | 1), "a PDO has no COB-ID");
         if let Rule::EventTimerOf(number) = rows[i].rule {
-            assert!(has(rows, (0x1800 | number as u32) << 8 | 5), "there is no such event timer");
+            let timer = &rows[event_timer(rows, number)];
+            assert!(
+                matches!(timer.access, Access::ReadWrite),
+                "an event timer is written under its other name"
+            );
+            assert!(timer.limits.is_none() && rows[i].limits.is_none(), "an event timer has no limits");
         }
         i += 1;
     }
@@ -79,7 +84,7 @@ const fn check_row(row: &Object) {
     let mappable = !matches!(row.mapping, Mapping::No);
     let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
     assert!(!mappable || fits, "a mapped object has no place in a PDO");
-    assert!(!mappable || !row.rule.is_computed(), "a mapped object has no place in the image");
+    assert!(!mappable || row.stored_size() > 0, "a mapped object has no place in the image");
     let saved = !matches!(row.group, Group::Volatile);
     assert!(!saved || matches!(row.access, Access::ReadWrite), "only a parameter can be saved");
     let tpdo = matches!(row.mapping, Mapping::Tpdo);

@@ -1,8 +1,9 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::entry::Attributes;
-use super::tables::{Place, Series};
-use super::{Access, DefaultValue, Object, Tables, Type};
+use super::tables::{Pdos, Place, Series};
+use super::{Access, DefaultValue, Object, Rule, Tables, Type};
+use crate::device::PDOS;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -58,13 +59,19 @@ macro_rules! dictionary {
 /// During compilation, when they are less.
 #[must_use]
 pub const fn compile<const S: usize, const P: usize, const A: usize>(rows: &[Object]) -> Tables<S, P, A> {
-    let tables = Tables { series: [UNUSED; S], places: [NO_PLACE; P], attributes: [attributes(&rows[0]); A] };
+    let tables = Tables {
+        series: [UNUSED; S],
+        places: [NO_PLACE; P],
+        attributes: [attributes(&rows[0]); A],
+        tpdos: pdos(rows, 0x1800),
+        rpdos: pdos(rows, 0x1400),
+    };
     let mut filling = Filling { tables, series: 0, places: 0, attributes: 0, offset: 0 };
     let mut row = 0;
     while row < rows.len() {
         let object = rows.split_at(row).1.split_at(object_len(rows, row)).0;
         let objects = series_len(rows, row);
-        filling.add_series(object, objects);
+        filling.add_series(rows, object, objects);
         row += object.len() * objects;
     }
     filling.tables
@@ -81,8 +88,8 @@ struct Filling<const S: usize, const P: usize, const A: usize> {
 
 #[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges.
 impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
-    /// So many objects like this one.
-    const fn add_series(&mut self, object: &[Object], objects: usize) {
+    /// So many objects of all `rows` like this one.
+    const fn add_series(&mut self, rows: &[Object], object: &[Object], objects: usize) {
         let stride = image_size(object);
         self.tables.series[self.series] = Series {
             index: object[0].index,
@@ -93,7 +100,11 @@ impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
         };
         let (mut row, mut offset) = (0, self.offset);
         while row < object.len() {
-            self.add_place(&object[row], offset);
+            let place = match object[row].rule {
+                Rule::EventTimerOf(number) => image_size(rows.split_at(event_timer(rows, number)).0),
+                _ => offset,
+            };
+            self.add_place(&object[row], place);
             (row, offset) = (row + 1, offset + object[row].stored_size());
         }
         (self.series, self.offset) = (self.series + 1, self.offset + stride * objects);
@@ -110,6 +121,32 @@ impl<const S: usize, const P: usize, const A: usize> Filling<S, P, A> {
             Place { sub: row.sub, attributes: number as u8, offset: offset as u16 };
         self.places += 1;
     }
+}
+
+/// Of the PDOs whose communication objects are among the 512 indexes from `first` on.
+const fn pdos(rows: &[Object], first: u16) -> Pdos {
+    let mut pdos = Pdos { count: 0, indexes: [0; PDOS] };
+    let mut row = 0;
+    while row < rows.len() {
+        if rows[row].index & 0xFE00 == first && rows[row].sub == 0 {
+            pdos.indexes[pdos.count as usize] = rows[row].index;
+            pdos.count += 1;
+        }
+        row += 1;
+    }
+    pdos
+}
+
+/// The row of the event timer of a TPDO.
+///
+/// # Panics
+/// During compilation, when there is none.
+pub(super) const fn event_timer(rows: &[Object], number: u8) -> usize {
+    let mut row = 0;
+    while rows[row].key() != (0x1800 | number as u32) << 8 | 5 {
+        row += 1;
+    }
+    row
 }
 
 /// A series of no object, after all others: no search ends in it.

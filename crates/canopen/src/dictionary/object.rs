@@ -114,7 +114,8 @@ pub enum Rule {
     PdoEventTimer,
     /// 1800h..:6, SYNC start value.
     PdoSyncStart,
-    /// Another name of 1800h..:5, the event timer of this TPDO, from 0: the cyclic timer of a device profile.
+    /// Another name of 1800h..:5, the event timer of this TPDO, from 0: the cyclic timer of a device profile. Both have
+    /// one place in the image.
     EventTimerOf(u8),
     /// 1600h.., 1A00h..:0, number of mapped objects.
     PdoCount,
@@ -173,9 +174,9 @@ impl Rule {
         }
     }
 
-    /// Whether the value lives elsewhere and takes no place in the image.
+    /// Whether the value lives outside the image.
     pub(crate) const fn is_computed(self) -> bool {
-        matches!(self, Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_))
+        matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
     }
 }
 
@@ -288,6 +289,9 @@ impl Object {
 
     /// Bytes it takes in the image.
     pub(crate) const fn stored_size(&self) -> usize {
-        if self.rule.is_computed() { 0 } else { self.kind.size() as usize }
+        match self.rule {
+            Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_) => 0,
+            _ => self.kind.size() as usize,
+        }
     }
 }

@@ -15,6 +15,8 @@
 use super::entry::{Attributes, little_endian};
 use super::{Entry, Field};
 use crate::NodeId;
+use crate::device::PDOS;
+use crate::pdo::Direction;
 use crate::sdo::Abort;
 
 /// Objects of one shape with indexes that follow each other.
@@ -40,12 +42,27 @@ pub(crate) struct Place {
     pub(crate) offset: u16,
 }
 
+/// The communication objects of the PDOs of a dictionary one way, ascending.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pdos {
+    pub(crate) count: u8,
+    pub(crate) indexes: [u16; PDOS],
+}
+
+impl Pdos {
+    fn as_slice(&self) -> &[u16] {
+        self.indexes.get(..usize::from(self.count)).unwrap_or(&self.indexes)
+    }
+}
+
 /// What [`compile`](super::compile) makes of a table: room for `S` series, `P` places and `A` attributes.
 #[derive(Clone, Copy, Debug)]
 pub struct Tables<const S: usize, const P: usize, const A: usize> {
     pub(crate) series: [Series; S],
     pub(crate) places: [Place; P],
     pub(crate) attributes: [Attributes; A],
+    pub(crate) tpdos: Pdos,
+    pub(crate) rpdos: Pdos,
 }
 
 /// The dictionary of one personality.
@@ -54,6 +71,8 @@ pub struct Dictionary {
     series: &'static [Series],
     places: &'static [Place],
     attributes: &'static [Attributes],
+    tpdos: &'static Pdos,
+    rpdos: &'static Pdos,
     defaults: &'static [u8],
 }
 
@@ -65,8 +84,8 @@ impl Dictionary {
         tables: &'static Tables<S, P, A>,
         defaults: &'static [u8],
     ) -> Dictionary {
-        let Tables { series, places, attributes } = tables;
-        Dictionary { series, places, attributes, defaults }
+        let Tables { series, places, attributes, tpdos, rpdos } = tables;
+        Dictionary { series, places, attributes, tpdos, rpdos, defaults }
     }
 
     /// All entries, sorted.
@@ -81,13 +100,12 @@ impl Dictionary {
         self.defaults
     }
 
-    /// The indexes of all objects from `first` up to the one before `end`.
-    pub(crate) fn between(&self, first: u16, end: u16) -> impl Iterator<Item = u16> + use<> {
-        let end_of = |series: &Series| series.index.saturating_add(series.objects.into());
-        let series = self.series.partition_point(|series| end_of(series) <= first);
-        let entries = Entries { series, ..self.entries() };
-        let indexes = entries.filter(|entry| entry.sub == 0).map(|entry| entry.index);
-        indexes.take_while(move |&index| index < end).filter(move |&index| index >= first)
+    /// The indexes of the communication objects of its PDOs one way.
+    pub(crate) fn pdos(&self, direction: Direction) -> &'static [u16] {
+        match direction {
+            Direction::Transmit => self.tpdos.as_slice(),
+            Direction::Receive => self.rpdos.as_slice(),
+        }
     }
 
     /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.

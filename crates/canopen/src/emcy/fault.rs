@@ -61,11 +61,11 @@ pub enum Fault {
     RpdoDeadline(u8),
 }
 
-/// The first bit of communication faults in a set of faults.
-const COMMUNICATION: u8 = 20;
+/// The first bit of communication faults in a set of faults: from here on, all are.
+const COMMUNICATION: u8 = 18;
 
 impl Fault {
-    /// Those that exist once.
+    /// Those that exist once, in the order of their bits.
     const SINGLE: [Fault; 24] = [
         Fault::SensorClock,
         Fault::SensorBoot,
@@ -95,53 +95,102 @@ impl Fault {
 
     /// Every fault that there is.
     pub fn all() -> impl Iterator<Item = Fault> {
-        Fault::SINGLE
-            .into_iter()
-            .chain((0..4).map(Fault::Heartbeat))
-            .chain((0..8).map(Fault::RpdoTooShort))
-            .chain((0..8).map(Fault::RpdoTooLong))
-            .chain((0..8).map(Fault::RpdoDeadline))
+        (0..u8::MAX).map_while(Fault::of_bit)
     }
 
-    /// Its bit in a set of faults, and its emergency error code: CiA 301, table 26, CiA 406, 5.1, and the codes of the
-    /// classes 50xxh, 61xxh, 63xxh and 80xxh that are the manufacturer's.
-    const fn definition(self) -> (u8, u16) {
+    /// The fault of a bit in a set of faults.
+    fn of_bit(bit: u8) -> Option<Fault> {
+        Some(match bit {
+            24..28 => Fault::Heartbeat(bit - 24),
+            28..36 => Fault::RpdoTooShort(bit - 28),
+            36..44 => Fault::RpdoTooLong(bit - 36),
+            44..52 => Fault::RpdoDeadline(bit - 44),
+            _ => return Fault::SINGLE.get(usize::from(bit)).copied(),
+        })
+    }
+
+    /// Its bit in a set of faults; of those that exist several times that of the first.
+    const fn first_bit(self) -> u8 {
         match self {
-            Fault::ModuleInitialisation => (0, 0x5001),
-            Fault::HardwareIdentification => (1, 0x5002),
-            Fault::ParameterStore => (2, 0x5003),
-            Fault::SensorClock => (3, 0x5004),
-            Fault::SensorBoot => (4, 0x5005),
-            Fault::SensorBreak => (5, 0x5006),
-            Fault::SensorMemory => (6, 0x5007),
-            Fault::UnexpectedReset => (7, 0x6101),
-            Fault::BootData => (8, 0x6301),
-            Fault::CommunicationData => (9, 0x6302),
-            Fault::ApplicationData => (10, 0x6303),
-            Fault::TemperatureRail => (11, 0x8001),
-            Fault::PressureRail => (12, 0x8002),
-            Fault::EncoderBreak => (13, 0x5006),
-            Fault::InputCurrent => (14, 0x2110),
-            Fault::InputVoltage => (15, 0x3110),
-            Fault::HardwareMemory => (16, 0x5100),
-            Fault::CalibrationData => (17, 0x6300),
-            Fault::Overrun => (COMMUNICATION, 0x8110),
-            Fault::ErrorPassive => (COMMUNICATION + 1, 0x8120),
-            Fault::BusOffRecovered => (COMMUNICATION + 2, 0x8140),
-            Fault::SyncMissing => (COMMUNICATION + 3, 0x8100),
-            Fault::SyncLength => (COMMUNICATION + 4, 0x8240),
-            Fault::MpdoNotTaken => (COMMUNICATION + 33, 0x8230),
-            Fault::Heartbeat(number) => (COMMUNICATION + 5 + (number & 3), 0x8130),
-            Fault::RpdoTooShort(number) => (COMMUNICATION + 9 + (number & 7), 0x8210),
-            Fault::RpdoTooLong(number) => (COMMUNICATION + 17 + (number & 7), 0x8220),
-            Fault::RpdoDeadline(number) => (COMMUNICATION + 25 + (number & 7), 0x8250),
+            Fault::SensorClock => 0,
+            Fault::SensorBoot => 1,
+            Fault::SensorBreak => 2,
+            Fault::SensorMemory => 3,
+            Fault::TemperatureRail => 4,
+            Fault::PressureRail => 5,
+            Fault::EncoderBreak => 6,
+            Fault::InputCurrent => 7,
+            Fault::InputVoltage => 8,
+            Fault::HardwareMemory => 9,
+            Fault::ModuleInitialisation => 10,
+            Fault::HardwareIdentification => 11,
+            Fault::ParameterStore => 12,
+            Fault::UnexpectedReset => 13,
+            Fault::BootData => 14,
+            Fault::CommunicationData => 15,
+            Fault::ApplicationData => 16,
+            Fault::CalibrationData => 17,
+            Fault::Overrun => 18,
+            Fault::ErrorPassive => 19,
+            Fault::BusOffRecovered => 20,
+            Fault::SyncMissing => 21,
+            Fault::SyncLength => 22,
+            Fault::MpdoNotTaken => 23,
+            Fault::Heartbeat(_) => 24,
+            Fault::RpdoTooShort(_) => 28,
+            Fault::RpdoTooLong(_) => 36,
+            Fault::RpdoDeadline(_) => 44,
         }
     }
 
-    /// Emergency error code.
+    /// Which one of those that exist several times, from 0.
+    const fn instance(self) -> u8 {
+        match self {
+            Fault::Heartbeat(number) => number & 3,
+            Fault::RpdoTooShort(number) | Fault::RpdoTooLong(number) | Fault::RpdoDeadline(number) => {
+                number & 7
+            }
+            _ => 0,
+        }
+    }
+
+    const fn bit(self) -> u8 {
+        self.first_bit() + self.instance()
+    }
+
+    /// Emergency error code: CiA 301, table 26, CiA 406, 5.1, and the codes of the classes 50xxh, 61xxh, 63xxh and 80xxh
+    /// that are the manufacturer's.
     #[must_use]
     pub const fn code(self) -> u16 {
-        self.definition().1
+        match self {
+            Fault::SensorClock => 0x5004,
+            Fault::SensorBoot => 0x5005,
+            Fault::SensorBreak | Fault::EncoderBreak => 0x5006,
+            Fault::SensorMemory => 0x5007,
+            Fault::TemperatureRail => 0x8001,
+            Fault::PressureRail => 0x8002,
+            Fault::InputCurrent => 0x2110,
+            Fault::InputVoltage => 0x3110,
+            Fault::HardwareMemory => 0x5100,
+            Fault::ModuleInitialisation => 0x5001,
+            Fault::HardwareIdentification => 0x5002,
+            Fault::ParameterStore => 0x5003,
+            Fault::UnexpectedReset => 0x6101,
+            Fault::BootData => 0x6301,
+            Fault::CommunicationData => 0x6302,
+            Fault::ApplicationData => 0x6303,
+            Fault::CalibrationData => 0x6300,
+            Fault::Overrun => 0x8110,
+            Fault::ErrorPassive => 0x8120,
+            Fault::BusOffRecovered => 0x8140,
+            Fault::SyncMissing => 0x8100,
+            Fault::SyncLength => 0x8240,
+            Fault::MpdoNotTaken => 0x8230,
+            Fault::Heartbeat(_) => 0x8130,
+            Fault::RpdoTooShort(_) => 0x8210,
+            Fault::RpdoTooLong(_) => 0x8220,
+            Fault::RpdoDeadline(_) => 0x8250,
+        }
     }
 
     /// Manufacturer-specific error field: which one, from 1, of those that exist several times; 1 for the encoder's
@@ -169,14 +218,14 @@ impl FaultSet {
     /// Whether it is new.
     pub(crate) fn insert(&mut self, fault: Fault) -> bool {
         let before = self.0;
-        self.0 |= 1 << fault.definition().0;
+        self.0 |= 1 << fault.bit();
         self.0 != before
     }
 
     /// Whether it was there.
     pub(crate) fn remove(&mut self, fault: Fault) -> bool {
         let before = self.0;
-        self.0 &= !(1 << fault.definition().0);
+        self.0 &= !(1 << fault.bit());
         self.0 != before
     }
 
@@ -197,7 +246,7 @@ impl FaultSet {
     }
 
     fn contains(self, fault: Fault) -> bool {
-        self.0 & 1 << fault.definition().0 != 0
+        self.0 & 1 << fault.bit() != 0
     }
 }
 

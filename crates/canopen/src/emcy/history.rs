@@ -3,22 +3,24 @@
 /// How many errors are kept.
 const DEPTH: u8 = 10;
 
-/// The last errors, newest first, each as its four bytes in an upload.
+/// The last errors, each as its four bytes in an upload.
 #[derive(Debug)]
 pub(crate) struct History {
     count: u8,
+    /// Where the newest is; the older ones are before it, and before the first comes the last.
+    newest: u8,
     errors: [[u8; 4]; DEPTH as usize],
 }
 
 impl History {
     pub(crate) const fn new() -> History {
-        History { count: 0, errors: [[0; 4]; DEPTH as usize] }
+        History { count: 0, newest: 0, errors: [[0; 4]; DEPTH as usize] }
     }
 
     pub(crate) fn push(&mut self, code: u16) {
-        self.errors.rotate_right(1);
-        if let Some(first) = self.errors.first_mut() {
-            *first = u32::from(code).to_le_bytes();
+        self.newest = (self.newest + 1) % DEPTH;
+        if let Some(place) = self.errors.get_mut(usize::from(self.newest)) {
+            *place = u32::from(code).to_le_bytes();
         }
         self.count = self.count.saturating_add(1).min(DEPTH);
     }
@@ -34,8 +36,8 @@ impl History {
 
     /// Sub-index 1 and up; `None` beyond the last error.
     pub(crate) fn error(&self, sub: u8) -> Option<&[u8; 4]> {
-        let at = sub.checked_sub(1).filter(|&at| at < self.count)?;
-        self.errors.get(usize::from(at))
+        let age = sub.checked_sub(1).filter(|&age| age < self.count)?;
+        self.errors.get(usize::from((self.newest + DEPTH - age) % DEPTH))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::history::History;
 use super::{Fault, FaultSet, Message};
 use crate::sdo::Abort;
-use crate::transmit::RETRY;
+use crate::transmit::{RETRY, Turn};
 use crate::{CobId, Duration, Frame, Instant, Transmit};
 use heapless::Deque;
 
@@ -19,8 +19,8 @@ pub(crate) struct Producer {
     active: FaultSet,
     history: History,
     waiting: Deque<Message, WAITING>,
-    /// 1015h.
-    inhibit: Duration,
+    /// 1015h, in 100 us.
+    inhibit: u16,
     /// The end of the inhibit time after the last message.
     inhibited_until: Instant,
     due: Instant,
@@ -33,7 +33,7 @@ impl Producer {
             active: FaultSet::EMPTY,
             history: History::new(),
             waiting: Deque::new(),
-            inhibit: Duration(0),
+            inhibit: 0,
             inhibited_until: Instant(0),
             due: Instant::NEVER,
         }
@@ -45,7 +45,7 @@ impl Producer {
     }
 
     /// Takes the inhibit time of 1015h, from the next message on.
-    pub(crate) fn set_inhibit(&mut self, inhibit: Duration) {
+    pub(crate) fn set_inhibit(&mut self, inhibit: u16) {
         self.inhibit = inhibit;
     }
 
@@ -107,8 +107,8 @@ impl Producer {
     }
 
     /// Sends what waits. To be called in states that have EMCY only; what waits then waits on.
-    pub(crate) fn poll(&mut self, now: Instant, out: &mut impl Transmit) {
-        if now < self.due {
+    pub(crate) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now < self.due {
             return;
         }
         let Some(cob_id) = self.id else {
@@ -117,13 +117,13 @@ impl Producer {
             return;
         };
         while let Some(message) = self.waiting.front() {
-            if out.send(Frame::data_frame(cob_id.id, 8, message.encode())).is_err() {
-                self.due = now + RETRY;
+            if !turn.send(Frame::data_frame(cob_id.id, 8, message.encode())) {
+                self.due = turn.now + RETRY;
                 return;
             }
             let _ = self.waiting.pop_front();
-            if !self.inhibit.is_zero() {
-                self.inhibited_until = now + self.inhibit;
+            if self.inhibit != 0 {
+                self.inhibited_until = turn.now + Duration::from_inhibit(self.inhibit);
                 self.due = if self.waiting.is_empty() { Instant::NEVER } else { self.inhibited_until };
                 return;
             }

@@ -9,15 +9,16 @@ pub(crate) const WATCHES: u8 = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Watch {
     pub(crate) node: NodeId,
-    period: Duration,
+    /// In ms.
+    period: u16,
 }
 
 impl Watch {
     /// From bits 0..15 (time in ms) and 16..23 (node-ID). `None` for an entry that is not used: time 0, or no node-ID.
     pub(crate) fn parse(value: u32) -> Option<Watch> {
         let [low, high, node, _] = value.to_le_bytes();
-        let period = Duration::from_millis(u16::from_le_bytes([low, high]).into());
-        NodeId::new(node).filter(|_| !period.is_zero()).map(|node| Watch { node, period })
+        let period = u16::from_le_bytes([low, high]);
+        NodeId::new(node).filter(|_| period != 0).map(|node| Watch { node, period })
     }
 
     fn id(self) -> CanId {
@@ -74,7 +75,7 @@ impl Consumer {
         let is_heartbeat = frame.len() == 1 && !frame.is_remote();
         let (number, entry) =
             self.numbered().find(|(_, entry)| is_heartbeat && entry.watch.id().get() == frame.id())?;
-        entry.due = now + entry.watch.period;
+        entry.due = now + Duration::from_millis(entry.watch.period.into());
         core::mem::take(&mut entry.is_lost).then_some(Change::Back(number))
     }
 

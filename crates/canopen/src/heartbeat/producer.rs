@@ -1,32 +1,33 @@
 //! The producer and the boot-up message (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
 
 use crate::nmt::State;
-use crate::transmit::RETRY;
+use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// Sends boot-up once and then a heartbeat every period (1017h).
 #[derive(Debug)]
 pub(crate) struct Producer {
-    period: Duration,
+    /// In ms; 0 for no heartbeat.
+    period: u16,
     due: Instant,
     boot_up: bool,
 }
 
 impl Producer {
     pub(crate) const fn new() -> Producer {
-        Producer { period: Duration(0), due: Instant::NEVER, boot_up: false }
+        Producer { period: 0, due: Instant::NEVER, boot_up: false }
     }
 
     /// Boot-up is due at once; it counts as the first heartbeat.
-    pub(crate) fn boot_up(&mut self, period: Duration, now: Instant) {
+    pub(crate) fn boot_up(&mut self, period: u16, now: Instant) {
         *self = Producer { period, due: now, boot_up: true };
     }
 
     /// A new period takes effect at once with a heartbeat; 0 switches the heartbeat off.
-    pub(crate) fn set_period(&mut self, period: Duration, now: Instant) {
+    pub(crate) fn set_period(&mut self, period: u16, now: Instant) {
         self.period = period;
         if !self.boot_up {
-            self.due = if period.is_zero() { Instant::NEVER } else { now };
+            self.due = if period == 0 { Instant::NEVER } else { now };
         }
     }
 
@@ -36,25 +37,26 @@ impl Producer {
     }
 
     /// Sends what is due.
-    pub(crate) fn poll(&mut self, id: CanId, state: State, now: Instant, out: &mut impl Transmit) {
-        if now < self.due {
+    pub(crate) fn poll(&mut self, id: CanId, state: State, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now < self.due {
             return;
         }
         let code = if self.boot_up { State::Initialising.code() } else { state.code() };
-        if out.send(Frame::data_frame(id, 1, [code, 0, 0, 0, 0, 0, 0, 0])).is_err() {
-            self.due = now + RETRY;
+        if !turn.send(Frame::data_frame(id, 1, [code, 0, 0, 0, 0, 0, 0, 0])) {
+            self.due = turn.now + RETRY;
             return;
         }
         self.boot_up = false;
-        self.due = self.following(now);
+        self.due = self.following(turn.now);
     }
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
     fn following(&self, now: Instant) -> Instant {
-        if self.period.is_zero() {
+        if self.period == 0 {
             return Instant::NEVER;
         }
-        let next = self.due + self.period;
-        if next > now { next } else { now + self.period }
+        let period = Duration::from_millis(self.period.into());
+        let next = self.due + period;
+        if next > now { next } else { now + period }
     }
 }

@@ -13,7 +13,7 @@ pub use bit_rate::BitRate;
 pub use request::{Bound, Request};
 pub use response::Response;
 pub use slave::Configuration;
-pub(crate) use slave::{Effect, Slave, Switch};
+pub(crate) use slave::{Outcome, Slave, Switch};
 
 use crate::CanId;
 

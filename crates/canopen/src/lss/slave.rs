@@ -13,9 +13,12 @@ pub struct Configuration {
     pub bit_rate: BitRate,
 }
 
-/// What a request asks of the device.
+/// What follows from a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Effect {
+pub(crate) enum Outcome {
+    /// Nothing: the master hears nothing.
+    Silence,
+    Answer(Response),
     /// A device without a node-ID has got one: it boots.
     Join,
     /// The bit rate changes.
@@ -28,25 +31,13 @@ pub(crate) enum Effect {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Switch {
     pub(crate) bit_rate: BitRate,
-    pub(crate) delay: Duration,
+    /// In ms.
+    delay: u16,
 }
 
-/// A response, an effect, both or nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Outcome {
-    pub(crate) response: Option<Response>,
-    pub(crate) effect: Option<Effect>,
-}
-
-impl From<Response> for Outcome {
-    fn from(response: Response) -> Outcome {
-        Outcome { response: Some(response), effect: None }
-    }
-}
-
-impl From<Effect> for Outcome {
-    fn from(effect: Effect) -> Outcome {
-        Outcome { response: None, effect: Some(effect) }
+impl Switch {
+    pub(crate) fn delay(self) -> Duration {
+        Duration::from_millis(self.delay.into())
     }
 }
 
@@ -90,30 +81,31 @@ impl Slave {
             Request::SwitchGlobal { configuration } => self.switch(configuration, node_id),
             Request::Select(part, value) => self.select(part, value, identity),
             Request::Identify(bound, value) => self.identify(bound, value, identity),
-            Request::IdentifyUnconfigured if self.is_unconfigured(node_id) => Response::Unconfigured.into(),
+            Request::IdentifyUnconfigured if self.is_unconfigured(node_id) => {
+                Outcome::Answer(Response::Unconfigured)
+            }
             Request::Fastscan { value, bit, part, next } if self.is_scanned(node_id) => {
                 self.fastscan(identity, value, bit, part, next)
             }
             _ if self.is_selected => self.configure(request, identity, node_id),
-            _ => Outcome::default(),
+            _ => Outcome::Silence,
         }
     }
 
     /// What the master does with the one slave that it has selected.
     fn configure(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
         match request {
-            Request::NodeId(id) => Response::NodeId(self.set_node_id(id)).into(),
+            Request::NodeId(id) => Outcome::Answer(Response::NodeId(self.set_node_id(id))),
             Request::BitTiming { table, index } => {
-                Response::BitTiming(self.set_bit_rate(table, index)).into()
+                Outcome::Answer(Response::BitTiming(self.set_bit_rate(table, index)))
             }
-            Request::Activate { delay } => {
-                let delay = Duration::from_millis(delay.into());
-                Effect::Switch(Switch { bit_rate: self.pending.bit_rate, delay }).into()
+            Request::Activate { delay } => Outcome::Switch(Switch { bit_rate: self.pending.bit_rate, delay }),
+            Request::Store => Outcome::Store(self.pending),
+            Request::Inquire(part) => Outcome::Answer(Response::Identity(part, identity.part(part))),
+            Request::InquireNodeId => {
+                Outcome::Answer(Response::NodeIdIs(node_id.map_or(u8::MAX, NodeId::get)))
             }
-            Request::Store => Effect::Store(self.pending).into(),
-            Request::Inquire(part) => Response::Identity(part, identity.part(part)).into(),
-            Request::InquireNodeId => Response::NodeIdIs(node_id.map_or(u8::MAX, NodeId::get)).into(),
-            _ => Outcome::default(),
+            _ => Outcome::Silence,
         }
     }
 
@@ -127,17 +119,17 @@ impl Slave {
         let is_left = core::mem::replace(&mut self.is_selected, configuration) && !configuration;
         (self.selected, self.identified) = (0, 0);
         let joins = is_left && node_id.is_none() && self.pending.node_id.is_some();
-        Outcome { response: None, effect: joins.then_some(Effect::Join) }
+        if joins { Outcome::Join } else { Outcome::Silence }
     }
 
     fn select(&mut self, part: Part, value: u32, identity: &Identity) -> Outcome {
         let matches = !self.is_selected && value == identity.part(part);
         self.selected = advance(self.selected, part.number(), matches);
         if usize::from(self.selected) < Part::ALL.len() {
-            return Outcome::default();
+            return Outcome::Silence;
         }
         (self.selected, self.is_selected) = (0, true);
-        Response::Selected.into()
+        Outcome::Answer(Response::Selected)
     }
 
     fn identify(&mut self, bound: Bound, value: u32, identity: &Identity) -> Outcome {
@@ -151,10 +143,10 @@ impl Slave {
         };
         self.identified = advance(self.identified, bound as u8, matches);
         if usize::from(self.identified) < Bound::ALL.len() {
-            return Outcome::default();
+            return Outcome::Silence;
         }
         self.identified = 0;
-        Response::Identified.into()
+        Outcome::Answer(Response::Identified)
     }
 
     fn is_unconfigured(&self, node_id: Option<NodeId>) -> bool {
@@ -169,7 +161,7 @@ impl Slave {
     fn fastscan(&mut self, identity: &Identity, value: u32, bit: u8, part: u8, next: u8) -> Outcome {
         let step = self.scan.step(identity, value, bit, part, next);
         self.is_selected = step == Step::Found;
-        if step == Step::Silent { Outcome::default() } else { Response::Identified.into() }
+        if step == Step::Silent { Outcome::Silence } else { Outcome::Answer(Response::Identified) }
     }
 
     fn set_node_id(&mut self, id: u8) -> u8 {

@@ -109,13 +109,13 @@ impl Layout {
         Ok(())
     }
 
-    fn places(&self) -> impl Iterator<Item = &Field> {
-        self.places.iter().take(usize::from(self.count))
+    fn places(&self) -> &[Field] {
+        self.places.get(..usize::from(self.count)).unwrap_or(&self.places)
     }
 
     /// Whether a value is in the PDO.
     pub(crate) fn contains(&self, field: Field) -> bool {
-        self.places().any(|place| (place.offset..place.end()).contains(&field.offset))
+        self.places().iter().any(|place| (place.offset..place.end()).contains(&field.offset))
     }
 
     /// Bytes of the PDO.
@@ -126,16 +126,15 @@ impl Layout {
     /// The PDO's data from the image.
     pub(crate) fn gather(&self, image: &[u8]) -> [u8; 8] {
         // Each place is read as eight bytes. What does not belong to it is overwritten by the next, or cut at the end.
-        let (mut data, mut at) = ([0; 16], 0);
-        for place in self.places() {
-            if let Some(to) = data.get_mut(at..).and_then(|rest| rest.first_chunk_mut()) {
-                *to = place.eight(image);
-            }
-            at += usize::from(place.size);
+        let data = match self.places() {
+            [place] => place.eight(image),
+            places => join(places, image),
+        };
+        if self.len == 8 {
+            return data;
         }
-        let all = data.first_chunk().map_or(0, |data| u64::from_le_bytes(*data));
-        let mask = u64::MAX.checked_shr(64 - u32::from(self.len) * 8).unwrap_or(0);
-        (all & mask).to_le_bytes()
+        let mask = (1_u64 << (self.len * 8)).wrapping_sub(1);
+        (u64::from_le_bytes(data) & mask).to_le_bytes()
     }
 
     /// The PDO's data into the image.
@@ -146,4 +145,16 @@ impl Layout {
             data = data.checked_shr(u32::from(place.size) * 8).unwrap_or(0);
         }
     }
+}
+
+/// The first eight bytes of the values in a row.
+fn join(places: &[Field], image: &[u8]) -> [u8; 8] {
+    let (mut data, mut at) = ([0; 16], 0);
+    for place in places {
+        if let Some(to) = data.get_mut(at..).and_then(|rest| rest.first_chunk_mut()) {
+            *to = place.eight(image);
+        }
+        at += usize::from(place.size);
+    }
+    data.first_chunk().copied().unwrap_or_default()
 }

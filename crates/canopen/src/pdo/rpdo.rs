@@ -4,34 +4,37 @@
 //! again within that time.
 
 use super::{Addressing, Content, Transmission};
-use crate::{CanId, CobId, Duration, Frame, Instant};
+use crate::{CanId, Duration, Frame, Instant};
 
 /// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RpdoSettings {
     id: CanId,
     is_synchronous: bool,
-    /// Deadline between two receptions; zero for none.
-    deadline: Duration,
+    /// Deadline between two receptions in ms; 0 for none.
+    deadline: u16,
     content: Content,
 }
 
 impl RpdoSettings {
-    /// From a COB-ID and a transmission type as they are stored; `None` for a PDO that is not valid.
+    /// `None` for a transmission type that an RPDO cannot have.
     pub(crate) fn new(
-        cob_id: u32,
-        transmission: u8,
-        deadline: Duration,
+        id: CanId,
+        transmission: Transmission,
+        deadline: u16,
         content: Content,
     ) -> Option<RpdoSettings> {
-        let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
-        let transmission = Transmission::parse(transmission).filter(|kind| !kind.needs_remote())?;
         let is_synchronous = !transmission.is_event_driven();
-        Some(RpdoSettings { id: cob_id.id, is_synchronous, deadline, content })
+        (!transmission.needs_remote()).then_some(RpdoSettings { id, is_synchronous, deadline, content })
     }
 }
 
 impl RpdoSettings {
+    /// Whether its data waits for the SYNC.
+    pub(crate) fn is_synchronous(&self) -> bool {
+        self.is_synchronous
+    }
+
     /// Bytes that it must have.
     fn len(&self) -> usize {
         match &self.content {
@@ -71,7 +74,8 @@ impl Rpdo {
 
     /// Takes new settings and starts afresh.
     pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
-        *self = Rpdo { settings, ..Rpdo::new() };
+        self.settings = settings;
+        self.stop();
     }
 
     /// Leaving Operational.
@@ -98,7 +102,10 @@ impl Rpdo {
         if frame.len() < mapped {
             return Some(Reception::TooShort);
         }
-        self.due = if settings.deadline.is_zero() { Instant::NEVER } else { now + settings.deadline };
+        self.due = match settings.deadline {
+            0 => Instant::NEVER,
+            deadline => now + Duration::from_millis(deadline.into()),
+        };
         match (&settings.content, settings.is_synchronous) {
             (Content::Multiplexed(addressing), _) => return Some(Reception::Multiplexed(*addressing)),
             (Content::Objects(layout), false) => layout.scatter(frame.bytes(), image),

@@ -4,10 +4,10 @@
 //! nodes; in source address mode those of the object scanner list. With an event timer the timer alone sends, all of
 //! them; without one, each change does. Entering Operational sends all in both cases.
 
-use super::{Address, Addressing, Mpdo};
+use super::{Address, Addressing, Layout, Mpdo};
 use crate::dictionary::Field;
 use crate::sdo::Multiplexer;
-use crate::transmit::RETRY;
+use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
@@ -20,17 +20,19 @@ pub(crate) struct ScannerSettings {
     pub(crate) id: CanId,
     pub(crate) addressing: Addressing,
     pub(crate) own: NodeId,
-    pub(crate) inhibit: Duration,
-    pub(crate) event: Duration,
+    /// Inhibit time in 100 us.
+    pub(crate) inhibit: u16,
+    /// Event timer in ms.
+    pub(crate) event: u16,
 }
 
 impl ScannerSettings {
-    fn frame(&self, watched: &Watched, data: [u8; 4]) -> Frame {
+    fn message(self, watched: &Watched, data: [u8; 4]) -> [u8; 8] {
         let address = match self.addressing {
             Addressing::Source => Address::Source(self.own),
             Addressing::Destination => Address::Destination(None),
         };
-        Frame::data_frame(self.id, 8, Mpdo { address, at: watched.at, data }.encode())
+        Mpdo { address, at: watched.at, data }.encode()
     }
 }
 
@@ -78,18 +80,21 @@ impl Scanner {
         }
     }
 
-    /// Takes new settings and what to watch; what is beyond its room is left out.
-    pub(crate) fn configure(
-        &mut self,
-        settings: Option<ScannerSettings>,
-        watched: impl Iterator<Item = Watched>,
-    ) {
-        *self = Scanner { settings, ..Scanner::new() };
-        if settings.is_some() {
-            for watched in watched.take(WATCHED) {
-                let _ = self.watched.push(watched);
-            }
-        }
+    /// Takes new settings. It watches nothing then.
+    pub(crate) fn configure(&mut self, settings: Option<ScannerSettings>) {
+        self.settings = settings;
+        self.watched.clear();
+        self.stop();
+    }
+
+    /// Watches one more object; what is beyond its room is left out.
+    pub(crate) fn watch(&mut self, watched: Watched) {
+        let _ = self.watched.push(watched);
+    }
+
+    /// No longer watches what a TPDO carries.
+    pub(crate) fn leave_out(&mut self, layout: &Layout) {
+        self.watched.retain(|watched| !layout.contains(watched.field));
     }
 
     /// Entering Operational.
@@ -111,42 +116,42 @@ impl Scanner {
     }
 
     /// Watched values may have changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
-        if settings.event.is_zero() {
+        if settings.event == 0 {
             let changed = |watched: &Watched| watched.value(image) != watched.sent;
             let bits = self.watched.iter().zip(0..).filter(|(watched, _)| changed(watched));
             self.pending |= bits.fold(0, |pending, (_, number)| pending | bit(number));
         }
-        self.poll(image, now, out);
+        self.poll(image, turn);
     }
 
     /// Sends what is due: one after the other, as the inhibit time and the queue allow.
-    pub(crate) fn poll(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
-        let elapsed = now >= self.event_due;
+        let elapsed = turn.now >= self.event_due;
         if elapsed {
             self.pending = u64::MAX;
         }
-        if self.pending != 0 && !settings.event.is_zero() && (elapsed || self.event_due == Instant::NEVER) {
-            self.event_due = now + settings.event;
+        if self.pending != 0 && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
+            self.event_due = turn.now + Duration::from_millis(settings.event.into());
         }
         for (number, watched) in (0..).zip(&mut self.watched) {
-            if now < self.inhibited_until {
+            if turn.now < self.inhibited_until {
                 return;
             }
             if self.pending & bit(number) == 0 {
                 continue;
             }
             let data = watched.value(image);
-            if out.send(settings.frame(watched, data)).is_err() {
-                self.inhibited_until = now + RETRY;
+            if !turn.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
+                self.inhibited_until = turn.now + RETRY;
                 return;
             }
             watched.sent = data;
             self.pending &= !bit(number);
-            if !settings.inhibit.is_zero() {
-                self.inhibited_until = now + settings.inhibit;
+            if settings.inhibit != 0 {
+                self.inhibited_until = turn.now + Duration::from_inhibit(settings.inhibit);
             }
         }
         self.pending = 0;

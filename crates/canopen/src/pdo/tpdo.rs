@@ -6,8 +6,8 @@
 
 use super::{Layout, Transmission};
 use crate::sync::Sync;
-use crate::transmit::RETRY;
-use crate::{CanId, CobId, Duration, Frame, Instant, Transmit};
+use crate::transmit::{RETRY, Turn};
+use crate::{CanId, Duration, Frame, Instant, Transmit};
 
 /// What the objects 1800h.. and 1A00h.. say about a TPDO that is valid.
 #[derive(Clone, Copy, Debug)]
@@ -16,30 +16,18 @@ pub(crate) struct Settings {
     /// Whether a remote frame is answered (bit 30 of the COB-ID is 0).
     pub(crate) answers_remote: bool,
     pub(crate) transmission: Transmission,
-    pub(crate) inhibit: Duration,
-    pub(crate) event: Duration,
+    /// Inhibit time in 100 us.
+    pub(crate) inhibit: u16,
+    /// Event timer in ms.
+    pub(crate) event: u16,
     /// SYNC counter with which the count of SYNCs begins; 0 for any.
     pub(crate) sync_start: u8,
     pub(crate) layout: Layout,
 }
 
 impl Settings {
-    /// From a COB-ID and a transmission type as they are stored; `None` for a PDO that is not valid.
-    pub(crate) fn new(cob_id: u32, transmission: u8) -> Option<Settings> {
-        let cob_id = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31)?;
-        Some(Settings {
-            id: cob_id.id,
-            answers_remote: !cob_id.bit30,
-            transmission: Transmission::parse(transmission)?,
-            inhibit: Duration(0),
-            event: Duration(0),
-            sync_start: 0,
-            layout: Layout::default(),
-        })
-    }
-
     fn sends_on_change(&self) -> bool {
-        self.transmission == Transmission::Event && self.event.is_zero()
+        self.transmission == Transmission::Event && self.event == 0
     }
 }
 
@@ -76,7 +64,8 @@ impl Tpdo {
 
     /// Takes new settings and starts afresh.
     pub(crate) fn configure(&mut self, settings: Option<Settings>) {
-        *self = Tpdo { settings, ..Tpdo::new() };
+        self.settings = settings;
+        self.stop();
     }
 
     pub(crate) fn settings(&self) -> Option<&Settings> {
@@ -91,7 +80,7 @@ impl Tpdo {
     /// Entering Operational, or becoming valid in it.
     pub(crate) fn start(&mut self) {
         self.stop();
-        self.pending = self.settings.is_some_and(|settings| settings.transmission.is_event_driven());
+        self.pending = self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
     }
 
     /// Leaving Operational: nothing is due, a PDO that waits is dropped.
@@ -106,7 +95,7 @@ impl Tpdo {
     }
 
     /// A SYNC arrived.
-    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         match settings.transmission {
             Transmission::SyncCyclic(every) => {
@@ -118,37 +107,37 @@ impl Tpdo {
                 self.syncs = self.syncs.saturating_add(1);
                 if self.syncs >= every.get() {
                     self.syncs = 0;
-                    self.send(image, now, out);
+                    self.send(image, turn);
                 }
             }
-            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, now, out),
+            Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, turn),
             Transmission::SyncRemote => self.data = Some(settings.layout.gather(image)),
             _ => (),
         }
     }
 
     /// A remote frame asks for it. The synchronous types 0 to 240 belong to the SYNC and do not answer.
-    pub(crate) fn on_remote(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_remote(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = self.settings.as_ref().filter(|settings| settings.answers_remote) else {
             return;
         };
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // The client asks again if the queue is full: a sample of the past need not be kept for it.
-                let _ = out.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+                turn.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
-                self.send(image, now, out);
+                self.send(image, turn);
             }
             _ => (),
         }
     }
 
     /// Mapped values may have changed.
-    pub(crate) fn on_change(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         if self.settings.as_ref().is_some_and(Settings::sends_on_change) && self.has_changed(image) {
             self.pending = true;
-            self.poll(image, now, out);
+            self.poll(image, turn);
         }
     }
 
@@ -163,38 +152,39 @@ impl Tpdo {
     }
 
     /// Sends what is due.
-    pub(crate) fn poll(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
-        let elapsed = now >= self.event_due;
+    pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+        let elapsed = turn.now >= self.event_due;
         self.pending |= elapsed;
         if elapsed {
-            self.event_due = self.following_event(now);
+            self.event_due = self.following_event(turn.now);
         }
-        if self.pending && now >= self.inhibited_until {
-            self.send(image, now, out);
+        if self.pending && turn.now >= self.inhibited_until {
+            self.send(image, turn);
         }
     }
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
     fn following_event(&self, now: Instant) -> Instant {
-        let Some(settings) = self.settings.filter(|settings| !settings.event.is_zero()) else {
+        let Some(settings) = self.settings.as_ref().filter(|settings| settings.event != 0) else {
             return Instant::NEVER;
         };
-        let next = self.event_due + settings.event;
-        if next > now && next < Instant::NEVER { next } else { now + settings.event }
+        let period = Duration::from_millis(settings.event.into());
+        let next = self.event_due + period;
+        if self.event_due != Instant::NEVER && next > now { next } else { now + period }
     }
 
     /// Sends the present values. A full queue leaves it pending: when there is room, the values of then go out.
-    fn send(&mut self, image: &[u8], now: Instant, out: &mut impl Transmit) {
+    fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         let data = settings.layout.gather(image);
-        let sent = out.send(Frame::data_frame(settings.id, settings.layout.len(), data)).is_ok();
+        let sent = turn.send(Frame::data_frame(settings.id, settings.layout.len(), data));
         self.pending = !sent;
-        self.inhibited_until = now + if sent { settings.inhibit } else { RETRY };
+        self.inhibited_until = turn.now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
         if sent {
             self.data = Some(data);
         }
         if settings.transmission.is_event_driven() && self.event_due == Instant::NEVER {
-            self.event_due = self.following_event(now);
+            self.event_due = self.following_event(turn.now);
         }
     }
 }

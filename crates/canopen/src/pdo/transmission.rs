@@ -41,6 +41,12 @@ impl Transmission {
         matches!(self, Transmission::Timer | Transmission::Event)
     }
 
+    /// Whether the SYNC sends or samples it: 0 to 240 and 252.
+    #[must_use]
+    pub const fn is_synchronous(self) -> bool {
+        matches!(self, Transmission::SyncAcyclic | Transmission::SyncCyclic(_) | Transmission::SyncRemote)
+    }
+
     /// Whether it is only sent on a remote frame, and so makes no sense where those are not allowed.
     #[must_use]
     pub const fn needs_remote(self) -> bool {

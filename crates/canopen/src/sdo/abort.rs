@@ -1,65 +1,90 @@
 //! SDO abort codes (CiA 301, 7.2.4.3.17).
 
-/// Why a transfer was refused or given up. The discriminant is the code on the wire.
+/// Why a transfer was refused or given up. A byte in the code that passes it on; only the message has 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
 pub enum Abort {
     /// The toggle bit did not alternate.
-    Toggle = 0x0503_0000,
+    Toggle,
     /// The other side was silent for too long.
-    TimeOut = 0x0504_0000,
+    TimeOut,
     /// The command specifier is unknown or not valid now.
-    Command = 0x0504_0001,
+    Command,
     /// The block size is not 1 to 127.
-    BlockSize = 0x0504_0002,
+    BlockSize,
     /// A sequence number that cannot be.
-    Sequence = 0x0504_0003,
+    Sequence,
     /// The CRC does not match.
-    Crc = 0x0504_0004,
+    Crc,
     /// The access is not possible on this object, or not now.
-    Access = 0x0601_0000,
+    Access,
     /// An attempt to read a write-only object.
-    WriteOnly = 0x0601_0001,
+    WriteOnly,
     /// An attempt to write a read-only object.
-    ReadOnly = 0x0601_0002,
+    ReadOnly,
     /// The object does not exist.
-    NoObject = 0x0602_0000,
+    NoObject,
     /// The object cannot be mapped into the PDO.
-    NotMappable = 0x0604_0041,
+    NotMappable,
     /// The mapped objects are longer than a PDO.
-    PdoLength = 0x0604_0042,
+    PdoLength,
     /// The value contradicts that of another parameter.
-    Parameter = 0x0604_0043,
+    Parameter,
     /// The hardware has failed.
-    Hardware = 0x0606_0000,
+    Hardware,
     /// The length of the data does not match the type.
-    Length = 0x0607_0010,
+    Length,
     /// The data is longer than the type.
-    TooLong = 0x0607_0012,
+    TooLong,
     /// The data is shorter than the type.
-    TooShort = 0x0607_0013,
+    TooShort,
     /// The sub-index does not exist.
-    NoSubIndex = 0x0609_0011,
+    NoSubIndex,
     /// The value is not allowed.
-    InvalidValue = 0x0609_0030,
+    InvalidValue,
     /// The value is above the upper limit.
-    ValueTooHigh = 0x0609_0031,
+    ValueTooHigh,
     /// The value is below the lower limit.
-    ValueTooLow = 0x0609_0032,
+    ValueTooLow,
     /// Something that has no code of its own.
-    General = 0x0800_0000,
+    General,
     /// The data cannot be stored.
-    NotStored = 0x0800_0020,
+    NotStored,
     /// The data cannot be stored in the present state of the device.
-    DeviceState = 0x0800_0022,
+    DeviceState,
     /// There is no data.
-    NoData = 0x0800_0024,
+    NoData,
 }
 
 impl Abort {
     /// The code on the wire.
     #[must_use]
     pub const fn code(self) -> u32 {
-        self as u32
+        match self {
+            Abort::Toggle => 0x0503_0000,
+            Abort::TimeOut => 0x0504_0000,
+            Abort::Command => 0x0504_0001,
+            Abort::BlockSize => 0x0504_0002,
+            Abort::Sequence => 0x0504_0003,
+            Abort::Crc => 0x0504_0004,
+            Abort::Access => 0x0601_0000,
+            Abort::WriteOnly => 0x0601_0001,
+            Abort::ReadOnly => 0x0601_0002,
+            Abort::NoObject => 0x0602_0000,
+            Abort::NotMappable => 0x0604_0041,
+            Abort::PdoLength => 0x0604_0042,
+            Abort::Parameter => 0x0604_0043,
+            Abort::Hardware => 0x0606_0000,
+            Abort::Length => 0x0607_0010,
+            Abort::TooLong => 0x0607_0012,
+            Abort::TooShort => 0x0607_0013,
+            Abort::NoSubIndex => 0x0609_0011,
+            Abort::InvalidValue => 0x0609_0030,
+            Abort::ValueTooHigh => 0x0609_0031,
+            Abort::ValueTooLow => 0x0609_0032,
+            Abort::General => 0x0800_0000,
+            Abort::NotStored => 0x0800_0020,
+            Abort::DeviceState => 0x0800_0022,
+            Abort::NoData => 0x0800_0024,
+        }
     }
 }

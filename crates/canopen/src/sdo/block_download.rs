@@ -88,7 +88,7 @@ impl Receiver {
 
     /// The end of the transfer.
     pub(super) fn end(
-        mut self,
+        &mut self,
         end: BlockEnd,
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,

@@ -15,7 +15,7 @@ mod server;
 pub use abort::Abort;
 pub use block::{BlockEnd, BlockSegment, BlockSize};
 pub use bytes::Bytes;
-pub(crate) use objects::{BUFFER, Objects, Readable, Writable};
+pub(crate) use objects::{BUFFER, Objects, Writable};
 pub use request::{Initiate, Request};
 pub use response::Response;
 pub(crate) use server::Server;

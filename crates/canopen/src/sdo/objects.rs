@@ -6,14 +6,6 @@ use crate::{Instant, Part};
 /// The longest value that is handed over in one piece, and how much of a stream is.
 pub(crate) const BUFFER: usize = 64;
 
-/// What an upload reads.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Readable<'a> {
-    pub(crate) bytes: &'a [u8],
-    /// The number of the stream that it is the content of, if it is a domain.
-    pub(crate) stream: Option<u8>,
-}
-
 /// How an entry takes a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Writable {
@@ -30,15 +22,13 @@ pub(crate) trait Objects {
     const IS_SMALL: bool = false;
 
     /// The value of an entry.
-    fn read(&mut self, at: Multiplexer) -> Result<Readable<'_>, Abort>;
+    fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
     /// How the entry can be written, if it can be at all.
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort>;
     /// Replaces the value of an entry and does what follows from it.
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
     /// Whether the response to the write just made has to wait for [`Server::release`](super::Server::release); once.
     fn take_deferred(&mut self) -> bool;
-    /// What is in a stream now.
-    fn content(&self, stream: u8) -> Result<&[u8], Abort>;
     /// Hands over a part of a stream.
     fn stream(&mut self, stream: u8, part: Part<'_>) -> Result<(), Abort>;
 }
@@ -47,15 +37,17 @@ pub(crate) trait Objects {
 /// (a domain) is read piece by piece.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source {
-    stream: Option<u8>,
+    at: Multiplexer,
     len: usize,
 }
 
 impl Source {
-    pub(super) fn new(value: Readable<'_>, buffer: &mut [u8; BUFFER]) -> Source {
-        let len = value.bytes.len();
-        let snapshot = buffer.get_mut(..len).map(|place| place.copy_from_slice(value.bytes));
-        Source { stream: value.stream.filter(|_| snapshot.is_none()), len }
+    pub(super) fn new(at: Multiplexer, value: &[u8], buffer: &mut [u8; BUFFER]) -> Source {
+        let len = value.len();
+        if let Some(place) = buffer.get_mut(..len) {
+            place.copy_from_slice(value);
+        }
+        Source { at, len }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -73,10 +65,7 @@ impl Source {
         buffer: &'a [u8; BUFFER],
         objects: &'a impl Objects,
     ) -> Result<&'a [u8], Abort> {
-        let content = match self.stream {
-            Some(stream) => objects.content(stream)?,
-            None => buffer,
-        };
+        let content = if self.len <= BUFFER { buffer } else { objects.read(self.at)? };
         content.get(..self.len).ok_or(Abort::General)
     }
 

@@ -39,6 +39,9 @@ pub enum Response {
     BlockUploadEnd(BlockEnd),
 }
 
+/// Command specifier: ready for a block download whose end carries a CRC.
+const BLOCK_DOWNLOAD: u8 = 0xA4;
+
 impl Response {
     /// `None` for an unknown command specifier.
     #[must_use]
@@ -78,6 +81,11 @@ impl Response {
         }
     }
 
+    /// Whether a frame is the response to what begins a block download.
+    pub(super) fn begins_block_download(frame: [u8; 8]) -> bool {
+        frame[0] == BLOCK_DOWNLOAD
+    }
+
     /// The frame's data.
     #[must_use]
     pub fn encode(self) -> [u8; 8] {
@@ -93,7 +101,9 @@ impl Response {
             }
             Response::UploadedSegment(segment) => segment.encode(0x00),
             Response::Abort(multiplexer, code) => multiplexer.frame(0x80, code.to_le_bytes()),
-            Response::BlockDownload(multiplexer, size) => multiplexer.frame(0xA4, [size.get(), 0, 0, 0]),
+            Response::BlockDownload(multiplexer, size) => {
+                multiplexer.frame(BLOCK_DOWNLOAD, [size.get(), 0, 0, 0])
+            }
             Response::BlockAcknowledge(sequence, size) => [0xA2, sequence, size.get(), 0, 0, 0, 0, 0],
             Response::BlockDownloaded => [0xA1, 0, 0, 0, 0, 0, 0, 0],
             Response::BlockUpload { at, crc, size } => {

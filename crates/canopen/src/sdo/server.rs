@@ -23,7 +23,9 @@ pub(crate) struct Server {
     /// When the transfer last went on.
     active: Instant,
     /// The last request of this transfer that could be one of a series, and its answer.
-    previous: ([u8; 8], Option<Response>),
+    previous: ([u8; 8], Option<[u8; 8]>),
+    /// The frame of the last response.
+    reply: [u8; 8],
 }
 
 #[derive(Debug)]
@@ -33,12 +35,12 @@ enum Transfer {
     Download(Download),
     BlockUpload(Sender),
     BlockDownload(Receiver),
-    /// All has arrived; the response waits until the device has done what was asked.
-    Held(Response),
+    /// All has arrived; the reply waits until the device has done what was asked.
+    Held,
 }
 
-/// A response, or nothing to say yet.
-type Answer = Result<Option<Response>, Abort>;
+/// Whether there is a reply, or nothing to say yet.
+type Answer = Result<bool, Abort>;
 
 impl Server {
     pub(crate) const fn new() -> Server {
@@ -48,7 +50,13 @@ impl Server {
             buffer: [0; BUFFER],
             active: Instant(0),
             previous: ([0; 8], None),
+            reply: [0; 8],
         }
+    }
+
+    /// The response that was made last, as a frame.
+    pub(crate) fn reply(&self) -> [u8; 8] {
+        self.reply
     }
 
     /// When [`expire`](Server::expire) has something to do.
@@ -67,57 +75,52 @@ impl Server {
         self.previous = ([0; 8], None);
     }
 
-    /// Takes a segment within a block, which has no answer but an abort; `None` for any other frame, which is for
-    /// [`answer`](Server::answer). The deadline is not earlier afterwards.
+    /// Takes a segment within a block; whether that has a reply, which is an abort. `None` for any other frame, which is
+    /// for [`answer`](Server::answer). The deadline is not earlier afterwards.
     pub(crate) fn take_expected<O: Objects>(
         &mut self,
         frame: [u8; 8],
         objects: &mut O,
         now: Instant,
-    ) -> Option<Result<(), Response>> {
+    ) -> Option<bool> {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return None };
         if O::IS_SMALL || !receiver.expects(frame) {
             return None;
         }
         self.active = now;
         let taken = receiver.take_expected(frame, &mut self.buffer, objects);
-        Some(taken.map_err(|abort| self.give_up(abort)))
+        Some(taken.is_err_and(|abort| self.give_up(abort)))
     }
 
-    /// Answers a request.
-    pub(crate) fn answer<O: Objects>(
-        &mut self,
-        frame: [u8; 8],
-        objects: &mut O,
-        now: Instant,
-    ) -> Option<Response> {
+    /// Takes a request; whether there is a reply.
+    pub(crate) fn answer<O: Objects>(&mut self, frame: [u8; 8], objects: &mut O, now: Instant) -> bool {
         // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
         if !O::IS_SMALL && matches!(frame[0] >> 5, 1 | 2) && !self.wants_block_segments() {
             let answer = self.dispatch(frame, objects, now);
-            let answer = self.hold(answer, objects);
-            return self.settle(answer, now);
+            return self.conclude(answer, objects, now);
         }
-        if let Some(response) = self.repeated(frame) {
-            return Some(response);
+        if let Some(reply) = self.repeated(frame) {
+            self.reply = reply;
+            return true;
         }
         let answer = match self.block_segment(frame) {
             Some(segment) => self.take_block_segment(segment, objects),
             None => self.dispatch(frame, objects, now),
         };
-        let answer = self.hold(answer, objects);
-        let response = self.settle(answer, now);
-        self.previous = (frame, response);
-        response
+        let has_reply = self.conclude(answer, objects, now);
+        self.previous = (frame, has_reply.then_some(self.reply));
+        has_reply
     }
 
     /// The answer to a frame that came twice, be it that the bus repeated it or that the client missed the answer.
     /// Segments and the end of a block download change from one to the next; only they can be known as repeated, and
     /// what begins a block download, as no first segment looks like it.
-    fn repeated(&self, frame: [u8; 8]) -> Option<Response> {
-        let (previous, response) = self.previous;
+    fn repeated(&self, frame: [u8; 8]) -> Option<[u8; 8]> {
+        let (previous, reply) = self.previous;
         let changes = matches!(frame[0] >> 5, 0 | 3) || frame[0] & 0xE1 == 0xC1;
-        let is_begin = matches!(response, Some(Response::BlockDownload(..)));
-        response.filter(|_| frame == previous && (is_begin || changes && !self.wants_block_segments()))
+        let is_repeatable =
+            |reply| Response::begins_block_download(reply) || changes && !self.wants_block_segments();
+        reply.filter(|reply| frame == previous && is_repeatable(*reply))
     }
 
     fn dispatch<O: Objects>(&mut self, frame: [u8; 8], objects: &mut O, now: Instant) -> Answer {
@@ -129,7 +132,7 @@ impl Server {
             Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
             Request::Abort(..) => {
                 self.transfer = Transfer::Idle;
-                Ok(None)
+                Ok(false)
             }
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
@@ -137,64 +140,75 @@ impl Server {
             Request::BlockUpload { at, block_size, threshold, .. } => {
                 self.block_upload(at, block_size, threshold, objects)
             }
-            Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| None),
+            Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| false),
             Request::BlockAcknowledge { sequence, block_size } => {
-                let end = self.sender()?.acknowledge(sequence, block_size, is_repeated)?;
-                Ok(end.map(Response::BlockUploadEnd))
+                match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
+                    Some(end) => Ok(self.say(Response::BlockUploadEnd(end))),
+                    None => Ok(false),
+                }
             }
             // The confirmation of the end is not answered; one that was refused is refused again.
-            Request::BlockUploadEnded if is_repeated && self.previous.1.is_none() => Ok(None),
+            Request::BlockUploadEnded if is_repeated && self.previous.1.is_none() => Ok(false),
             Request::BlockUploadEnded => {
                 self.sender()?.ended()?;
                 self.transfer = Transfer::Idle;
-                Ok(None)
+                Ok(false)
             }
         }
     }
 
-    /// Keeps back the response to a write that takes its time.
-    fn hold(&mut self, answer: Answer, objects: &mut impl Objects) -> Answer {
-        match answer {
-            Ok(Some(response)) if objects.take_deferred() => {
-                self.transfer = Transfer::Held(response);
-                Ok(None)
-            }
-            answer => answer,
-        }
+    /// Makes a response: there is a reply, `true`.
+    fn say(&mut self, response: Response) -> bool {
+        self.reply = response.encode();
+        true
     }
 
-    /// The response that was kept back, if its client still waits for it.
-    pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Instant) -> Option<Response> {
-        let Transfer::Held(response) = self.transfer else { return None };
+    /// The end of a request: an error ends the transfer, and the reply to a write that takes its time is kept back.
+    fn conclude(&mut self, answer: Answer, objects: &mut impl Objects, now: Instant) -> bool {
+        let has_reply = self.settle(answer, now);
+        let is_held = answer == Ok(true) && objects.take_deferred();
+        if is_held {
+            self.transfer = Transfer::Held;
+        }
+        has_reply && !is_held
+    }
+
+    /// Whether there is a reply that was kept back and for which its client still waits.
+    pub(crate) fn release(&mut self, result: Result<(), Abort>, now: Instant) -> bool {
+        if !matches!(self.transfer, Transfer::Held) {
+            return false;
+        }
         self.transfer = Transfer::Idle;
-        self.settle(result.map(|()| Some(response)), now)
+        self.settle(result.map(|()| true), now)
     }
 
-    /// Does what the time demands: answers a block that has lost its end, or gives up the transfer.
-    pub(crate) fn expire(&mut self, now: Instant) -> Option<Response> {
+    /// Does what the time demands: answers a block that has lost its end, or gives up the transfer. Whether there is a
+    /// reply.
+    pub(crate) fn expire(&mut self, now: Instant) -> bool {
         if now < self.deadline() {
-            return None;
+            return false;
         }
         match &mut self.transfer {
             Transfer::BlockDownload(receiver)
                 if receiver.is_within_block() && now < self.active + TIME_OUT =>
             {
-                Some(Response::BlockAcknowledge(receiver.acknowledge(), BlockSize::MAX))
+                let sequence = receiver.acknowledge();
+                self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX))
             }
             _ => self.settle(Err(Abort::TimeOut), now),
         }
     }
 
     /// An error ends the transfer.
-    fn settle(&mut self, answer: Answer, now: Instant) -> Option<Response> {
+    fn settle(&mut self, answer: Answer, now: Instant) -> bool {
         self.active = now;
-        answer.unwrap_or_else(|abort| Some(self.give_up(abort)))
+        answer.unwrap_or_else(|abort| self.give_up(abort))
     }
 
     /// Ends the transfer: the one place where an error becomes an abort message.
-    fn give_up(&mut self, abort: Abort) -> Response {
+    fn give_up(&mut self, abort: Abort) -> bool {
         self.transfer = Transfer::Idle;
-        Response::Abort(self.multiplexer, abort.code())
+        self.say(Response::Abort(self.multiplexer, abort.code()))
     }
 
     /// A new transfer; one that was under way is forgotten, as its client has started over.
@@ -207,12 +221,12 @@ impl Server {
     fn upload(&mut self, at: Multiplexer, objects: &mut impl Objects) -> Answer {
         self.begin(at);
         let value = objects.read(at)?;
-        if value.bytes.len() <= 4 {
-            return Ok(Some(Response::Uploaded(at, Bytes::from_slice(value.bytes))));
+        if value.len() <= 4 {
+            return Ok(self.say(Response::Uploaded(at, Bytes::from_slice(value))));
         }
-        let source = Source::new(value, &mut self.buffer);
+        let source = Source::new(at, value, &mut self.buffer);
         self.transfer = Transfer::Upload(Upload::new(source));
-        Ok(Some(Response::UploadSegmented(at, Some(source.size()))))
+        Ok(self.say(Response::UploadSegmented(at, Some(source.size()))))
     }
 
     fn upload_segment(&mut self, toggle: bool, objects: &impl Objects) -> Answer {
@@ -221,7 +235,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        Ok(Some(Response::UploadedSegment(segment)))
+        Ok(self.say(Response::UploadedSegment(segment)))
     }
 
     fn download(
@@ -242,7 +256,7 @@ impl Server {
                 self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
             }
         }
-        Ok(Some(Response::Downloaded(at)))
+        Ok(self.say(Response::Downloaded(at)))
     }
 
     fn download_segment(&mut self, segment: &Segment, objects: &mut impl Objects, now: Instant) -> Answer {
@@ -251,7 +265,7 @@ impl Server {
         if segment.last {
             self.transfer = Transfer::Idle;
         }
-        Ok(Some(Response::DownloadedSegment { toggle: segment.toggle }))
+        Ok(self.say(Response::DownloadedSegment { toggle: segment.toggle }))
     }
 
     fn block_download(
@@ -264,7 +278,7 @@ impl Server {
         self.begin(at);
         let sink = Sink::open(at, size, objects)?;
         self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
-        Ok(Some(Response::BlockDownload(at, BlockSize::MAX)))
+        Ok(self.say(Response::BlockDownload(at, BlockSize::MAX)))
     }
 
     fn wants_block_segments(&self) -> bool {
@@ -281,18 +295,18 @@ impl Server {
 
     fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut impl Objects) -> Answer {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
-        let is_end = receiver.take(segment, &mut self.buffer, objects)?;
-        Ok(is_end.then(|| Response::BlockAcknowledge(receiver.acknowledge(), BlockSize::MAX)))
+        if !receiver.take(segment, &mut self.buffer, objects)? {
+            return Ok(false);
+        }
+        let sequence = receiver.acknowledge();
+        Ok(self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
     }
 
     fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
-        match core::mem::replace(&mut self.transfer, Transfer::Idle) {
-            Transfer::BlockDownload(receiver) => {
-                receiver.end(end, &mut self.buffer, objects, now)?;
-                Ok(Some(Response::BlockDownloaded))
-            }
-            _ => Err(Abort::Command),
-        }
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
+        receiver.end(end, &mut self.buffer, objects, now)?;
+        self.transfer = Transfer::Idle;
+        Ok(self.say(Response::BlockDownloaded))
     }
 
     /// A value of no more than `threshold` bytes goes by the simpler transfers.
@@ -304,13 +318,13 @@ impl Server {
         objects: &mut impl Objects,
     ) -> Answer {
         self.begin(at);
-        let source = Source::new(objects.read(at)?, &mut self.buffer);
+        let source = Source::new(at, objects.read(at)?, &mut self.buffer);
         if source.len() <= usize::from(threshold) {
             return self.upload(at, objects);
         }
         let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
         self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
-        Ok(Some(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
+        Ok(self.say(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
     }
 
     fn sender(&mut self) -> Result<&mut Sender, Abort> {
@@ -325,19 +339,16 @@ impl Server {
         matches!(&self.transfer, Transfer::BlockUpload(sender) if sender.is_sending())
     }
 
-    /// Sends segments of a block as long as `send` takes them.
+    /// Sends segments of a block as long as `send` takes them. Whether there is a reply, which is an abort.
     pub(crate) fn send_block(
         &mut self,
         objects: &impl Objects,
         now: Instant,
         send: impl FnMut([u8; 8]) -> bool,
-    ) -> Option<Response> {
-        let Transfer::BlockUpload(sender) = &mut self.transfer else { return None };
-        self.active = now;
-        match sender.send(&self.buffer, objects, send) {
-            Ok(()) => None,
-            Err(abort) => self.settle(Err(abort), now),
-        }
+    ) -> bool {
+        let Transfer::BlockUpload(sender) = &mut self.transfer else { return false };
+        let result = sender.send(&self.buffer, objects, send);
+        self.settle(result.map(|()| false), now)
     }
 }
 

@@ -49,6 +49,10 @@ const OPTCR_WRITABLE: u32 = 0x0FFF_FFEC;
 /// The first of the nWRP bits: a sector is protected while its bit is 0.
 const OPTCR_NWRP: u32 = 16;
 const OPTCR_DEFAULT: u32 = 0x0FFF_AAEC;
+/// RDP, and its levels with a value of their own; any other is level 1.
+const OPTCR_RDP: u32 = 8;
+const LEVEL_0: u32 = 0xAA;
+const LEVEL_2: u32 = 0xCC;
 
 /// An operation that was refused: its flag in FLASH_SR.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,8 +129,8 @@ impl Flash {
         if let Some(Work::Erase { sectors, .. }) = self.work.take() {
             self.tear(&sectors, effects);
         }
-        let fresh = Self::new(self.variant, self.write_protected());
-        *self = Self { operations: self.operations, cut_at: self.cut_at, ..fresh };
+        let fresh = Self::new(self.variant, 0);
+        *self = Self { optcr: self.optcr, operations: self.operations, cut_at: self.cut_at, ..fresh };
     }
 
     pub(crate) fn read(&self, offset: u32, now: Time) -> Option<u32> {
@@ -158,7 +162,7 @@ impl Flash {
             OPTKEYR => self.option_lock.take(value)?,
             SR => self.sr &= !(value & SR_CLEARABLE),
             CR if self.lock.is_open() => self.write_control(value, now, effects),
-            OPTCR if self.option_lock.is_open() => return Ok(self.write_options(value, now)),
+            OPTCR if self.option_lock.is_open() => return Ok(self.write_options(value, now, effects)),
             // Locked: the write has no effect.
             CR | OPTCR => {}
             _ => return Ok(None),
@@ -178,17 +182,31 @@ impl Flash {
         }
     }
 
-    /// Options take effect with OPTSTRT; the array is not changed. `None` for PCROP.
-    fn write_options(&mut self, value: u32, now: Time) -> Option<()> {
-        if bit(value, OPTCR_STRT) {
-            self.optcr = value & OPTCR_WRITABLE;
-            // The reference manual gives no time; the option bytes are erased and programmed like a small sector.
-            self.busy_until = self.free(now) + timing::sector_erase(16 * 1024, field(self.cr, 8, 2));
+    /// Options take effect with OPTSTRT. `None` for PCROP.
+    fn write_options(&mut self, value: u32, now: Time, effects: &mut VecDeque<Effect>) -> Option<()> {
+        if bit(value, OPTCR_STRT) && self.read_out_level() != LEVEL_2 {
+            self.program_options(value & OPTCR_WRITABLE, now, effects);
         }
         if bit(value, OPTCR_LOCK) {
             self.option_lock.close();
         }
         (!bit(value, 31)).then_some(())
+    }
+
+    /// From level 1 to level 0 the array is erased, write protected or not (RM0390 section 3.6.3).
+    fn program_options(&mut self, options: u32, now: Time, effects: &mut VecDeque<Effect>) {
+        let before = self.read_out_level();
+        self.optcr = options;
+        // The reference manual gives no time; the option bytes are erased and programmed like a small sector.
+        self.busy_until = self.free(now) + timing::sector_erase(16 * 1024, field(self.cr, 8, 2));
+        effects.push_back(Effect::StallFlash(self.busy_until));
+        if before != LEVEL_0 && self.read_out_level() == LEVEL_0 {
+            self.erase_all(now, effects);
+        }
+    }
+
+    fn read_out_level(&self) -> u32 {
+        field(self.optcr, OPTCR_RDP, 8)
     }
 
     fn report(&mut self, outcome: Result<(), Refused>) {

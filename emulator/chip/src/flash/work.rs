@@ -28,13 +28,23 @@ impl Flash {
         if chosen.iter().any(|&sector| self.is_protected(sector)) {
             return Err(Refused::WriteProtected);
         }
+        self.begin(chosen, time, now, effects);
+        Ok(())
+    }
+
+    /// Erases the whole array, whatever protects it.
+    pub(super) fn erase_all(&mut self, now: Time, effects: &mut VecDeque<Effect>) {
+        let time = timing::mass_erase(self.variant.flash_size(), field(self.cr, 8, 2));
+        self.begin((0..self.variant.sectors().count()).collect(), time, now, effects);
+    }
+
+    fn begin(&mut self, chosen: Vec<usize>, time: Time, now: Time, effects: &mut VecDeque<Effect>) {
         let cut = self.count(chosen.len() as u64);
         let sectors = chosen.into_iter().filter_map(|sector| self.variant.sector(sector)).collect();
         let start = self.free(now);
         self.busy_until = start + if cut { Time(time.0 / 2) } else { time };
         self.work = Some(Work::Erase { sectors, cut });
         effects.push_back(Effect::StallFlash(self.busy_until));
-        Ok(())
     }
 
     /// Counts operations; `true` when the power goes away in one of them.

@@ -7,10 +7,8 @@ use crate::support::Rig;
 
 const FLASH: u32 = 0x4002_3C00;
 const KEYR: u32 = FLASH + 0x04;
-const OPTKEYR: u32 = FLASH + 0x08;
 const SR: u32 = FLASH + 0x0C;
 const CR: u32 = FLASH + 0x10;
-const OPTCR: u32 = FLASH + 0x14;
 const BSY: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 const PG: u32 = 1;
@@ -172,20 +170,6 @@ fn a_protected_sector_is_neither_erased_nor_programmed() {
     rig.write(SR, WRPERR);
     rig.write(CR, MER | STRT);
     assert_eq!(rig.read(SR), WRPERR, "nor with all the others");
-}
-
-#[test]
-fn protection_is_set_with_the_option_bytes() {
-    let mut rig = unlocked();
-    assert_eq!(rig.read(OPTCR) >> 16 & 0xFF, 0xFF);
-    rig.write(OPTKEYR, 0x0819_2A3B);
-    rig.write(OPTKEYR, 0x4C5D_6E7F);
-    let value = rig.read(OPTCR) & !(0b11 << 16);
-    rig.write(OPTCR, value | 2);
-    wait_ready(&mut rig);
-    assert_eq!(rig.chip.flash_mut().write_protected() & 0xFF, 0b11);
-    rig.chip.reset(true, rig.now);
-    assert_eq!(rig.chip.flash_mut().write_protected() & 0xFF, 0b11, "it survives");
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod conversions;
 mod encoder;
 mod flash;
 mod others;
+mod protection;
 mod support;
 mod timers;
 mod watchdog;

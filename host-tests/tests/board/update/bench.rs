@@ -28,7 +28,7 @@ pub(super) const HEADER: u32 = 0x0801_0000;
 pub(super) const VERSION_B: Version = Version { major: 9, minor: 8, patch: 7 };
 /// How long a client waits for a response, the shortest that is known (python-canopen).
 const TIME_OUT: Time = Time::from_millis(300);
-/// What the bootloader owes while a sector erases.
+/// What the bootloader owes, whatever the flash does.
 pub(super) const PROMPT: Time = Time::from_millis(20);
 const STEP: Time = Time::from_micros(100);
 
@@ -90,6 +90,12 @@ impl Bench {
 
     pub(super) fn command(&mut self, command: u8) -> Result<(), Failure> {
         Client::new(self).write(CONTROL, &[command])
+    }
+
+    /// A frame that nobody answers, and time for what it does.
+    pub(super) fn tell(&mut self, id: u16, bytes: &[u8]) {
+        self.master.send(&mut self.world, id, bytes);
+        self.run(Time::from_millis(50));
     }
 
     /// Into the bootloader, which answers next.

@@ -1,16 +1,18 @@
-//! `nodectl update` on the bus of the emulated boards, in virtual time.
+//! The command `nodectl update` on the bus of the emulated boards, in virtual time.
 
 use std::cell::RefCell;
+use std::io;
+use std::path::Path;
 use std::rc::Rc;
 
 use canbus::{Id, Time};
-use canopen::{Duration, Frame, Instant, NodeId};
-use chip::Stm32f4;
-use emulator::Machine;
+use canopen::{Frame, Instant};
+use clap::Parser;
 use nodectl::Network;
 use nodectl::bus::{Bus, BusError, Received};
-use nodectl::sdo;
-use nodectl::update::{Error, Image, Options, Outcome, Step, Watcher, update};
+use nodectl::cli::{Cli, Output, Session};
+use serde_json::{Value, json};
+use sign::image::Image;
 use sim::world::World;
 
 use super::bench::{VERSION_B, version_a, version_b};
@@ -19,12 +21,51 @@ use crate::support::{Master, SECOND, world};
 /// Of the adapter: how often it looks for a frame.
 const STEP: Time = Time::from_micros(100);
 
-type Shared = Rc<RefCell<World>>;
+pub(super) type Shared = Rc<RefCell<World>>;
 
 /// The adapter of `nodectl`.
 struct Adapter {
     world: Shared,
     master: Master,
+    outage: Option<Outage>,
+}
+
+/// A board that is switched off in one operation of its flash, and on again.
+pub(super) struct Outage {
+    board: usize,
+    /// The number of the operation.
+    operation: u64,
+    /// When it comes back.
+    until: Option<Time>,
+}
+
+impl Outage {
+    const LENGTH: Time = Time::from_millis(8_000);
+
+    /// When the flash of this board has done half of what the download of an image takes.
+    fn halfway(world: &Shared, board: usize, image: &Image) -> Outage {
+        let words = image.to_bytes().len() as u64 / 4;
+        let done = world.borrow_mut().machine(board).peripherals_mut().flash_mut().operations();
+        Outage { board, operation: done + words / 2, until: None }
+    }
+
+    /// Whether the board is back.
+    fn is_over(&mut self, world: &mut World) -> bool {
+        let now = world.now();
+        let machine = world.machine(self.board);
+        match self.until {
+            None if machine.peripherals_mut().flash_mut().operations() >= self.operation => {
+                machine.power_off();
+                self.until = Some(now + Outage::LENGTH);
+            }
+            Some(until) if now >= until => {
+                machine.power_on(now);
+                return true;
+            }
+            _ => {}
+        }
+        false
+    }
 }
 
 impl Adapter {
@@ -56,6 +97,7 @@ impl Bus for Adapter {
             let mut world = self.world.borrow_mut();
             let next = world.now() + STEP;
             world.run_until(next);
+            self.outage.take_if(|outage| outage.is_over(&mut world));
         }
     }
 }
@@ -64,104 +106,80 @@ fn instant(time: Time) -> Instant {
     Instant(time.as_micros())
 }
 
-fn boards(count: u8) -> Shared {
+pub(super) fn boards(count: u8) -> Shared {
     let nodes: String = (1..=count).map(|node| format!(" --node {node}:pressure")).collect();
     let world = Rc::new(RefCell::new(world(&format!("--bitrate 1000{nodes}"))));
     world.borrow_mut().run_until(SECOND);
     world
 }
 
-/// `nodectl update`, forced, as A is the older version.
-fn run(
-    world: &Shared,
-    nodes: &[NodeId],
-    image: &sign::image::Image,
-    watcher: &mut dyn Watcher,
-) -> Vec<Outcome> {
+/// Takes what is printed.
+#[derive(Clone, Default)]
+struct Paper(Rc<RefCell<Vec<u8>>>);
+
+impl io::Write for Paper {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// `nodectl update --force`, as A is the older version: what it reports, a line for each node in the order in which they
+/// were done.
+pub(super) fn update(world: &Shared, nodes: &str, image: &Image, outage: Option<Outage>) -> Vec<Value> {
+    let file =
+        Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{nodes}-{:08X}.img", image.header.code_crc()));
+    std::fs::write(&file, image.to_bytes()).unwrap();
+    let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", nodes, "update", "--force"];
+    let cli = Cli::try_parse_from(line.into_iter().chain(file.to_str())).unwrap();
+
     let master = Master::join(&mut world.borrow_mut());
     let port = master.port;
-    let mut adapter = Some(Adapter { world: Rc::clone(world), master });
+    let mut adapter = Some(Adapter { world: Rc::clone(world), master, outage });
     let open = move || Ok(Box::new(adapter.take().expect("the bus is opened once")) as Box<dyn Bus>);
-    let mut network = Network::open(open).unwrap();
-    let image = Image::parse(image.to_bytes()).unwrap();
-    let options =
-        Options { sdo: sdo::Options::default(), patience: Duration::from_millis(20_000), force: true };
-    let results = update(&mut network, nodes, &image, &options, watcher);
+    let paper = Paper::default();
+    let output = Output::new(paper.clone(), cli.options.json);
+    let result = cli.run_in(&mut Session::with(Network::open(open).unwrap(), &cli.options, output));
     world.borrow_mut().close_port(port);
-    let outcome = |(node, result): (NodeId, Result<Outcome, Error>)| {
-        result.unwrap_or_else(|error| panic!("node {}: {error}", node.get()))
-    };
-    results.into_iter().map(outcome).collect()
+
+    let printed = String::from_utf8(paper.0.take()).unwrap();
+    result.unwrap_or_else(|failure| panic!("{failure}: {printed}"));
+    println!("{:6.2} s: {printed}", world.borrow().now().as_secs_f64());
+    printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// Notes the steps, and switches a board off for a while when half of the program has arrived.
-struct Switch<'a> {
-    world: &'a Shared,
-    steps: Vec<(u8, Step)>,
-    node: u8,
-    off: bool,
-    on_at: Time,
-}
-
-impl<'a> Switch<'a> {
-    fn never(world: &'a Shared) -> Switch<'a> {
-        Switch { world, steps: vec![], node: 0, off: false, on_at: Time::ZERO }
-    }
-
-    fn machine(&self, act: impl FnOnce(&mut Machine<Stm32f4>, Time)) {
-        let mut world = self.world.borrow_mut();
-        let now = world.now();
-        act(world.machine(usize::from(self.node) - 1), now);
-    }
-}
-
-impl Watcher for Switch<'_> {
-    /// The board is switched on again when another node is served and the time has come.
-    fn step(&mut self, node: NodeId, step: Step) {
-        println!("{:6.2} s  node {}: {step}", self.world.borrow().now().as_secs_f64(), node.get());
-        self.steps.push((node.get(), step));
-        if self.off && self.world.borrow().now() >= self.on_at {
-            self.off = false;
-            self.machine(Machine::power_on);
-        }
-    }
-
-    fn progress(&mut self, node: NodeId, done: usize, total: usize) {
-        if node.get() == self.node && !self.off && done > total / 2 && self.on_at == Time::ZERO {
-            self.off = true;
-            self.on_at = self.world.borrow().now() + SECOND * 8;
-            self.machine(|machine, _| machine.power_off());
-        }
-    }
+/// What is reported of a node.
+fn updated(node: u8, [from, to]: [&Image; 2]) -> Value {
+    let version = |image: &Image| image.header.description().version.to_string();
+    json!({
+        "node": node,
+        "result": "updated",
+        "old_version": version(from),
+        "old_identification": from.header.code_crc(),
+        "new_version": version(to),
+        "new_identification": to.header.code_crc(),
+        "error": null,
+    })
 }
 
 #[test]
 fn nodectl_updates_to_b_and_back() {
     let world = boards(1);
-    let nodes = [NodeId::new(1).unwrap()];
     let (a, b) = (version_a(), version_b(0));
-    let there = run(&world, &nodes, &b, &mut Switch::never(&world));
-    let back = run(&world, &nodes, &a, &mut Switch::never(&world));
-    let identifications = [&a, &b].map(|image| Some(image.header.code_crc()));
-    assert_eq!([there[0].old_identification, there[0].new_identification], identifications);
-    assert_eq!(there[0].new_version, Some(VERSION_B.to_string()));
-    assert_eq!([back[0].new_identification, back[0].old_identification], identifications);
-    assert_eq!(back[0].new_version.as_deref(), Some(env!("CARGO_PKG_VERSION")));
+    assert_eq!(b.header.description().version, VERSION_B);
+    assert_eq!(update(&world, "1", &b, None), [updated(1, [&a, &b])]);
+    assert_eq!(update(&world, "1", &a, None), [updated(1, [&b, &a])]);
 }
 
+/// The one gets its turn after the others, and is gone on with.
 #[test]
 fn four_nodes_of_which_one_is_switched_off_halfway_and_gone_on_with() {
     let world = boards(4);
-    let nodes: Vec<NodeId> = (1..=4).filter_map(NodeId::new).collect();
-    let b = version_b(0);
-    let mut switch = Switch { node: 2, ..Switch::never(&world) };
-    let outcomes = run(&world, &nodes, &b, &mut switch);
-    assert_eq!(outcomes.len(), 4);
-    for outcome in outcomes {
-        assert_eq!(outcome.new_identification, Some(b.header.code_crc()));
-        assert_eq!(outcome.old_identification, Some(version_a().header.code_crc()));
-    }
-    let lost = |of: u8| switch.steps.iter().filter(|step| **step == (of, Step::Lost)).count();
-    assert_eq!([1, 2, 3, 4].map(lost), [0, 1, 0, 0]);
-    assert_eq!(switch.steps.last(), Some(&(2, Step::Start)), "it gets its turn after the others");
+    let (a, b) = (version_a(), version_b(0));
+    let outage = Outage::halfway(&world, 1, &b);
+    let reports = update(&world, "1-4", &b, Some(outage));
+    assert_eq!(reports, [1, 3, 4, 2].map(|node| updated(node, [&a, &b])));
 }

@@ -3,7 +3,9 @@
 mod bench;
 mod corrupted;
 mod cuts;
+mod device;
 mod fleet;
+mod protected;
 
 use canbus::Time;
 use update::{HEADER_LEN, Status};
@@ -57,30 +59,26 @@ fn noise(length: usize) -> Vec<u8> {
     (0..length).map(|_| random.u8(..)).collect()
 }
 
-/// Both areas, while every sector erases.
+/// While every sector of both areas erases, and in everything between: download, check, signature, copy.
 #[test]
-fn the_bus_is_answered_while_the_flash_erases() {
+fn every_answer_of_an_update_is_prompt() {
     let mut bench = Bench::running();
     bench.stop();
-    bench.slowest = Time::ZERO;
-    bench.clear();
-    println!("slowest answer while staging is cleared: {:.2} ms", bench.slowest.as_secs_f64() * 1e3);
-    assert!(bench.slowest <= PROMPT);
-    bench.download(&version_b(0).to_bytes()).unwrap();
-    let mut slow = 0;
-    let mut worst = Time::ZERO;
-    while {
+    let image = version_b(0).to_bytes();
+    let mut slowest = |what: &str, phase: &mut dyn FnMut(&mut Bench)| {
         bench.slowest = Time::ZERO;
-        let busy = bench.status().busy;
-        worst = worst.max(bench.slowest);
-        slow += u32::from(bench.slowest > PROMPT);
-        busy
-    } {
-        bench.run(Time::from_millis(1));
-    }
-    println!("slowest answer in check and copy: {:.2} ms", worst.as_secs_f64() * 1e3);
-    assert!(slow <= 2, "only the two checks of the signature may take longer: {slow} answers did");
-    assert!(worst < Time::from_millis(100));
+        phase(&mut bench);
+        println!("slowest answer while the node {what}: {:.2} ms", bench.slowest.as_secs_f64() * 1e3);
+        assert!(bench.slowest > Time::ZERO && bench.slowest <= PROMPT, "{what}");
+    };
+    slowest("erases staging", &mut |bench| bench.clear());
+    slowest("programs what comes", &mut |bench| bench.download(&image).unwrap());
+    slowest("checks the image and copies it", &mut |bench| {
+        while bench.status().busy {
+            bench.run(Time::from_micros(500));
+        }
+    });
+    assert_eq!(bench.status(), Status::GOOD);
 }
 
 #[test]
@@ -117,15 +115,17 @@ fn an_application_that_crashes_again_and_again_stays_reachable() {
     assert_eq!(bench.read(CONTROL).unwrap(), [1], "a crash after it was well counts for itself");
 }
 
-/// The linker holds the bootloader to its budget; that of the application is printed beside it.
+/// The linker holds the bootloader to its two sectors. Another compiler must not be what breaks that.
 #[test]
 fn the_bootloader_fits_into_its_two_sectors() {
     const KIB: u32 = 1024;
+    const RESERVE: u32 = KIB;
     let mut bench = Bench::running();
     bench.stop();
     let memory = bench.world.summary(1.0, 0).nodes[0].memory;
-    println!("bootloader: {} bytes of flash, budget {}", memory.bootloader_flash, 32 * KIB);
+    let size = memory.bootloader_flash;
+    println!("bootloader: {size} bytes of flash, budget {}, free {}", 32 * KIB, 32 * KIB - size);
     println!("application: {} bytes of flash, budget {}", memory.flash, 96 * KIB);
     println!("application: {} bytes of RAM, {} of stack, budget {}", memory.ram, memory.stack, 24 * KIB);
-    assert!(memory.bootloader_flash > 0 && memory.bootloader_flash <= 32 * KIB);
+    assert!(size > 0 && size + RESERVE <= 32 * KIB);
 }

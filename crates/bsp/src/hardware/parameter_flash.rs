@@ -1,0 +1,57 @@
+//! The two pages of the parameter store as NOR flash; offset 0 is their start.
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+
+use super::flash::{Error, Flash};
+use super::memory;
+use crate::flash_area::FlashArea;
+use crate::sectors;
+
+/// The controller for those two sectors.
+pub struct ParameterFlash {
+    flash: Flash,
+    area: FlashArea,
+}
+
+impl ParameterFlash {
+    pub(super) fn new(flash: Flash) -> ParameterFlash {
+        let pages = memory::parameters();
+        ParameterFlash { flash, area: FlashArea::new(pages.start, pages) }
+    }
+}
+
+impl ErrorType for ParameterFlash {
+    type Error = Error;
+}
+
+impl ReadNorFlash for ParameterFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        self.flash.read(&self.area, offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.area.capacity()
+    }
+}
+
+impl NorFlash for ParameterFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = memory::PARAMETER_PAGE as usize;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
+        let len = to.checked_sub(from).ok_or(NorFlashErrorKind::OutOfBounds)?;
+        let start = self.area.address(from, len as usize, memory::PARAMETER_PAGE)?;
+        for address in (start..start + len).step_by(Self::ERASE_SIZE) {
+            let sector = sectors::starting_at(address).ok_or(NorFlashErrorKind::NotAligned)?;
+            self.flash.erase(sector.number)?;
+        }
+        self.flash.forget_cached();
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        self.flash.write(&self.area, offset, bytes)
+    }
+}

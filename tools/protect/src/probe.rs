@@ -1,0 +1,128 @@
+//! The registers through `probe-rs`, a call for each access: it does not reset the chip, so the lock stays open between two.
+
+use std::io;
+use std::process::{Command, ExitStatus, Stdio};
+
+use crate::option_bytes::OptionBytes;
+use crate::sequence::{OPTCR, Registers};
+
+/// Why a register could not be reached.
+#[derive(Debug, thiserror::Error)]
+pub enum ProbeError {
+    /// There is no probe-rs.
+    #[error("cannot start probe-rs (https://probe.rs): {0}")]
+    Start(io::Error),
+    /// It has said why on its standard error output.
+    #[error("`{0}` failed ({1})")]
+    Failed(String, ExitStatus),
+    /// This is not a word.
+    #[error("probe-rs has read {0:?}")]
+    Answer(String),
+}
+
+/// A chip at a debug probe.
+pub struct Probe {
+    chip: String,
+    probe: Option<String>,
+}
+
+impl Probe {
+    /// The chip by the name that probe-rs has for it; the probe by VID:PID or serial number when there are several.
+    #[must_use]
+    pub fn new(chip: String, probe: Option<String>) -> Probe {
+        Probe { chip, probe }
+    }
+
+    fn command(&self, verb: &str, address: u32, last: &str) -> Command {
+        let mut command = Command::new("probe-rs");
+        command.args([verb, "--chip", &self.chip]);
+        if let Some(probe) = &self.probe {
+            command.args(["--probe", probe]);
+        }
+        command.args(["b32", &format!("{address:#010x}"), last]);
+        command
+    }
+}
+
+impl Registers for Probe {
+    type Error = ProbeError;
+
+    fn read(&mut self, address: u32) -> Result<u32, ProbeError> {
+        let text = answer(self.command("read", address, "1"))?;
+        word(&text).ok_or(ProbeError::Answer(text))
+    }
+
+    fn write(&mut self, address: u32, value: u32) -> Result<(), ProbeError> {
+        answer(self.command("write", address, &format!("{value:#010x}"))).map(drop)
+    }
+}
+
+fn answer(mut command: Command) -> Result<String, ProbeError> {
+    let output = command.stderr(Stdio::inherit()).output().map_err(ProbeError::Start)?;
+    if !output.status.success() {
+        return Err(ProbeError::Failed(line(&command), output.status));
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// The word that probe-rs prints: eight digits, behind the address in some of its formats.
+fn word(text: &str) -> Option<u32> {
+    let digits = text.split_whitespace().next_back()?;
+    u32::from_str_radix(digits.trim_start_matches("0x"), 16).ok()
+}
+
+/// Prints the calls instead of making them, and answers as a chip that is never busy.
+pub struct DryRun {
+    probe: Probe,
+    option_bytes: u32,
+}
+
+impl DryRun {
+    /// With these option bytes.
+    #[must_use]
+    pub fn new(probe: Probe, has: OptionBytes) -> DryRun {
+        DryRun { probe, option_bytes: has.register() }
+    }
+}
+
+impl Registers for DryRun {
+    type Error = ProbeError;
+
+    fn read(&mut self, address: u32) -> Result<u32, ProbeError> {
+        println!("{}", line(&self.probe.command("read", address, "1")));
+        Ok(if address == OPTCR { self.option_bytes } else { 0 })
+    }
+
+    fn write(&mut self, address: u32, value: u32) -> Result<(), ProbeError> {
+        println!("{}", line(&self.probe.command("write", address, &format!("{value:#010x}"))));
+        if address == OPTCR {
+            self.option_bytes = OptionBytes::from_register(value).register();
+        }
+        Ok(())
+    }
+}
+
+fn line(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_word_is_found_in_what_probe_rs_prints() {
+        for text in ["0fffaaed\n", "0fffaaed \n", "0x0fffaaed", "40023c14: 0fffaaed\n"] {
+            assert_eq!(word(text), Some(0x0FFF_AAED), "{text}");
+        }
+        assert_eq!((word(""), word("no probe was found")), (None, None));
+    }
+
+    #[test]
+    fn the_calls_are_those_of_the_handbook() {
+        let probe = Probe::new("STM32F446RETx".into(), Some("0483:374b".into()));
+        let read = line(&probe.command("read", 0x4002_3C14, "1"));
+        assert_eq!(read, "probe-rs read --chip STM32F446RETx --probe 0483:374b b32 0x40023c14 1");
+    }
+}
