@@ -75,3 +75,46 @@ impl Record {
         program(flash, self.0, &[0; RECORD_LEN as usize])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mock::MockFlash;
+
+    const ERASED: [u8; 4] = [0xFF; 4];
+
+    #[test]
+    fn the_record_says_what_the_table_says() {
+        let (first, second) = (*b"COPY", *b"THIS");
+        for (words, says) in [
+            ([ERASED; 4], Commit::None),
+            ([ZERO; 4], Commit::None),
+            ([first, second, ERASED, ERASED], Commit::Torn),
+            ([first, second, ZERO, ERASED], Commit::Pending),
+            ([first, second, ZERO, ZERO], Commit::Done),
+            ([first, second, ERASED, ZERO], Commit::Torn),
+            ([first, ERASED, ERASED, ERASED], Commit::Torn),
+            ([first, ERASED, ZERO, ERASED], Commit::Torn),
+            ([ERASED, second, ZERO, ZERO], Commit::Torn),
+            ([ZERO, second, ZERO, ZERO], Commit::Torn),
+            ([ERASED, ERASED, ERASED, ZERO], Commit::Torn),
+        ] {
+            let mut flash = MockFlash::new(&[64], 1);
+            for (at, word) in (0..).step_by(4).zip(words).filter(|(_, word)| *word != ERASED) {
+                program(&mut flash, at, &word).unwrap();
+            }
+            assert_eq!(Record(0).read(&mut flash), Ok(says), "{words:?}");
+        }
+    }
+
+    #[test]
+    fn a_revoked_record_is_none_whatever_it_was() {
+        for write in [Record::write, Record::close, Record::done] {
+            let mut flash = MockFlash::new(&[64], 1);
+            write(Record(0), &mut flash).unwrap();
+            Record(0).revoke(&mut flash).unwrap();
+            assert_eq!(Record(0).read(&mut flash), Ok(Commit::None));
+            assert_eq!(flash.bytes()[..16], [0; 16]);
+        }
+    }
+}

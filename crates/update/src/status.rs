@@ -107,6 +107,20 @@ mod tests {
     }
 
     #[test]
+    fn the_detail_is_what_the_node_expects_or_a_count() {
+        for (refusal, detail) in [
+            (Refusal::Product { expected: 0x1234_5678 }, 0x5678),
+            (Refusal::Hardware { revision: 3 }, 3),
+            (Refusal::Counter { least: 9 }, 9),
+            (Refusal::Counter { least: 70_000 }, u16::MAX),
+            (Refusal::Crashes { count: 5 }, 5),
+            (Refusal::Signature, 0),
+        ] {
+            assert_eq!(Status::refused(refusal).detail, detail, "{refusal}");
+        }
+    }
+
+    #[test]
     fn no_refusal_is_ok_and_each_code_has_words_of_its_own() {
         let mut texts: Vec<_> = ALL.map(|refusal| (refusal.code(), refusal.to_string())).to_vec();
         texts.dedup();

@@ -75,6 +75,12 @@ mod tests {
     }
 
     #[test]
+    fn the_word_is_the_count_and_its_complement_three_times() {
+        assert_eq!(Trial(0).word(), 0xFFFF_FF00);
+        assert_eq!(Trial(0x12).word(), 0xEDED_ED12);
+    }
+
+    #[test]
     fn only_crashes_count_and_only_until_a_confirmation() {
         let trial =
             [Reset::Crash, Reset::Asked, Reset::Crash].into_iter().fold(Trial::default(), Trial::after);

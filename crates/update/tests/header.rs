@@ -46,6 +46,15 @@ fn a_change_of_any_byte_is_refused() {
     });
 }
 
+#[test]
+fn a_wrong_crc_is_told_from_a_wrong_content() {
+    check((header(), 8..HEADER_LEN, 1..=u8::MAX), |(header, at, change)| {
+        let mut bytes = header.encode();
+        bytes[at] ^= change;
+        assert_eq!(Header::parse(&bytes), Err(Refusal::HeaderCrc), "byte {at}");
+    });
+}
+
 /// Whatever is accepted, with a good CRC over anything, is what the parsed value encodes to: nothing is left open.
 #[test]
 fn what_is_parsed_encodes_to_the_same_bytes() {

@@ -45,6 +45,7 @@ fn the_machine_says_what_it_does_and_the_bootloader_stays_responsive() {
     }
     let erasing = seen.iter().filter(|next| **next == Next::Erasing).count();
     assert!(erasing >= 4, "two sectors, each for several polls: {seen:?}");
+    assert!(seen.contains(&Next::Step), "then it is read, whether it is erased: {seen:?}");
     assert_eq!((updater.phase(), updater.status()), (Phase::Cleared, Status::GOOD));
     updater.begin(None).unwrap();
     updater.receive(&image_b().bytes()).unwrap();
@@ -62,6 +63,17 @@ fn the_machine_says_what_it_does_and_the_bootloader_stays_responsive() {
     run(&mut updater).unwrap();
     assert_eq!((updater.phase(), updater.status()), (Phase::Installed, Status::GOOD));
     assert_starts(&mut flash, &image_b());
+}
+
+#[test]
+fn a_program_is_identified_once_it_was_found_good() {
+    let mut flash = flash_with(&image_a(), 1);
+    let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
+    assert_eq!(updater.identification(), None);
+    download(&mut updater, &image_b().bytes()).unwrap();
+    assert_eq!(updater.identification(), Some(image_b().header.code_crc()));
+    updater.clear().unwrap();
+    assert_eq!(updater.identification(), None, "it is lost");
 }
 
 #[test]

@@ -67,6 +67,11 @@ impl Consumer {
         self.entries.iter().filter_map(|entry| entry.watch.map(Watch::id))
     }
 
+    /// The nodes that it watches, entry by entry.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = Option<NodeId>> {
+        self.entries.iter().map(|entry| entry.watch.map(|watch| watch.node))
+    }
+
     /// Takes a heartbeat or a boot-up message.
     pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Option<Change> {
         if frame.len() != 1 || frame.is_remote() {
