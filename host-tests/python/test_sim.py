@@ -115,6 +115,8 @@ def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
     simulator = Simulator("--bitrate", "1000", "--pressure", "ramp:100000,200000,4")
     master = Master(simulator)
     tpdo = master.listen(0x181)
+    # A heartbeat or the boot-up message: it listens.
+    master.listen(0x701).next()
     master.write(0x1800, 5, 100, 2)
     master.node.nmt.send_command(0x01)
     for _ in range(10):
