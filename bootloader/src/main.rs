@@ -25,6 +25,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 
 #[rtic::app(device = bsp::pac, peripherals = true)]
 mod app {
+    use bsp::filters::Fifo;
     use bsp::loader::Loader;
     use bsp::losses::Losses;
     use bsp::{ReceiveQueue, Receiver, TimeInterrupt, application};
@@ -62,7 +63,7 @@ mod app {
         };
         let bus = loader.rest.start();
         let lost: &'static Losses = cx.local.lost;
-        let (receiver, frames) = Receiver::new(1, cx.local.queue, lost);
+        let (receiver, frames) = Receiver::new(Fifo::Services, cx.local.queue, lost);
         let run = Run {
             session: Session::new(reason, note, loader.flash, bus.can),
             frames,

@@ -1,7 +1,7 @@
 //! What waits for a mailbox: in the order in which it was said. The bootloader sends no process data that would have to go
 //! first.
 
-use bsp::can::Transmitter;
+use bsp::Transmitter;
 use canopen::{Frame, QueueFull, Transmit};
 
 /// A response, a heartbeat, LSS, and as much again: whoever asks waits for the answer.
@@ -24,10 +24,10 @@ impl Outbox {
 
     /// Moves frames into free mailboxes.
     pub(crate) fn pump(&mut self, transmitter: &mut Transmitter) {
-        while let Some(Some(frame)) = self.frames.get(self.first)
-            && transmitter.put(frame)
+        while let Some(place) = self.frames.get_mut(self.first)
+            && place.as_ref().is_some_and(|frame| transmitter.put(frame))
         {
-            self.frames[self.first] = None;
+            *place = None;
             self.first = (self.first + 1) % CAPACITY;
         }
     }

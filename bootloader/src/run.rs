@@ -1,8 +1,7 @@
 //! The one loop of the bootloader.
 
-use bsp::can::Transmitter;
 use bsp::led::Led;
-use bsp::{Alarm, Clock, Frames, StartUpWatchdog};
+use bsp::{Alarm, Clock, Frames, StartUpWatchdog, Transmitter};
 use canopen::{Duration, Instant};
 use cortex_m::peripheral::SCB;
 

@@ -52,13 +52,14 @@ defmt::timestamp!("{=u64:us}", bsp::Clock::now().0);
 mod app {
     use core::mem::MaybeUninit;
 
-    use bsp::can::Transmitter;
+    use bsp::filters::Fifo;
     use bsp::losses::Losses;
     use bsp::reset_cause::ResetCause;
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
     use bsp::{
-        BackupMemory, Board, Buttons, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Watchdog,
+        BackupMemory, Board, Buttons, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Transmitter,
+        Watchdog,
     };
     use node::{EncoderBoard, FactoryCalibration, Measurement, Parameters, Parcel, Protocol};
 
@@ -116,8 +117,9 @@ mod app {
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = EncoderBoard { watchdog_reset, ..EncoderBoard::default() };
         let lost: &'static Losses = cx.local.lost;
-        let (receiver_process, process_frames) = Receiver::new(0, cx.local.process_queue, lost);
-        let (receiver_services, service_frames) = Receiver::new(1, cx.local.services_queue, lost);
+        let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);
+        let (receiver_services, service_frames) =
+            Receiver::new(Fifo::Services, cx.local.services_queue, lost);
         let [process_alarm, mut services_alarm] = board.alarms;
         services_alarm.set(Clock::now() + FIRST_SAMPLE);
         let parameters = Some(protocol.prepare());

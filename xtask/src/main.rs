@@ -1,6 +1,7 @@
 //! Build, run and test the project. `cargo xtask --help` lists the commands; `cargo sim` is `cargo xtask sim`.
 
 mod bench;
+mod callgraph;
 mod command;
 mod coverage;
 mod eds;
@@ -70,6 +71,14 @@ enum Command {
     Mutants(mutants::Flags),
     /// Print what each task of the firmware takes at worst, and when it ends at the latest
     Timing,
+    /// Print which code of the images can panic, and why it does not
+    Panics,
+    /// Print how deep the stack of each image can get
+    Stack {
+        /// Show the functions of each way
+        #[arg(long)]
+        paths: bool,
+    },
     /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
     Test {
         /// Run only the steps whose name contains this text
@@ -91,6 +100,8 @@ fn main() -> ExitCode {
         Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),
         Command::Mutants(flags) => mutants::print(&flags).map(|()| ExitCode::SUCCESS),
         Command::Timing => timing::print().map(|()| ExitCode::SUCCESS),
+        Command::Panics => callgraph::panics().map(|()| ExitCode::SUCCESS),
+        Command::Stack { paths } => callgraph::stack(paths).map(|()| ExitCode::SUCCESS),
         Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {

@@ -14,6 +14,10 @@ use crate::native;
 /// The target of both images: Cortex-M4 with its FPU.
 pub(crate) const TRIPLE: &str = "thumbv7em-none-eabihf";
 
+/// Has the compiler note what each function takes of the stack, in a section that is not flashed; `cargo xtask stack` adds it
+/// up. A stable compiler knows the flag with `RUSTC_BOOTSTRAP` only.
+const STACK_SIZES: &str = "target.thumbv7em-none-eabihf.rustflags = ['-Zemit-stack-sizes']";
+
 const DEBIAN_PACKAGES: [&str; 5] = ["rustc-web", "rust-web-src", "cargo-web", "rust-web-clippy", "lld-22"];
 
 /// A toolchain that can build for [`TRIPLE`].
@@ -50,10 +54,10 @@ impl Toolchain {
             Toolchain::Debian { .. } => Command::new("/usr/bin/cargo"),
         };
         command.current_dir(root()).arg(verb).args(["--target", TRIPLE]).args(args);
+        command.args(["--config", STACK_SIZES]).env("RUSTC_BOOTSTRAP", "1");
         if let Toolchain::Debian { linker } = self {
             command
                 .arg("-Zbuild-std=core")
-                .env("RUSTC_BOOTSTRAP", "1")
                 .env("RUSTC", "/usr/bin/rustc")
                 .env("RUSTDOC", "/usr/bin/rustdoc")
                 .env("PATH", debian_first())

@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use crate::command::{cargo, root, run};
 use crate::steps::Steps;
 use crate::target::Toolchain;
-use crate::{bench, images, native, python, sim};
+use crate::{bench, callgraph, images, native, python, sim};
 
 /// The packages that only build for the embedded target.
 const IMAGES: [&str; 5] = ["firmware", "bootloader", "mechanics-images", "panic-free", "bench-images"];
@@ -23,6 +23,8 @@ fn run_all(steps: &mut Steps) -> Result<()> {
     steps.run("lint images", lint_images)?;
     steps.run("other chips", other_chips)?;
     steps.run("no panic", no_panic)?;
+    steps.run("no panic in the images", callgraph::check_panics)?;
+    steps.run("stack", || callgraph::stack(false))?;
     steps.run("test host", || run(with_images(&mut host("test"))))?;
     steps.run("performance", bench::check)?;
     steps.run("test python", test_python)

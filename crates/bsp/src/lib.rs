@@ -6,7 +6,7 @@
 #![no_std]
 // On the host, where only the modules without hardware are: values are cut to the width of a register everywhere else.
 #![cfg_attr(not(target_os = "none"), warn(clippy::pedantic))]
-#![warn(clippy::undocumented_unsafe_blocks)]
+#![deny(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 pub mod back_off;
 pub mod bit_rate_detection;
@@ -33,6 +33,7 @@ pub mod transmit_queue;
 pub mod vectors;
 
 #[cfg(target_os = "none")]
+#[expect(unsafe_code, reason = "registers, memory by its address, the fault handler")]
 mod hardware;
 
 #[cfg(target_os = "none")]

@@ -1,4 +1,4 @@
-//! A frame in the registers of a receive mailbox (RM0390, 30.9.3).
+//! A frame in the registers of a mailbox (RM0390, 30.9.3); those of a transmit mailbox have the same layout.
 //!
 //! bxcan's own reception is not used: it takes the length code as it comes, and a code of 9 to 15, which any node may
 //! send for eight bytes (ISO 11898-1, 10.4.2.4), makes it index out of range.
@@ -6,7 +6,8 @@
 use canopen::Frame;
 
 const EXTENDED: u32 = 1 << 2;
-const REMOTE: u32 = 1 << 1;
+/// RTR.
+pub(crate) const REMOTE: u32 = 1 << 1;
 
 /// The registers RIR, RDTR, RDLR and RDHR.
 #[derive(Clone, Copy, Debug)]

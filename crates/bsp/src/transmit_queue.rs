@@ -71,8 +71,16 @@ impl TransmitQueue {
         self.insert(self.frames.partition_point(|other| other.id() >= frame.id()), frame)
     }
 
+    /// Moves what is behind the place one further. `Vec::insert` panics at a place behind the end.
     fn insert(&mut self, index: usize, frame: Frame) -> Result<(), QueueFull> {
-        self.frames.insert(index, frame).map_err(|_| QueueFull)
+        if self.frames.is_full() {
+            return Err(QueueFull);
+        }
+        let mut moved = frame;
+        for place in self.frames.iter_mut().skip(index) {
+            core::mem::swap(place, &mut moved);
+        }
+        self.frames.push(moved).map_err(|_| QueueFull)
     }
 }
 

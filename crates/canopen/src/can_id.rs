@@ -33,6 +33,7 @@ impl CanId {
     /// Whether no configurable service may use it: NMT, SDO, error control, and the ranges that
     /// CiA 301 reserves (7.3.5, restricted CAN-IDs).
     #[must_use]
+    #[inline(never)]
     pub const fn is_restricted(self) -> bool {
         matches!(self.0, 0x000..=0x07F | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..)
     }

@@ -209,7 +209,6 @@ mod tests {
         }
         assert!(is_good_to_salty(&hash, &signature, &key));
         assert!(!is_good(&hash, CONTEXT, &signature, &key));
-        let order: [u8; LEN] = ORDER;
-        assert!(!is_reduced(&order) && is_reduced(&[0; LEN]));
+        assert!(!is_reduced(&ORDER) && is_reduced(&[0; LEN]));
     }
 }

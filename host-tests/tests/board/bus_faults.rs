@@ -77,6 +77,36 @@ fn a_participant_with_a_wrong_bit_rate_is_outlived() {
     assert!(after.nodes[0].incidents.is_empty(), "{after}");
 }
 
+/// For two minutes somebody sends nothing but a frame that comes before all of the node's: it is silent all the time, goes on
+/// measuring, and is back with the first gap.
+#[test]
+fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
+    const BIT_RATE: u32 = 125_000;
+    const MORE_URGENT: u16 = 0x001;
+    const MINUTES: u64 = 2;
+    /// More than 100 ms of frames of eight bytes.
+    const FRAMES: usize = 120;
+    let mut world = world("--bitrate 125");
+    let babbler = Master::join_at(&mut world, BIT_RATE);
+    let before = run(&mut world, SECOND * 2).nodes[0].clone();
+    for step in 0..MINUTES * 600 {
+        let waiting = if step == 0 { 2 * FRAMES } else { FRAMES };
+        (0..waiting).for_each(|_| babbler.send(&mut world, MORE_URGENT, &[0x55; 8]));
+        world.run_until(world.now() + Time::from_millis(100));
+    }
+    let during = run(&mut world, Time::ZERO);
+    let node = &during.nodes[0];
+    assert_eq!(node.sampling.samples - before.sampling.samples, MINUTES * 60_000, "{during}");
+    assert!(node.heard.heartbeats - before.heard.heartbeats <= 1, "it found a gap: {during}");
+    assert_eq!((node.receiving.lost, during.bus.errors), (0, 0), "{during}");
+    world.close_port(babbler.port);
+    let back = run(&mut world, SECOND * 2).nodes[0].clone();
+    let after = run(&mut world, SECOND * 5);
+    let node = &after.nodes[0];
+    assert_eq!(node.heard.heartbeats - back.heard.heartbeats, 5, "{after}");
+    assert!(node.heard.boot_ups == 1 && node.incidents.is_empty(), "{after}");
+}
+
 /// A babbling node leaves no gap on the bus for half a minute: what the node wants to send waits, and nothing is lost but
 /// the time.
 #[test]

@@ -9,9 +9,19 @@ use crate::support::{Master, SECOND, comes_back, run, running, world};
 /// Timer 2, the time base: its counter (RM0390, 17.4.10) and its interrupt.
 const TIM2_CNT: u32 = 0x4000_0024;
 const TIM2: u32 = 28;
-/// The application's vector table (memory.x), and an instruction that never ends.
+/// The interrupts of the services and of the sampling.
+const CAN1_SCE: u32 = 22;
+const DMA2_STREAM0: u32 = 56;
+/// The application's vector table (memory.x), an instruction that never ends, and one that there is not.
 const VECTORS: u32 = 0x0801_0200;
 const BRANCH_TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
+/// UDF #0.
+const UNDEFINED: [u8; 2] = [0x00, 0xDE];
+/// EMCY code for a reset that nobody asked for (object 3000h:3, bit 6).
+const UNEXPECTED_RESET: u16 = 0x6101;
+/// RAM of the chip (RM0390, 2.3.1).
+const RAM: u32 = 0x2000_0000;
+const RAM_SIZE: usize = 128 * 1024;
 /// Control register 2 of the converter: 0 switches it off (RM0390, 13.13.3).
 const ADC1_CR2: u32 = 0x4001_2008;
 /// The parameter pages (memory.x).
@@ -38,12 +48,33 @@ fn a_dead_converter_is_ended_by_the_watchdog() {
 #[test]
 fn an_interrupt_without_end_is_ended_by_the_watchdog() {
     let mut world = running();
+    run_broken(&mut world, TIM2, BRANCH_TO_ITSELF);
+    let after = run(&mut world, SECOND * 4);
+    let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
+    assert!(log.concat().contains("reset by independent watchdog"), "{log:?}");
+    assert!(after.nodes[0].heard.boot_ups == 2 && after.nodes[0].heard.heartbeats > 1, "{after}");
+}
+
+/// Each of the tasks that run by themselves meets an undefined instruction: the crash record names the place.
+#[test]
+fn a_fault_in_a_task_ends_in_a_recorded_reset() {
+    for irq in [TIM2, CAN1_SCE, DMA2_STREAM0] {
+        let mut world = running();
+        let handler = run_broken(&mut world, irq, UNDEFINED);
+        let log = comes_back(&mut world);
+        assert!(log.contains(&format!("fault at {handler:#010x}")), "interrupt {irq}: {log}");
+        assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET), "interrupt {irq}: {log}");
+    }
+}
+
+/// Puts an instruction in place of the first one of a handler, until that has ended in a reset. Gives the address.
+fn run_broken(world: &mut World, irq: u32, instruction: [u8; 2]) -> u32 {
     let mut vector = [0; 4];
-    world.machine(0).read(VECTORS + 4 * (16 + TIM2), &mut vector).unwrap();
+    world.machine(0).read(VECTORS + 4 * (16 + irq), &mut vector).unwrap();
     let handler = u32::from_le_bytes(vector) & !1;
     let mut code = [0; 2];
     world.machine(0).read(handler, &mut code).unwrap();
-    world.machine(0).write(handler, &BRANCH_TO_ITSELF).unwrap();
+    world.machine(0).write(handler, &instruction).unwrap();
     // The bootloader starts no application that was changed, so the code must be as it was before its CRC is computed.
     let reset = (0..1000).find(|_| {
         world.run_until(world.now() + Time::from_millis(1));
@@ -51,10 +82,7 @@ fn an_interrupt_without_end_is_ended_by_the_watchdog() {
     });
     world.machine(0).write(handler, &code).unwrap();
     assert!(reset.is_some(), "nobody has ended it");
-    let after = run(&mut world, SECOND * 4);
-    let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
-    assert!(log.concat().contains("reset by independent watchdog"), "{log:?}");
-    assert!(after.nodes[0].heard.boot_ups == 2 && after.nodes[0].heard.heartbeats > 1, "{after}");
+    handler
 }
 
 /// Without the crystal the node never gets on the bus, and the watchdog has it try again and again.
@@ -95,6 +123,27 @@ fn the_time_goes_on_where_its_counter_wraps() {
 /// The power fails in each phase of a save: the node has what was saved before or what was saved now.
 #[test]
 fn a_save_that_the_power_cuts_is_made_or_not_made() {
+    cut_saves(|world| {
+        let now = world.now();
+        world.machine(0).power_on(now);
+    });
+}
+
+/// The supply fails for so short a time that RAM keeps what is in it: the note for the bootloader and the crash record, too.
+#[test]
+fn a_save_that_a_brown_out_cuts_is_made_or_not_made() {
+    cut_saves(|world| {
+        let mut kept = vec![0; RAM_SIZE];
+        let now = world.now();
+        let machine = world.machine(0);
+        machine.read(RAM, &mut kept).unwrap();
+        machine.power_on(now);
+        machine.write(RAM, &kept).unwrap();
+    });
+}
+
+/// Cuts one save after the other, each at a later operation of the flash, and restarts the node in this way.
+fn cut_saves(restart: impl Fn(&mut World)) {
     const OLD: [u8; 4] = [1, 2, 3, 4];
     const NEW: [u8; 4] = [5, 6, 7, 8];
     /// Every operation is cut in the tests of the store itself.
@@ -112,9 +161,8 @@ fn a_save_that_the_power_cuts_is_made_or_not_made() {
         master.send(&mut world, 0x601, &SAVE);
         world.run_until(world.now() + Time::from_millis(100));
         let is_saved = !master.heard(&mut world, 0x581).is_empty();
-        let now = world.now();
-        world.machine(0).power_on(now);
-        world.run_until(now + SECOND);
+        restart(&mut world);
+        world.run_until(world.now() + SECOND);
         let answer = master.ask(&mut world, 1, &[0x40, 0, 0x40, 1, 0, 0, 0, 0]);
         match &answer[4..] {
             value if value == OLD => found[0] += 1,

@@ -10,6 +10,7 @@ mod faults;
 mod lift;
 mod measuring;
 mod running;
+mod stack;
 mod support;
 mod timing;
 mod update;

@@ -21,7 +21,7 @@ pub(crate) const LSS_RESPONSE: u16 = 0x7E4;
 pub(crate) const START_ALL: (u16, [u8; 2]) = (0x000, [1, 0]);
 
 /// Where the ELF files are: $NODE_IMAGES, or where cargo puts them.
-fn images() -> PathBuf {
+pub(crate) fn images() -> PathBuf {
     let target = std::env::var_os("CARGO_TARGET_DIR")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("target"), PathBuf::from);
     let built = || target.join("thumbv7em-none-eabihf/release");

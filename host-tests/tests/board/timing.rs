@@ -129,7 +129,7 @@ fn response(tasks: &[(Task, Measured)], place: usize) -> Option<f64> {
 }
 
 /// As much as the bus can carry: every TPDO with every SYNC, RPDOs, SDO transfers, a save, and frames of others.
-fn busy_run() -> World {
+pub(crate) fn busy_run() -> World {
     let mut world = world("--node 1:combined --bitrate 1000 --load 100");
     let master = Master::join(&mut world);
     world.run_until(SECOND);

@@ -7,7 +7,7 @@ use stm32f4xx_hal::rcc::{Config, Rcc};
 
 use super::ParameterFlash;
 use super::backup::BackupMemory;
-use super::can::{Controller, Transmitter};
+use super::can::Controller;
 use super::digital::{Buttons, Lamps};
 use super::encoder::{self, Encoder};
 use super::flash::Flash;
@@ -15,6 +15,7 @@ use super::led::Led;
 use super::sampling::{Parts, Sampling};
 use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
+use super::transmit::Transmitter;
 use super::watchdog::StartUpWatchdog;
 use crate::bit_timing::APB1_HZ;
 use crate::kept::Found;

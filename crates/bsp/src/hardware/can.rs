@@ -1,18 +1,17 @@
-//! CAN1: bring-up, filters, state, and the transmit mailboxes.
+//! CAN1: bring-up, filters and state. The mailboxes are in `transmit` and `receive`.
 
 use bxcan::filter::Mask16;
-use bxcan::{Data, Interrupts, StandardId};
-use canopen::Frame;
+use bxcan::{Interrupts, StandardId};
 use stm32f4xx_hal::can::Can as Pins;
 use stm32f4xx_hal::gpio::{PB8, PB9};
 use stm32f4xx_hal::pac::{CAN1, can1};
 use stm32f4xx_hal::rcc::Rcc;
 
+use super::transmit::Transmitter;
 use crate::bit_rate_detection::Heard;
 use crate::bit_timing::BitTiming;
 use crate::bus_state::BusState;
 use crate::filters::{self, BANKS, Bank, Fifo, Pair};
-use crate::transmit_queue::{Mailboxes, Offer};
 
 /// The registers as bxcan wants them.
 pub(crate) struct Registers;
@@ -46,9 +45,8 @@ impl Controller {
     /// Takes the peripheral and its pins, and leaves the bus alone until [`Controller::start`].
     pub(crate) fn new(can: CAN1, tx: PB9, rx: PB8, rcc: &mut Rcc) -> (Controller, Transmitter) {
         let pins = Pins::new(can, (tx, rx), rcc);
-        let (transmit, ..) = bxcan::Can::builder(Registers).leave_disabled().split();
         let can = bxcan::Can::builder(Registers).leave_disabled();
-        (Controller { can, _pins: pins }, Transmitter(transmit))
+        (Controller { can, _pins: pins }, Transmitter::new())
     }
 
     /// Goes on the bus, again when it was there: drops what is in the mailboxes and takes new timing and filters. Error
@@ -106,7 +104,7 @@ impl Controller {
     pub fn set_filters(&mut self, banks: &[Bank]) {
         let mut filters = self.can.modify_filters();
         filters.set_split(BANKS as u8).clear();
-        for (index, bank) in (0..).zip(banks) {
+        for (index, bank) in (0..BANKS as u8).zip(banks) {
             filters.enable_bank(index, fifo(bank.fifo), masks(bank));
         }
     }
@@ -149,85 +147,4 @@ fn masks(bank: &Bank) -> [Mask16; 2] {
 
 fn standard(id: u16) -> StandardId {
     StandardId::new(id).unwrap_or(StandardId::MAX)
-}
-
-/// The transmit mailboxes.
-pub struct Transmitter(bxcan::Tx<Registers>);
-
-impl Transmitter {
-    /// Acknowledges the transmit interrupt. To be called before the queue is pumped: a mailbox that becomes free later
-    /// interrupts again.
-    pub fn acknowledge(&mut self) {
-        self.0.clear_interrupt_flags();
-    }
-
-    /// Whether all mailboxes are empty: everything that was sent is on the wire.
-    pub fn is_idle(&self) -> bool {
-        let status = registers().tsr().read();
-        status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
-    }
-}
-
-/// TIxR: the place of the identifier, a remote frame, and the request to transmit (RM0390, 30.9.3).
-const STID: u32 = 21;
-const RTR: u32 = 1 << 1;
-const TXRQ: u32 = 1 << 0;
-
-impl Transmitter {
-    /// Puts a frame into the first mailbox, if that is free. For whoever uses no other: frames keep their order then.
-    pub fn put(&mut self, frame: &Frame) -> bool {
-        if registers().tsr().read().tme0().bit_is_clear() {
-            return false;
-        }
-        let mailbox = registers().tx(0);
-        let data = frame.data().iter().rev().fold(0, |word: u64, byte| word << 8 | u64::from(*byte));
-        let [low, high] = [data as u32, (data >> 32) as u32];
-        let remote = if frame.is_remote() { RTR } else { 0 };
-        // SAFETY: DLC, data and identifier take any value.
-        unsafe {
-            mailbox.tdtr().write(|w| w.bits(frame.len() as u32));
-            mailbox.tdlr().write(|w| w.bits(low));
-            mailbox.tdhr().write(|w| w.bits(high));
-            mailbox.tir().write(|w| w.bits(u32::from(frame.id()) << STID | remote | TXRQ));
-        }
-        true
-    }
-}
-
-impl Mailboxes for Transmitter {
-    fn offer(&mut self, frame: &Frame) -> Offer {
-        if would_wait() {
-            return Offer::Refused;
-        }
-        match self.0.transmit(&outgoing(frame)) {
-            Err(_) => Offer::Refused,
-            Ok(status) => status.dequeued_frame().and_then(replaced).map_or(Offer::Taken, Offer::Replaced),
-        }
-    }
-}
-
-/// With all mailboxes full bxcan takes a pending frame back, and when that frame is on the wire it waits for its end, up to
-/// 13 ms at 10 kbit/s. So nothing is taken back while the controller transmits; the interrupt at the end comes soon.
-fn would_wait() -> bool {
-    let status = registers().tsr().read();
-    let full = status.tme0().bit_is_clear() && status.tme1().bit_is_clear() && status.tme2().bit_is_clear();
-    full && registers().msr().read().txm().bit_is_set()
-}
-
-fn outgoing(frame: &Frame) -> bxcan::Frame {
-    let id = standard(frame.id());
-    if frame.is_remote() {
-        bxcan::Frame::new_remote(id, frame.len() as u8)
-    } else {
-        bxcan::Frame::new_data(id, Data::new(frame.data()).unwrap_or(Data::empty()))
-    }
-}
-
-/// A frame that bxcan hands back: always one that [`outgoing`] made.
-fn replaced(frame: &bxcan::Frame) -> Option<Frame> {
-    let bxcan::Id::Standard(id) = frame.id() else { return None };
-    match frame.data() {
-        Some(data) => Frame::new(id.as_raw(), data),
-        None => Frame::remote(id.as_raw(), frame.dlc()),
-    }
 }

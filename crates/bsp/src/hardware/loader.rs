@@ -5,10 +5,11 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use update::Reset;
 
-use super::can::{Controller, Transmitter};
+use super::can::Controller;
 use super::flash::Flash;
 use super::led::Led;
 use super::time_base::{self, Alarm, TimeInterrupt};
+use super::transmit::Transmitter;
 use super::{ProgramFlash, StartUpWatchdog, board, clock_tree, crash};
 use crate::reset_cause::ResetCause;
 

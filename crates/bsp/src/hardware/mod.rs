@@ -21,6 +21,7 @@ pub mod retained;
 mod sampling;
 mod ssi;
 mod time_base;
+mod transmit;
 mod watchdog;
 
 pub use backup::BackupMemory;
@@ -34,6 +35,7 @@ pub use sampling::{Sampling, Sums};
 pub use ssi::Ssi;
 pub use stm32f4xx_hal::pac;
 pub use time_base::{Alarm, Clock, TimeInterrupt};
+pub use transmit::Transmitter;
 pub use watchdog::{StartUpWatchdog, Watchdog};
 
 // The logger of every image.

@@ -35,7 +35,7 @@ pub(crate) fn start(_tim2: TIM2, rcc: &mut Rcc) -> (TimeInterrupt, [Alarm; 2]) {
     tim2.sr().reset();
     tim2.dier().write(|w| w.uie().set_bit().cc1ie().set_bit().cc2ie().set_bit().cc3ie().set_bit());
     tim2.cr1().write(|w| w.cen().set_bit());
-    (TimeInterrupt(()), [Alarm { compare: 0 }, Alarm { compare: 1 }])
+    (TimeInterrupt(()), [Alarm(Compare::First), Alarm(Compare::Second)])
 }
 
 /// Time since start-up.
@@ -53,8 +53,13 @@ impl Clock {
 
 /// One compare channel.
 #[derive(Debug)]
-pub struct Alarm {
-    compare: usize,
+pub struct Alarm(Compare);
+
+/// The channels that are alarms, by their index among the registers.
+#[derive(Clone, Copy, Debug)]
+enum Compare {
+    First = 0,
+    Second = 1,
 }
 
 impl Alarm {
@@ -63,10 +68,10 @@ impl Alarm {
     #[expect(clippy::cast_possible_truncation, reason = "the hardware compares the low half")]
     pub fn set(&mut self, deadline: Instant) {
         let deadline = deadline.min(Clock::now() + FARTHEST);
-        registers().ccr(self.compare).write(|w| w.ccr().set(deadline.0 as u32));
+        registers().ccr(self.0 as usize).write(|w| w.ccr().set(deadline.0 as u32));
         // The counter may have passed the value before it was written: then no match comes for 71 minutes.
         if Clock::now() >= deadline {
-            registers().egr().write(|w| w.ccg(self.compare as u8).set_bit());
+            registers().egr().write(|w| w.ccg(self.0 as u8).set_bit());
         }
     }
 }

@@ -40,7 +40,7 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
-        entry.check_value(bytes)?;
+        entry.check_value(value)?;
         self.admit(&entry, value, bytes)?;
         if !entry.rule().is_computed() && !entry.rule().is_command() {
             entry.field.set(&mut self.image, bytes);
@@ -75,6 +75,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     /// An integer of at most 32 bits; 0 where the dictionary has no such entry.
+    #[inline(never)]
     pub(super) fn number(&self, index: u16, sub: u8) -> u32 {
         self.number_or(index, sub, 0)
     }

@@ -38,11 +38,13 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         if turn.now >= core.process_due {
             core.poll_sync(turn.now);
-            core.poll_rpdos(turn.now);
-            core.each_tpdo(core.valid_tpdos, |tpdo, image| tpdo.poll(image, turn));
+            let mut due = core.poll_rpdos(turn.now);
+            core.each_tpdo(core.valid_tpdos, |tpdo, image| {
+                tpdo.poll(image, turn);
+                due = due.min(tpdo.due());
+            });
             core.scanner.poll(&core.image, turn);
-            let pdos = core.next_tpdo().min(core.next_rpdo()).min(core.scanner.due());
-            core.process_due = pdos.min(core.sync.due());
+            core.process_due = due.min(core.scanner.due()).min(core.sync.due());
         }
         core.process_due
     }
@@ -79,11 +81,6 @@ impl<A: Application, const N: usize> Core<A, N> {
         } else {
             self.on_rpdo(frame, turn.now);
         }
-    }
-
-    fn next_tpdo(&self) -> Instant {
-        let valid = self.valid_tpdos.iter().filter_map(|number| self.tpdos.get(usize::from(number)));
-        valid.map(Tpdo::due).fold(Instant::NEVER, Instant::min)
     }
 
     /// Visits some TPDOs. What one of them could not send at once moves the next deadline.

@@ -49,14 +49,19 @@ impl<A: Application, const N: usize> Core<A, N> {
         if active { self.raise(fault, now) } else { self.clear(fault, now) }
     }
 
-    /// Looks for RPDOs that are missing.
-    pub(super) fn poll_rpdos(&mut self, now: Instant) {
+    /// Looks for RPDOs that are missing. The next instant at which one is.
+    pub(super) fn poll_rpdos(&mut self, now: Instant) -> Instant {
+        let mut due = Instant::NEVER;
         for number in self.valid_rpdos.iter() {
-            if self.rpdos.get_mut(usize::from(number)).is_some_and(|rpdo| rpdo.expire(now)) {
+            let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return due };
+            if rpdo.expire(now) {
                 self.raise(Fault::RpdoDeadline(number), now);
                 self.faulty_rpdos.set(number, true);
+            } else {
+                due = due.min(rpdo.due());
             }
         }
+        due
     }
 
     /// A PDO that is configured anew, or that is no longer received, has no faults.
@@ -65,11 +70,6 @@ impl<A: Application, const N: usize> Core<A, N> {
             self.clear(fault, now);
         }
         self.faulty_rpdos.set(number, false);
-    }
-
-    pub(super) fn next_rpdo(&self) -> Instant {
-        let valid = self.valid_rpdos.iter().filter_map(|number| self.rpdos.get(usize::from(number)));
-        valid.map(Rpdo::due).fold(Instant::NEVER, Instant::min)
     }
 }
 

@@ -26,7 +26,6 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-    #[inline(never)]
     fn on_sdo(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
@@ -37,7 +36,9 @@ impl<A: Application, const N: usize> Device<A, N> {
             return;
         }
         let has_reply = self.server.answer(request, &mut self.core, turn.now);
-        self.core.services_due = self.core.services_due.min(self.server.deadline());
+        if !self.server.is_idle() {
+            self.core.services_due = self.core.services_due.min(self.server.deadline());
+        }
         // A reply that still waits is obsolete: its client has gone on.
         self.reply_due = Instant::NEVER;
         if has_reply {
@@ -64,9 +65,11 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// Sends the server's reply.
     pub(super) fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let id = self.core.service(SDO_RESPONSE);
-        let is_sent = turn.send(Frame::data_frame(id, 8, self.server.reply()));
-        self.reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };
-        self.core.services_due = self.core.services_due.min(self.reply_due);
+        self.reply_due = Instant::NEVER;
+        if !turn.send(Frame::data_frame(id, 8, self.server.reply())) {
+            self.reply_due = turn.now + RETRY;
+            self.core.services_due = self.core.services_due.min(self.reply_due);
+        }
     }
 
     /// Sends what is due. Returns the instant of the next call.

@@ -49,9 +49,9 @@ impl<A: Application, const N: usize> Core<A, N> {
             return Err(Abort::InvalidValue);
         }
         let Some(watch) = Watch::parse(value) else { return Ok(()) };
-        let mut others = (1..=WATCHES).filter(|&sub| sub != entry.sub());
-        let is_double = |sub| self.watch(sub).is_some_and(|other| other.node == watch.node);
-        if others.any(is_double) { Err(Abort::Parameter) } else { Ok(()) }
+        let mut others = self.watches.nodes().zip(1..).filter(|(_, sub)| *sub != entry.sub());
+        let is_double = others.any(|(node, _)| node == Some(watch.node));
+        if is_double { Err(Abort::Parameter) } else { Ok(()) }
     }
 
     fn watch(&self, sub: u8) -> Option<Watch> {
@@ -66,6 +66,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     pub(super) fn configure_watches(&mut self, now: Instant) {
-        (1..=WATCHES).for_each(|sub| self.configure_watch(sub, now));
+        for number in 0..WATCHES {
+            self.configure_watch(number + 1, now);
+        }
     }
 }

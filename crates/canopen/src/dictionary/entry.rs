@@ -63,12 +63,12 @@ impl Entry {
         }
     }
 
-    /// Checks a value of the right length that is to be written.
-    pub(crate) fn check_value(&self, bytes: &[u8]) -> Result<(), Abort> {
+    /// Checks a value of the right length that is to be written, by its first four bytes.
+    pub(crate) fn check_value(&self, value: u32) -> Result<(), Abort> {
         match self.attributes.kind {
             Type::VisibleString(_) | Type::Domain | Type::Unsigned48 | Type::Unsigned64 => Ok(()),
-            Type::Real32 => check_real(f32::from_bits(little_endian(bytes))),
-            kind => self.attributes.check_limits(kind.ordered(little_endian(bytes))),
+            Type::Real32 => check_real(f32::from_bits(value)),
+            kind => self.attributes.check_limits(kind.ordered(value)),
         }
     }
 }

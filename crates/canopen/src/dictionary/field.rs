@@ -44,7 +44,7 @@ impl Field {
     /// Eight bytes from the start of the value; those beyond the image are zero.
     pub(crate) fn eight(self, image: &[u8]) -> [u8; 8] {
         let rest = image.get(usize::from(self.offset)..).unwrap_or(&[]);
-        rest.first_chunk().copied().unwrap_or_else(|| Bytes::from_slice(rest).padded())
+        rest.first_chunk().copied().unwrap_or_else(|| padded(rest))
     }
 
     /// The first `K` bytes from the start of the value.
@@ -84,4 +84,10 @@ impl Field {
     pub fn f32(self, image: &[u8]) -> f32 {
         f32::from_le_bytes(self.load(image))
     }
+}
+
+/// The last bytes of an image, then zeros.
+#[inline(never)]
+fn padded(rest: &[u8]) -> [u8; 8] {
+    Bytes::from_slice(rest).padded()
 }

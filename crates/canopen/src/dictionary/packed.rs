@@ -12,6 +12,7 @@
 //! later keep their defaults. A set that names an object which is gone, has another size or no longer takes the value
 //! is refused as a whole.
 
+use super::entry::little_endian;
 use super::{DefaultValue, Dictionary, Entry, Group, Object};
 use crate::NodeId;
 use crate::sdo::Abort;
@@ -105,7 +106,7 @@ impl Dictionary {
         if entry.attributes.group != group || value.len() != usize::from(entry.field.size) {
             return Err(Abort::Length);
         }
-        entry.check_value(value)?;
+        entry.check_value(little_endian(value))?;
         entry.field.set(image, value);
         Ok(())
     }

@@ -89,6 +89,7 @@ impl Producer {
     }
 
     /// The error register, object 1001h.
+    #[inline(never)]
     pub(crate) fn register(&self) -> u8 {
         self.active.register()
     }

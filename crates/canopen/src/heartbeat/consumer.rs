@@ -37,7 +37,7 @@ pub(crate) enum Change {
 
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    watch: Watch,
+    watch: Option<Watch>,
     /// `NEVER` until the first heartbeat, and while it is lost.
     due: Instant,
     is_lost: bool,
@@ -46,47 +46,54 @@ struct Entry {
 /// Watches up to [`WATCHES`] nodes. Each is watched from its first heartbeat on.
 #[derive(Debug)]
 pub(crate) struct Consumer {
-    entries: [Option<Entry>; WATCHES as usize],
+    entries: [Entry; WATCHES as usize],
 }
 
 impl Consumer {
     pub(crate) const fn new() -> Consumer {
-        Consumer { entries: [None; WATCHES as usize] }
+        let unused = Entry { watch: None, due: Instant::NEVER, is_lost: false };
+        Consumer { entries: [unused; WATCHES as usize] }
     }
 
     /// Takes an entry of 1016h, from 0. The watch starts afresh.
     pub(crate) fn configure(&mut self, number: usize, watch: Option<Watch>) {
         if let Some(entry) = self.entries.get_mut(number) {
-            *entry = watch.map(|watch| Entry { watch, due: Instant::NEVER, is_lost: false });
+            *entry = Entry { watch, due: Instant::NEVER, is_lost: false };
         }
     }
 
     /// Identifiers of the heartbeats that it watches.
     pub(crate) fn ids(&self) -> impl Iterator<Item = CanId> {
-        self.entries.iter().flatten().map(|entry| entry.watch.id())
+        self.entries.iter().filter_map(|entry| entry.watch.map(Watch::id))
     }
 
-    fn numbered(&mut self) -> impl Iterator<Item = (u8, &mut Entry)> {
-        (0..).zip(&mut self.entries).filter_map(|(number, entry)| Some((number, entry.as_mut()?)))
+    /// The nodes that it watches, entry by entry.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = Option<NodeId>> {
+        self.entries.iter().map(|entry| entry.watch.map(|watch| watch.node))
     }
 
     /// Takes a heartbeat or a boot-up message.
     pub(crate) fn take(&mut self, frame: &Frame, now: Instant) -> Option<Change> {
-        let is_heartbeat = frame.len() == 1 && !frame.is_remote();
-        let (number, entry) =
-            self.numbered().find(|(_, entry)| is_heartbeat && entry.watch.id().get() == frame.id())?;
-        entry.due = now + Duration::from_millis(entry.watch.period.into());
-        core::mem::take(&mut entry.is_lost).then_some(Change::Back(number))
+        if frame.len() != 1 || frame.is_remote() {
+            return None;
+        }
+        for (number, entry) in (0..).zip(&mut self.entries) {
+            if let Some(watch) = entry.watch.filter(|watch| watch.id().get() == frame.id()) {
+                entry.due = now + Duration::from_millis(watch.period.into());
+                return core::mem::take(&mut entry.is_lost).then_some(Change::Back(number));
+            }
+        }
+        None
     }
 
     /// The next instant at which a heartbeat is missing.
     pub(crate) fn due(&self) -> Instant {
-        self.entries.iter().flatten().map(|entry| entry.due).min().unwrap_or(Instant::NEVER)
+        self.entries.iter().fold(Instant::NEVER, |due, entry| due.min(entry.due))
     }
 
     /// A heartbeat that is missing. To be asked until there is none.
     pub(crate) fn expire(&mut self, now: Instant) -> Option<Change> {
-        let (number, entry) = self.numbered().find(|(_, entry)| now >= entry.due)?;
+        let (number, entry) = (0..).zip(&mut self.entries).find(|(_, entry)| now >= entry.due)?;
         (entry.due, entry.is_lost) = (Instant::NEVER, true);
         Some(Change::Lost(number))
     }

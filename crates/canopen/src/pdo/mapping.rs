@@ -148,6 +148,7 @@ impl Layout {
 }
 
 /// The first eight bytes of the values in a row.
+#[inline(never)]
 fn join(places: &[Field], image: &[u8]) -> [u8; 8] {
     let (mut data, mut at) = ([0; 16], 0);
     for place in places {

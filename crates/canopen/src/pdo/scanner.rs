@@ -63,7 +63,9 @@ impl Watched {
 pub(crate) struct Scanner {
     settings: Option<ScannerSettings>,
     watched: Vec<Watched, WATCHED>,
-    /// Which of them are to be sent, a bit each.
+    /// Which of them no other TPDO carries, a bit each.
+    own: u64,
+    /// Which of these are to be sent.
     pending: u64,
     event_due: Instant,
     inhibited_until: Instant,
@@ -74,6 +76,7 @@ impl Scanner {
         Scanner {
             settings: None,
             watched: Vec::new(),
+            own: 0,
             pending: 0,
             event_due: Instant::NEVER,
             inhibited_until: Instant(0),
@@ -84,6 +87,7 @@ impl Scanner {
     pub(crate) fn configure(&mut self, settings: Option<ScannerSettings>) {
         self.settings = settings;
         self.watched.clear();
+        self.own = u64::MAX;
         self.stop();
     }
 
@@ -94,14 +98,18 @@ impl Scanner {
 
     /// No longer watches what a TPDO carries.
     pub(crate) fn leave_out(&mut self, layout: &Layout) {
-        self.watched.retain(|watched| !layout.contains(watched.field));
+        for (number, watched) in (0..).zip(&self.watched) {
+            if layout.contains(watched.field) {
+                self.own &= !bit(number);
+            }
+        }
     }
 
     /// Entering Operational.
     pub(crate) fn start(&mut self) {
         self.stop();
         if self.settings.is_some() {
-            self.pending = u64::MAX;
+            self.pending = self.own;
         }
     }
 
@@ -121,7 +129,7 @@ impl Scanner {
         if settings.event == 0 {
             let changed = |watched: &Watched| watched.value(image) != watched.sent;
             let bits = self.watched.iter().zip(0..).filter(|(watched, _)| changed(watched));
-            self.pending |= bits.fold(0, |pending, (_, number)| pending | bit(number));
+            self.pending |= bits.fold(0, |pending, (_, number)| pending | bit(number)) & self.own;
         }
         self.poll(image, turn);
     }
@@ -131,17 +139,17 @@ impl Scanner {
         let Some(settings) = &self.settings else { return };
         let elapsed = turn.now >= self.event_due;
         if elapsed {
-            self.pending = u64::MAX;
+            self.pending = self.own;
         }
         if self.pending != 0 && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
             self.event_due = turn.now + Duration::from_millis(settings.event.into());
         }
         for (number, watched) in (0..).zip(&mut self.watched) {
-            if turn.now < self.inhibited_until {
-                return;
-            }
             if self.pending & bit(number) == 0 {
                 continue;
+            }
+            if turn.now < self.inhibited_until {
+                return;
             }
             let data = watched.value(image);
             if !turn.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {

@@ -8,13 +8,14 @@ impl PdoSet {
     pub(crate) const EMPTY: PdoSet = PdoSet(0);
 
     /// Puts a number in or takes it out. Numbers above 7 are in no set.
+    #[inline(never)]
     pub(crate) fn set(&mut self, number: u8, contains: bool) {
         let bit = 1_u8.checked_shl(number.into()).unwrap_or(0);
         self.0 = if contains { self.0 | bit } else { self.0 & !bit };
     }
 
     pub(crate) fn contains(self, number: u8) -> bool {
-        self.iter().any(|other| other == number)
+        self.0.checked_shr(number.into()).unwrap_or(0) & 1 != 0
     }
 
     /// The numbers in the set, ascending.

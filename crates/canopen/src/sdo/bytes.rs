@@ -19,6 +19,7 @@ impl<const N: usize> Bytes<N> {
 
     /// The first bytes of a slice, at most `N`.
     #[must_use]
+    #[inline]
     pub fn from_slice(bytes: &[u8]) -> Bytes<N> {
         if let Some(full) = bytes.first_chunk() {
             return Bytes { len: Self::CAPACITY, data: *full };

@@ -88,6 +88,7 @@ impl Response {
 
     /// The frame's data.
     #[must_use]
+    #[inline]
     pub fn encode(self) -> [u8; 8] {
         match self {
             Response::Downloaded(multiplexer) => multiplexer.frame(0x60, [0; 4]),

@@ -59,6 +59,11 @@ impl Server {
         self.reply
     }
 
+    /// Whether no transfer is under way.
+    pub(crate) fn is_idle(&self) -> bool {
+        matches!(self.transfer, Transfer::Idle)
+    }
+
     /// When [`expire`](Server::expire) has something to do.
     pub(crate) fn deadline(&self) -> Instant {
         match &self.transfer {
@@ -158,6 +163,7 @@ impl Server {
     }
 
     /// Makes a response: there is a reply, `true`.
+    #[inline]
     fn say(&mut self, response: Response) -> bool {
         self.reply = response.encode();
         true

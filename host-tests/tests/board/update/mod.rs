@@ -10,6 +10,7 @@ mod protected;
 use canbus::Time;
 use update::{HEADER_LEN, Status};
 
+use crate::stack::assert_bound;
 use crate::support::SECOND;
 use bench::{
     BOOT, Bench, CONTROL, DEVICE_TYPE, HEADER, IDENTIFICATION, PROMPT, START, signed, version_a, version_b,
@@ -113,6 +114,19 @@ fn an_application_that_crashes_again_and_again_stays_reachable() {
     bench.machine().set_register(PC, 0x3000_0000);
     bench.run(SECOND);
     assert_eq!(bench.read(CONTROL).unwrap(), [1], "a crash after it was well counts for itself");
+}
+
+/// The signature takes most.
+#[test]
+fn the_bootloader_stays_within_the_bound_of_its_stack() {
+    let mut bench = Bench::new("--bitrate 250", 250_000, 126);
+    bench.machine().write(HEADER, &[0xFF; 1024]).unwrap();
+    bench.power_cycle();
+    bench.run(SECOND);
+    bench.clear();
+    bench.download(&version_a().to_bytes()).unwrap();
+    assert_eq!(bench.wait_for_flash(), Status::GOOD);
+    assert_bound(&bench.world, &["bootloader"]);
 }
 
 /// The linker holds the bootloader to its two sectors. Another compiler must not be what breaks that.

@@ -1,0 +1,123 @@
+//! The transmit mailboxes of CAN1 (RM0390, 30.7.1).
+//!
+//! bxcan's own transmission is not used: it panics at a number of a mailbox and a length that a register could hold.
+
+use canopen::Frame;
+use stm32f4xx_hal::pac::can1::TX;
+
+use super::can::registers;
+use crate::mailbox::{Mailbox, REMOTE};
+use crate::transmit_queue::{Mailboxes, Offer};
+
+/// TIxR: the place of the identifier and the request to transmit (RM0390, 30.9.3). Shifted, identifier and RTR are in the
+/// order in which the bus prefers them.
+const STID: u32 = 21;
+const TXRQ: u32 = 1 << 0;
+
+/// TSR of mailbox 0: transmission OK and abort request; those of the next mailbox are a byte further on (RM0390, 30.9.2).
+const TXOK: u32 = 1 << 1;
+const ABRQ: u32 = 1 << 7;
+
+/// The transmit mailboxes.
+pub struct Transmitter(());
+
+impl Transmitter {
+    /// There is one.
+    pub(super) fn new() -> Transmitter {
+        Transmitter(())
+    }
+
+    /// Acknowledges the transmit interrupt. To be called before the queue is pumped: a mailbox that becomes free later
+    /// interrupts again.
+    pub fn acknowledge(&mut self) {
+        registers().tsr().write(|w| w.rqcp0().set_bit().rqcp1().set_bit().rqcp2().set_bit());
+    }
+
+    /// Whether all mailboxes are empty: everything that was sent is on the wire.
+    pub fn is_idle(&self) -> bool {
+        let status = registers().tsr().read();
+        status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
+    }
+
+    /// Puts a frame into the first mailbox, if that is free. For whoever uses no other: frames keep their order then.
+    pub fn put(&mut self, frame: &Frame) -> bool {
+        let is_free = registers().tsr().read().tme0().bit_is_set();
+        if is_free {
+            load(registers().tx(0), frame);
+        }
+        is_free
+    }
+}
+
+impl Mailboxes for Transmitter {
+    /// Among equal identifiers the hardware prefers the mailbox of the lower number, not the frame that came first, so a
+    /// frame waits for those of its own identifier.
+    fn offer(&mut self, frame: &Frame) -> Offer {
+        if would_wait() || pending().any(|(_, other)| order(other) <= identifier(frame)) {
+            return Offer::Refused;
+        }
+        if let Some(free) = registers().tx_iter().find(|mailbox| !is_pending(mailbox)) {
+            load(free, frame);
+            return Offer::Taken;
+        }
+        let Some((number, last)) = pending().max_by_key(|(_, mailbox)| order(mailbox)) else {
+            return Offer::Refused;
+        };
+        let replaced = take_back(number, last);
+        load(last, frame);
+        replaced.map_or(Offer::Taken, Offer::Replaced)
+    }
+}
+
+/// Mailboxes with a frame that is not sent yet, with their numbers.
+fn pending() -> impl Iterator<Item = (u32, &'static TX)> {
+    (0..).zip(registers().tx_iter()).filter(|(_, mailbox)| is_pending(mailbox))
+}
+
+fn is_pending(mailbox: &TX) -> bool {
+    mailbox.tir().read().txrq().bit_is_set()
+}
+
+/// What the arbitration goes by, lowest first.
+fn order(mailbox: &TX) -> u32 {
+    mailbox.tir().read().bits() & !TXRQ
+}
+
+fn identifier(frame: &Frame) -> u32 {
+    u32::from(frame.id()) << STID | if frame.is_remote() { REMOTE } else { 0 }
+}
+
+/// With all mailboxes full a frame that waits is taken back, and when that frame is on the wire, it takes up to its end: 13 ms
+/// at 10 kbit/s. So nothing is taken back while the controller transmits; the interrupt at the end comes soon.
+fn would_wait() -> bool {
+    let full = registers().tx_iter().all(is_pending);
+    full && registers().msr().read().txm().bit_is_set()
+}
+
+/// Takes a frame out of its mailbox; `None` when it was sent meanwhile.
+fn take_back(number: u32, mailbox: &TX) -> Option<Frame> {
+    let flags = 8 * number;
+    // SAFETY: the other bits of TSR are cleared by writing 1, so 0 leaves them.
+    registers().tsr().write(|w| unsafe { w.bits(ABRQ << flags) });
+    while registers().tsr().read().bits() & ABRQ << flags != 0 {}
+    let is_sent = registers().tsr().read().bits() & TXOK << flags != 0;
+    let content = Mailbox {
+        rir: mailbox.tir().read().bits(),
+        rdtr: mailbox.tdtr().read().bits(),
+        rdlr: mailbox.tdlr().read().bits(),
+        rdhr: mailbox.tdhr().read().bits(),
+    };
+    if is_sent { None } else { content.frame() }
+}
+
+fn load(mailbox: &TX, frame: &Frame) {
+    let data = frame.data().iter().rev().fold(0, |word: u64, byte| word << 8 | u64::from(*byte));
+    let [low, high] = [data as u32, (data >> 32) as u32];
+    // SAFETY: DLC, data and identifier take any value.
+    unsafe {
+        mailbox.tdtr().write(|w| w.bits(frame.len() as u32));
+        mailbox.tdlr().write(|w| w.bits(low));
+        mailbox.tdhr().write(|w| w.bits(high));
+        mailbox.tir().write(|w| w.bits(identifier(frame) | TXRQ));
+    }
+}

@@ -1,0 +1,78 @@
+//! Which function can call which.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::code::{Body, Decoder, Way};
+use crate::image::Image;
+
+/// The functions of an image, by their start.
+pub(crate) struct Graph(BTreeMap<u32, Body>);
+
+/// The deepest that the stack gets below a function, and through which functions.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Depth {
+    pub(crate) bytes: u32,
+    /// From the outermost: start and bytes of each.
+    pub(crate) path: Vec<(u32, u32)>,
+}
+
+impl Graph {
+    pub(crate) fn of(image: &Image<'_>) -> Result<Graph> {
+        let decoder = Decoder::new()?;
+        let bodies = image.functions().map(|function| Ok((function.start, decoder.body(image, function)?)));
+        Ok(Graph(bodies.collect::<Result<_>>()?))
+    }
+
+    pub(crate) fn bodies(&self) -> impl Iterator<Item = (u32, &Body)> {
+        self.0.iter().map(|(&start, body)| (start, body))
+    }
+
+    /// Out of this function.
+    pub(crate) fn ways(&self, start: u32) -> impl Iterator<Item = &Way> {
+        self.0.get(&start).into_iter().flat_map(|body| &body.ways)
+    }
+
+    /// The deepest use of the stack from this function on. A function that calls itself, by whatever way, has none.
+    pub(crate) fn depth(&self, image: &Image<'_>, start: u32) -> Result<Depth> {
+        self.search(image, start, &mut BTreeMap::new())
+    }
+
+    /// `None` in `known` stands for a function whose search has not ended.
+    fn search(
+        &self,
+        image: &Image<'_>,
+        start: u32,
+        known: &mut BTreeMap<u32, Option<Depth>>,
+    ) -> Result<Depth> {
+        let name = || image.function_at(start).map_or("?", |function| function.name.as_str());
+        if let Some(depth) = known.get(&start) {
+            return depth.clone().with_context(|| format!("{} calls itself", name()));
+        }
+        known.insert(start, None);
+        let mut below = Depth::default();
+        for way in self.ways(start) {
+            let other = self.search(image, way.to, known).with_context(|| format!("called by {}", name()))?;
+            below = below.max(other);
+        }
+        let own = self.frame(image, start)?;
+        let path = [(start, own)].into_iter().chain(below.path).collect();
+        let depth = Depth { bytes: own + below.bytes, path };
+        known.insert(start, Some(depth.clone()));
+        Ok(depth)
+    }
+
+    /// What the compiler has noted, or what the instructions take: that is more where the compiler has moved a part of the
+    /// function out of it afterwards and saves a register around the call.
+    pub(crate) fn frame(&self, image: &Image<'_>, start: u32) -> Result<u32> {
+        let function = image.function_at(start).context("not in the image")?;
+        let body = self.0.get(&start).with_context(|| format!("nothing is known of {}", function.name))?;
+        ensure!(
+            function.noted.is_some() || !body.is_variable,
+            "nothing tells the stack of {}",
+            function.name
+        );
+        Ok(function.noted.unwrap_or(0).max(body.stack))
+    }
+}

@@ -1,0 +1,133 @@
+//! Which calls lead to a panic, and whether each of them is known.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::path::Path;
+
+use addr2line::Loader;
+use anyhow::{Result, anyhow, ensure};
+
+use crate::graph::Graph;
+use crate::image::Image;
+use crate::lists::Known;
+
+/// The sources of the core library, wherever they lie.
+const CORE: &str = "/library/core/src/";
+/// What the compiler has moved out of several functions, to have it once.
+const OUTLINED: &str = "OUTLINED_FUNCTION_";
+/// The panic handler.
+const HANDLER: &str = "__rustc::rust_begin_unwind";
+
+/// A function of the source and a place in it; several are inlined into each other.
+struct Frame {
+    function: String,
+    file: String,
+    line: u32,
+}
+
+/// A call that leads to a panic, in code that is not of the core library.
+pub(crate) struct Site {
+    at: u32,
+    /// The innermost first.
+    frames: Vec<Frame>,
+}
+
+impl Site {
+    /// The innermost function that is not of the core library.
+    pub(crate) fn function(&self) -> &str {
+        let own = self.frames.iter().find(|frame| !frame.file.contains(CORE)).or(self.frames.first());
+        own.map_or("?", |frame| frame.function.trim_start_matches(['<', '&']))
+    }
+}
+
+impl Site {
+    fn is(&self, known: &Known) -> bool {
+        let panic = self.frames.first().map_or("", |frame| &frame.function);
+        self.function().starts_with(known.function) && panic.starts_with(known.panic)
+    }
+}
+
+impl fmt::Display for Site {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:#010x}", self.at)?;
+        self.frames
+            .iter()
+            .try_for_each(|Frame { function, file, line }| write!(f, "\n    in {function}, {file}:{line}"))
+    }
+}
+
+/// Every such call of an image.
+pub(crate) fn sites(path: &Path, image: &Image<'_>, graph: &Graph) -> Result<Vec<Site>> {
+    let loader = Loader::new(path).map_err(|error| anyhow!("{}: {error}", path.display()))?;
+    let panics = panics(image, graph, &loader)?;
+    ensure!(!panics.is_empty(), "{} has no panic handler", path.display());
+    let mut sites = vec![];
+    for (_, body) in graph.bodies().filter(|(start, _)| !panics.contains(start)) {
+        for way in body.ways.iter().filter(|way| panics.contains(&way.to)) {
+            sites.push(Site { at: way.at, frames: frames(&loader, way.at)? });
+        }
+    }
+    Ok(sites)
+}
+
+/// Everything between the code that can panic and the handler: functions of the core library that call it, and so on.
+fn panics(image: &Image<'_>, graph: &Graph, loader: &Loader) -> Result<BTreeSet<u32>> {
+    let mut between = BTreeSet::new();
+    let mut panics = BTreeSet::new();
+    for function in image.functions() {
+        let outermost = frames(loader, function.start)?.pop();
+        if function.name.starts_with(OUTLINED) || outermost.is_some_and(|frame| frame.file.contains(CORE)) {
+            between.insert(function.start);
+        }
+        if function.name.starts_with("core::panicking::") || function.name == HANDLER {
+            panics.insert(function.start);
+        }
+    }
+    loop {
+        let leads = |start: &u32| graph.ways(*start).any(|way| panics.contains(&way.to));
+        let more: Vec<u32> =
+            between.iter().copied().filter(|start| !panics.contains(start) && leads(start)).collect();
+        if more.is_empty() {
+            return Ok(panics);
+        }
+        panics.extend(more);
+    }
+}
+
+fn frames(loader: &Loader, address: u32) -> Result<Vec<Frame>> {
+    let mut found =
+        loader.find_frames(address.into()).map_err(|error| anyhow!("{address:#010x}: {error}"))?;
+    let mut frames = vec![];
+    while let Some(frame) = found.next()? {
+        let name = frame.function.and_then(|name| name.demangle().ok().map(String::from));
+        let place = frame.location;
+        frames.push(Frame {
+            function: name.unwrap_or_else(|| "?".into()),
+            file: place.as_ref().and_then(|place| place.file).unwrap_or("?").into(),
+            line: place.and_then(|place| place.line).unwrap_or(0),
+        });
+    }
+    Ok(frames)
+}
+
+/// Prints what is known, with the number of calls. An error names every call that is not known, and everything known that
+/// is not there.
+pub(crate) fn compare(name: &str, sites: &[Site], known: &[Known]) -> Result<()> {
+    let known: Vec<&Known> = known.iter().filter(|known| known.image == name).collect();
+    let mut counts: BTreeMap<&str, usize> = known.iter().map(|known| (known.function, 0)).collect();
+    let mut unknown = vec![];
+    for site in sites {
+        match known.iter().find(|known| site.is(known)) {
+            Some(known) => *counts.entry(known.function).or_default() += 1,
+            None => unknown.push(format!("\n{site}")),
+        }
+    }
+    for Known { function, reason, .. } in &known {
+        println!("| {name} | `{function}` | {} | {reason} |", counts[function]);
+    }
+    ensure!(unknown.is_empty(), "{name}: calls that lead to a panic and are not known:{}", unknown.concat());
+    let gone: Vec<_> =
+        counts.iter().filter(|(_, count)| **count == 0).map(|(function, _)| *function).collect();
+    ensure!(gone.is_empty(), "{name}: known to lead to a panic, but it does not: {}", gone.join(", "));
+    Ok(())
+}
