@@ -136,7 +136,7 @@ mod app {
             sampling: board.sampling,
             shaft: Shaft::new(board.encoder, board.ssi, surroundings),
             buttons: board.buttons,
-            measurement: cx.local.measurement_place.write(Measurement::new(remembering::start(&board.found))),
+            measurement: remembering::make(cx.local.measurement_place, setup.personality, &board.found),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,

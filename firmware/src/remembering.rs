@@ -1,13 +1,25 @@
 //! The position through a loss of power: back from the memory that a battery keeps.
 
+use core::mem::MaybeUninit;
+
 use bsp::kept::Found;
-use node::{Kept, Start};
+use node::{Kept, Measurement, Personality, Start};
+
+/// Makes the measurement in its place. Not inlined: the stack on which the value is made is free again after it.
+#[inline(never)]
+pub(crate) fn make(
+    place: &'static mut MaybeUninit<Measurement>,
+    personality: Personality,
+    found: &Found,
+) -> &'static mut Measurement {
+    place.write(Measurement::new(personality, start(found)))
+}
 
 /// What the encoder goes on from.
 ///
 /// Memory without a trace of a copy is that of a new board, and after a loss of power that of one without a battery, or with
 /// an empty one: the two cannot be told apart, and the encoder begins anew.
-pub(crate) fn start(found: &Found) -> Start {
+fn start(found: &Found) -> Start {
     match found {
         Found::Nothing => Start::First,
         Found::Kept(words) => Start::Kept(Kept::from_words(words)),

@@ -140,12 +140,12 @@ impl Bench {
     fn start(flash: Vec<u8>, unless_stored: &Setup, kept: Start) -> Bench {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
         let record = view.device().expect("a record or none");
-        let mut protocol =
-            Protocol::new(&record.map_or(*unless_stored, |record| stored_setup(record, unless_stored)));
+        let setup = record.map_or(*unless_stored, |record| stored_setup(record, unless_stored));
+        let mut protocol = Protocol::new(&setup);
         protocol.load(&mut view);
         let mut bench = Bench {
             protocol,
-            measurement: Measurement::new(kept),
+            measurement: Measurement::new(setup.personality, kept),
             out: Queue::default(),
             now: Instant(0),
             store: Store::prepare(view).expect("a store"),

@@ -55,7 +55,7 @@ impl<S: Sensors> Station<S> {
     pub fn new(setup: &Setup, sensors: S) -> Station<S> {
         Station {
             protocol: Protocol::new(setup),
-            measurement: Measurement::new(Start::First),
+            measurement: Measurement::new(setup.personality, Start::First),
             store: empty_store(),
             sensors,
             next_sample: Instant::NEVER,

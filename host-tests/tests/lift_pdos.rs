@@ -85,9 +85,10 @@ fn device(row: &Pdo) -> (&'static Dictionary, Device<NoRules, SIZE>) {
     rows.extend(filled.take(missing));
     rows.sort_by_key(Object::key);
     let rows: [Object; ROWS] = rows.try_into().unwrap();
-    let tables: &'static Tables<ROWS, ROWS, ROWS> = Box::leak(Box::new(dictionary::compile(&rows)));
-    let defaults: &'static [u8; SIZE] = Box::leak(Box::new(dictionary::default_image(&rows)));
-    let dictionary: &'static Dictionary = Box::leak(Box::new(Dictionary::new(tables, defaults)));
+    let tables: &'static Tables<1, ROWS, ROWS, ROWS, SIZE> =
+        Box::leak(Box::new(dictionary::compile(&[&rows])));
+    let [dictionary] = tables.dictionaries(&[&rows]);
+    let dictionary: &'static Dictionary = Box::leak(Box::new(dictionary));
     (dictionary, Device::new(dictionary, NodeId::new(ID), NoRules))
 }
 

@@ -48,7 +48,8 @@ fn tpdo1_carries_the_live_pressure_and_temperature() {
 #[test]
 fn a_node_that_is_started_the_moment_it_boots_sends_what_it_has_measured_before() {
     let setup = setup();
-    let (mut protocol, mut measurement) = (Protocol::new(&setup), Measurement::new(Start::First));
+    let mut protocol = Protocol::new(&setup);
+    let mut measurement = Measurement::new(setup.personality, Start::First);
     let (mut out, now) = (Queue::default(), Instant(0));
     measurement.apply(&protocol.prepare());
     let snapshot = measurement.sample(&raw(250_000.0, 298.15), &RawEncoder::default(), [false; 2]);

@@ -9,6 +9,7 @@
 pub mod combined;
 mod communication;
 mod configured;
+mod dictionaries;
 pub mod encoder;
 mod faults;
 mod flags;

@@ -1,5 +1,6 @@
 //! The sampling half: one raw sample in, one snapshot out, a thousand times a second.
 
+use crate::Personality;
 use profiles::encoder::{self, Encoder, Kept, RawEncoder, Start};
 use profiles::lift::panel::BUTTONS;
 use profiles::lift::{self, Lift, RawLift};
@@ -41,44 +42,53 @@ impl Snapshot {
     }
 }
 
-/// The measurement chains and their state. Nothing is measured before there are parameters: they say what.
+/// The measurement chains of a personality and their state.
 #[derive(Clone, Debug)]
 pub struct Measurement {
-    pressure: Transmitter,
-    encoder: Encoder,
-    lift: Lift,
-    has_pressure: bool,
-    has_encoder: bool,
-    has_lift: bool,
+    chains: Chains,
+    /// Before there are parameters, nothing is measured.
+    has_parameters: bool,
+}
+
+/// In one place: a node is either of them.
+#[derive(Clone, Debug)]
+enum Chains {
+    Sensors { pressure: Option<Transmitter>, encoder: Option<Encoder> },
+    Lift(Lift),
 }
 
 impl Measurement {
     /// A measurement after power-on, with what was kept of the position sensors.
     #[must_use]
-    pub fn new(start: Start) -> Measurement {
-        Measurement {
-            pressure: Transmitter::default(),
-            encoder: Encoder::new(start),
-            lift: Lift::new(start),
-            has_pressure: false,
-            has_encoder: false,
-            has_lift: false,
-        }
+    pub fn new(personality: Personality, start: Start) -> Measurement {
+        let sensors = |pressure, encoder| Chains::Sensors { pressure, encoder };
+        let transmitter = Transmitter::default;
+        let chains = match personality {
+            Personality::Pressure => sensors(Some(transmitter()), None),
+            Personality::Encoder => sensors(None, Some(Encoder::new(start))),
+            Personality::Combined => sensors(Some(transmitter()), Some(Encoder::new(start))),
+            Personality::Lift => Chains::Lift(Lift::new(start)),
+        };
+        Measurement { chains, has_parameters: false }
     }
 
-    /// Takes over new parameters, from the next sample on.
+    /// Takes over new parameters of its personality, from the next sample on.
     pub fn apply(&mut self, parameters: &Parameters) {
-        let Parameters { pressure, encoder, lift } = parameters;
-        (self.has_pressure, self.has_encoder, self.has_lift) =
-            (pressure.is_some(), encoder.is_some(), lift.is_some());
-        if let Some(pressure) = pressure {
-            self.pressure.apply(pressure);
-        }
-        if let Some(encoder) = encoder {
-            self.encoder.apply(encoder);
-        }
-        if let Some(lift) = lift {
-            self.lift.apply(lift);
+        self.has_parameters = true;
+        match &mut self.chains {
+            Chains::Sensors { pressure, encoder } => {
+                if let (Some(pressure), Some(parameters)) = (pressure, &parameters.pressure) {
+                    pressure.apply(parameters);
+                }
+                if let (Some(encoder), Some(parameters)) = (encoder, &parameters.encoder) {
+                    encoder.apply(parameters);
+                }
+            }
+            Chains::Lift(lift) => {
+                if let Some(parameters) = &parameters.lift {
+                    lift.apply(parameters);
+                }
+            }
         }
     }
 
@@ -90,53 +100,48 @@ impl Measurement {
         snapshot
     }
 
-    /// The same, with the snapshot where it is to be.
+    /// The same, with the snapshot where it is to be; it is the last one.
     pub fn update(
         &mut self,
         raw: &RawSample,
-        encoder: &RawEncoder,
+        shaft: &RawEncoder,
         buttons: [bool; BUTTONS],
         snapshot: &mut Snapshot,
     ) {
-        if self.has_pressure {
-            self.pressure.update(raw, snapshot.pressure.get_or_insert_default());
-        } else {
-            snapshot.pressure = None;
+        match &mut self.chains {
+            _ if !self.has_parameters => {}
+            Chains::Sensors { pressure, encoder } => {
+                if let Some(pressure) = pressure {
+                    pressure.update(raw, snapshot.pressure.get_or_insert_default());
+                }
+                if let Some(encoder) = encoder {
+                    encoder.update(shaft, snapshot.encoder.get_or_insert_default());
+                }
+            }
+            Chains::Lift(lift) => {
+                let raw = RawLift { encoder: *shaft, pressure: *raw, buttons };
+                snapshot.lift = Some(lift.sample(&raw));
+            }
         }
-        if self.has_encoder {
-            self.encoder.update(encoder, snapshot.encoder.get_or_insert_default());
-        } else {
-            snapshot.encoder = None;
-        }
-        if self.has_lift {
-            self.update_lift(&RawLift { encoder: *encoder, pressure: *raw, buttons }, snapshot);
-        } else {
-            snapshot.lift = None;
-        }
-    }
-
-    /// Out of the way of the others.
-    #[inline(never)]
-    fn update_lift(&mut self, raw: &RawLift, snapshot: &mut Snapshot) {
-        snapshot.lift = Some(self.lift.sample(raw));
     }
 
     /// What is to outlive a loss of power; `None` where no position is measured.
     #[must_use]
     pub fn kept(&self) -> Option<Kept> {
-        match (self.has_encoder, self.has_lift) {
-            (true, _) => Some(self.encoder.kept()),
-            (_, true) => Some(self.lift.kept()),
-            _ => None,
+        match &self.chains {
+            _ if !self.has_parameters => None,
+            Chains::Sensors { encoder, .. } => encoder.as_ref().map(Encoder::kept),
+            Chains::Lift(lift) => Some(lift.kept()),
         }
     }
 
     /// Hands on the same as it is to be stored: see [`Kept::to_words`]. Without a copy on the way, a thousand times a second.
     pub fn keep(&self, store: impl FnOnce(&[u32; Kept::WORDS])) {
-        match (self.has_encoder, self.has_lift) {
-            (true, _) => store(&self.encoder.kept_words()),
-            (_, true) => store(&self.lift.kept().to_words()),
-            _ => {}
+        match &self.chains {
+            _ if !self.has_parameters => {}
+            Chains::Sensors { encoder: Some(encoder), .. } => store(&encoder.kept_words()),
+            Chains::Sensors { encoder: None, .. } => {}
+            Chains::Lift(lift) => store(&lift.kept().to_words()),
         }
     }
 }

@@ -1,20 +1,18 @@
 //! The application of the CANopen device: what the personality adds to it.
 
 use crate::configured::Configured;
+use crate::dictionaries::TABLES;
 use crate::flags::Flags;
 use crate::manufacturer::PERSONALITY;
 use crate::personality::Definition;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
 use crate::{REVISION, Setup, Snapshot, VENDOR_ID, combined, encoder, lift, pressure};
-use canopen::dictionary::{Entry, Group, Object, packed_size};
+use canopen::dictionary::{Entry, Group, packed_size};
 use canopen::emcy::Fault;
 use canopen::sdo::Abort;
 use canopen::{Application, Part};
 use profiles::lift::panel::{LAMPS, Lamp};
-
-/// The tables of all personalities.
-const TABLES: [&[Object]; 4] = [&pressure::OBJECTS, &encoder::OBJECTS, &combined::OBJECTS, &lift::OBJECTS];
 
 /// Large enough for the values of every personality.
 pub(crate) const IMAGE_SIZE: usize =

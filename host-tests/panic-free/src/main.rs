@@ -8,7 +8,8 @@
 use canopen::{Frame, Instant, QueueFull, Transmit};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use node::{
-    BusEvent, Fault, Kept, Measurement, Parcel, Protocol, RawEncoder, RawSample, Setup, Snapshot, Start,
+    BusEvent, Fault, Kept, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample, Setup,
+    Snapshot, Start,
 };
 use storage::{Pages, Store, View};
 
@@ -128,9 +129,9 @@ extern "C" fn measure(
 
 /// What the encoder keeps, out and in again.
 #[unsafe(no_mangle)]
-extern "C" fn power_cycle(measurement: &mut Measurement) {
+extern "C" fn power_cycle(measurement: &mut Measurement, personality: Personality) {
     let kept = measurement.kept().map(|kept| Kept::from_words(&kept.to_words()));
-    *measurement = Measurement::new(kept.map_or(Start::First, Start::Kept));
+    *measurement = Measurement::new(personality, kept.map_or(Start::First, Start::Kept));
 }
 
 /// Storing.

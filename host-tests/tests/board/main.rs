@@ -1,5 +1,6 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
 
+mod budget;
 mod bus_faults;
 mod chip_faults;
 mod configuring;

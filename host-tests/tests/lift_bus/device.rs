@@ -78,7 +78,7 @@ impl VirtualDevice {
         behaviour: impl Behaviour + 'static,
         world: &Rc<RefCell<World>>,
     ) -> VirtualDevice {
-        assert!(dictionary.defaults().len() <= SIZE);
+        assert!(dictionary.image_size() <= SIZE);
         VirtualDevice {
             device: Device::new(dictionary, NodeId::new(node_id), NoRules),
             dictionary,

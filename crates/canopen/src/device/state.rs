@@ -229,10 +229,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn load(&mut self) {
         if A::SERVICES_ONLY {
             // Nothing of it is stored, and nothing depends on the node-ID.
-            self.image
-                .iter_mut()
-                .zip(self.dictionary.defaults())
-                .for_each(|(value, default)| *value = *default);
+            self.dictionary.load_defaults(&mut self.image);
         } else {
             self.load_parameters();
         }
@@ -252,20 +249,13 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     pub(super) fn load_defaults(&mut self, scope: Scope) {
         for entry in self.dictionary.entries().filter(|entry| scope.contains(entry)) {
-            let default: [u8; 4] = entry.field.load(self.dictionary.defaults());
             if entry.attributes.node_relative {
-                self.store_node_relative(entry.field, u32::from_le_bytes(default));
-            } else if !entry.rule().is_computed() {
-                entry.field.set(&mut self.image, entry.field.get(self.dictionary.defaults()));
+                let default = self.dictionary.default_number(&entry, self.node_id);
+                entry.field.store(&mut self.image, default.to_le_bytes());
+            } else if entry.rule().has_place() {
+                entry.field.set(&mut self.image, self.dictionary.default(&entry));
             }
         }
-    }
-
-    fn store_node_relative(&mut self, field: crate::dictionary::Field, base: u32) {
-        field.store(
-            &mut self.image,
-            base.wrapping_add(self.node_id.map_or(0, NodeId::get).into()).to_le_bytes(),
-        );
     }
 
     /// Gives every protocol its parameters.

@@ -1,8 +1,8 @@
 //! The object dictionary as data.
 //!
 //! A personality writes one const table of [`Object`] rows. From it const functions make what the node needs at run
-//! time, all of it by [`dictionary!`](crate::dictionary!): the [`Tables`], which hold no text, and the default image of
-//! all values. The rows themselves are only referenced by what writes documents on the host, so names and units never
+//! time, all of it by [`dictionary!`](crate::dictionary!): the [`Tables`], which hold no text but that of default
+//! values. The rows themselves are only referenced by what writes documents on the host, so names and units never
 //! reach the firmware image.
 //!
 //! All values of a device live in one flat byte image, little endian as on the wire. An entry knows its place.
@@ -11,15 +11,14 @@ mod check;
 mod compile;
 mod entry;
 mod field;
+mod filling;
 mod object;
 mod packed;
 mod tables;
 mod types;
 
 pub use check::check;
-pub use compile::{
-    attributes_count, compile, count, default_image, gather, image_size, place_count, series_count,
-};
+pub use compile::{Counts, compile, count, gather, image_size};
 pub use entry::Entry;
 pub(crate) use entry::little_endian;
 pub use field::Field;

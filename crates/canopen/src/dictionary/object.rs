@@ -174,6 +174,11 @@ impl Rule {
         }
     }
 
+    /// Whether the value has a place of its own in the image.
+    pub(crate) const fn has_place(self) -> bool {
+        !matches!(self, Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_))
+    }
+
     /// Whether the value lives outside the image.
     pub(crate) const fn is_computed(self) -> bool {
         matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
@@ -289,9 +294,6 @@ impl Object {
 
     /// Bytes it takes in the image.
     pub(crate) const fn stored_size(&self) -> usize {
-        match self.rule {
-            Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_) => 0,
-            _ => self.kind.size() as usize,
-        }
+        if self.rule.has_place() { self.kind.size() as usize } else { 0 }
     }
 }

@@ -1,16 +1,17 @@
 //! The dictionary at run time: tables without text, found by binary search.
 //!
 //! ```text
-//! series of objects             places of entries           attributes
-//! ┌───────────────────────┐     ┌───────────────────┐       ┌────────────────────┐
-//! │ 1400h, 4 objects      │ ──► │ sub 0, at 512     │ ────► │ UNSIGNED8, ro      │
-//! │ of 4 entries, 8 bytes │     │ sub 1, at 513     │ ──┐   ├────────────────────┤
-//! └───────────────────────┘     │ ...               │   └─► │ UNSIGNED32, rw ... │
+//! series of objects              places of entries           attributes
+//! ┌────────────────────────┐     ┌───────────────────┐       ┌────────────────────┐
+//! │ 1400h, 4 objects       │ ──► │ sub 0, at 0       │ ────► │ UNSIGNED8, ro      │
+//! │ of 4 entries, from 512 │     │ sub 1, at 1       │ ──┐   ├────────────────────┤
+//! └────────────────────────┘     │ ...               │   └─► │ UNSIGNED32, rw ... │
+//!      └─► default values        └───────────────────┘       └────────────────────┘
 //! ```
 //!
-//! Objects that follow each other and differ in nothing but their values, as the parameters of PDOs do, are one series:
-//! the places are those of its first object, and those of the next are a constant number of bytes further on. Entries
-//! of equal attributes share them.
+//! Objects that follow each other and differ in nothing but their values, as the parameters of PDOs do, are one series.
+//! Series of one shape share their places, entries of equal attributes share those, and a run of default values that is
+//! found among others is there once; all of that across the dictionaries that are compiled together.
 
 use super::entry::{Attributes, little_endian};
 use super::{Entry, Field};
@@ -24,21 +25,25 @@ use crate::sdo::Abort;
 pub(crate) struct Series {
     /// Index of the first object.
     pub(crate) index: u16,
+    /// Where the first object begins in the image.
+    pub(crate) offset: u16,
+    /// Number of the first place.
+    pub(crate) first: u16,
+    /// Number of the first default value, and how many there are: those behind them are 0.
+    pub(crate) defaults: u16,
+    pub(crate) given: u16,
     pub(crate) objects: u8,
     /// Entries of an object.
     pub(crate) entries: u8,
-    /// Number of the first place.
-    pub(crate) first: u16,
-    /// Bytes of an object in the image.
-    pub(crate) stride: u16,
 }
 
-/// An entry of the first object of a series.
+/// An entry of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) sub: u8,
     /// Number of its attributes.
     pub(crate) attributes: u8,
+    /// From the start of the object, modulo 2^16: another name of a value has its place, which is before the object.
     pub(crate) offset: u16,
 }
 
@@ -55,49 +60,64 @@ impl Pdos {
     }
 }
 
-/// What [`compile`](super::compile) makes of a table: room for `S` series, `P` places and `A` attributes.
+/// What [`compile`](super::compile) makes of `D` tables of rows: room for `S` series, `P` places, `A` attributes and `V`
+/// bytes of default values.
 #[derive(Clone, Copy, Debug)]
-pub struct Tables<const S: usize, const P: usize, const A: usize> {
+pub struct Tables<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize> {
+    /// Those of the dictionaries, one after the other.
     pub(crate) series: [Series; S],
     pub(crate) places: [Place; P],
     pub(crate) attributes: [Attributes; A],
-    pub(crate) tpdos: Pdos,
-    pub(crate) rpdos: Pdos,
+    pub(crate) defaults: [u8; V],
+    pub(crate) tpdos: [Pdos; D],
+    pub(crate) rpdos: [Pdos; D],
 }
 
-/// The dictionary of one personality.
+/// One dictionary.
 #[derive(Clone, Copy, Debug)]
 pub struct Dictionary {
-    series: &'static [Series],
-    places: &'static [Place],
-    attributes: &'static [Attributes],
-    tpdos: &'static Pdos,
-    rpdos: &'static Pdos,
-    defaults: &'static [u8],
+    pub(super) series: &'static [Series],
+    pub(super) places: &'static [Place],
+    pub(super) attributes: &'static [Attributes],
+    pub(super) defaults: &'static [u8],
+    pub(super) tpdos: &'static Pdos,
+    pub(super) rpdos: &'static Pdos,
 }
 
 impl Dictionary {
-    /// From what [`compile`](super::compile) and [`default_image`](super::default_image) made of the same rows;
-    /// [`dictionary!`](crate::dictionary!) does all of it.
-    #[must_use]
-    pub const fn new<const S: usize, const P: usize, const A: usize>(
-        tables: &'static Tables<S, P, A>,
-        defaults: &'static [u8],
-    ) -> Dictionary {
-        let Tables { series, places, attributes, tpdos, rpdos } = tables;
-        Dictionary { series, places, attributes, tpdos, rpdos, defaults }
-    }
-
     /// All entries, sorted.
     #[must_use]
     pub fn entries(&self) -> Entries {
         Entries { dictionary: *self, series: 0, object: 0, place: 0 }
     }
 
-    /// The image of all default values; what counts from the node-ID holds the rest.
+    /// Bytes of the image of all values.
     #[must_use]
-    pub const fn defaults(&self) -> &'static [u8] {
-        self.defaults
+    pub fn image_size(&self) -> usize {
+        let stored = self.entries().filter(|entry| !entry.rule().is_computed());
+        stored.map(|entry| entry.field.end()).max().map_or(0, usize::from)
+    }
+
+    /// Gives all values of an image their defaults; what counts from the node-ID gets the rest.
+    pub fn load_defaults(&self, image: &mut [u8]) {
+        image.fill(0);
+        for series in self.series {
+            let values = image.get_mut(usize::from(series.offset)..).unwrap_or_default();
+            values.iter_mut().zip(self.defaults_of(series)).for_each(|(value, default)| *value = *default);
+        }
+    }
+
+    /// The default value of an entry, without the zeros at its end.
+    pub(crate) fn default(&self, entry: &Entry) -> &'static [u8] {
+        let Ok((series, _)) = self.series_of(entry.index) else { return &[] };
+        let start = entry.field.offset.wrapping_sub(series.offset);
+        let defaults = self.defaults_of(series).get(usize::from(start)..).unwrap_or_default();
+        defaults.get(..usize::from(entry.field.size)).unwrap_or(defaults)
+    }
+
+    fn defaults_of(&self, series: &Series) -> &'static [u8] {
+        let first = usize::from(series.defaults);
+        self.defaults.get(first..first + usize::from(series.given)).unwrap_or_default()
     }
 
     /// The indexes of the communication objects of its PDOs one way.
@@ -111,7 +131,7 @@ impl Dictionary {
     /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.
     pub(crate) fn default_number(&self, entry: &Entry, node_id: Option<NodeId>) -> u32 {
         let node_id = node_id.filter(|_| entry.attributes.node_relative).map_or(0, NodeId::get);
-        little_endian(entry.field.get(self.defaults)).wrapping_add(node_id.into())
+        little_endian(self.default(entry)).wrapping_add(node_id.into())
     }
 
     /// The entry of an index and a sub-index.
@@ -119,12 +139,7 @@ impl Dictionary {
     /// # Errors
     /// `NoObject` where the index is unknown, `NoSubIndex` where only the sub-index is.
     pub fn find(&self, index: u16, sub: u8) -> Result<Entry, Abort> {
-        let after = self.series.partition_point(|series| series.index <= index);
-        let series = *self.series.get(after.wrapping_sub(1)).ok_or(Abort::NoObject)?;
-        let number = index.wrapping_sub(series.index);
-        if number >= series.objects.into() {
-            return Err(Abort::NoObject);
-        }
+        let (series, number) = self.series_of(index)?;
         // Most objects have the sub-indexes 0, 1, 2 and so on.
         let places = self.places_of(series);
         let direct = places.get(usize::from(sub)).filter(|place| place.sub == sub);
@@ -132,18 +147,38 @@ impl Dictionary {
         place.and_then(|place| self.entry(series, number, *place)).ok_or(Abort::NoSubIndex)
     }
 
-    fn places_of(&self, series: Series) -> &'static [Place] {
+    /// The series of an object, and its number there.
+    #[inline]
+    fn series_of(&self, index: u16) -> Result<(&'static Series, u16), Abort> {
+        let after = self.series.partition_point(|series| series.index <= index);
+        let series = self.series.get(after.wrapping_sub(1)).ok_or(Abort::NoObject)?;
+        let number = index.wrapping_sub(series.index);
+        if number < series.objects.into() { Ok((series, number)) } else { Err(Abort::NoObject) }
+    }
+
+    fn places_of(&self, series: &Series) -> &'static [Place] {
         let first = usize::from(series.first);
         self.places.get(first..first + usize::from(series.entries)).unwrap_or(&[])
     }
 
     /// The entry at a place in an object of a series.
     #[inline]
-    fn entry(&self, series: Series, number: u16, place: Place) -> Option<Entry> {
+    fn entry(&self, series: &Series, number: u16, place: Place) -> Option<Entry> {
         let attributes = self.attributes.get(usize::from(place.attributes))?;
-        let offset = place.offset.wrapping_add(number.wrapping_mul(series.stride));
+        let before = if number == 0 { 0 } else { number.wrapping_mul(self.stride(series)) };
+        let offset = series.offset.wrapping_add(before).wrapping_add(place.offset);
         let field = Field { offset, size: attributes.kind.size() };
         Some(Entry { attributes, field, sub: place.sub, index: series.index.wrapping_add(number) })
+    }
+
+    /// Bytes of an object in the image.
+    const fn stride(&self, series: &Series) -> u16 {
+        let end = series.first as usize + series.entries as usize;
+        let Some((_, [last, ..])) = self.places.split_at_checked(end.wrapping_sub(1)) else { return 0 };
+        let Some((_, [attributes, ..])) = self.attributes.split_at_checked(last.attributes as usize) else {
+            return 0;
+        };
+        last.offset.wrapping_add(attributes.kind.size() as u16)
     }
 
     /// The place of a value, known at compile time.
@@ -164,7 +199,8 @@ impl Dictionary {
         assert!(place < series.first as usize + series.entries as usize, "no such entry");
         let Place { offset, attributes, .. } = self.places[place];
         let size = self.attributes[attributes as usize].kind.size();
-        Field { offset: offset + (index - series.index) * series.stride, size }
+        let object = series.offset + (index - series.index) * self.stride(series);
+        Field { offset: object.wrapping_add(offset), size }
     }
 }
 
@@ -183,7 +219,7 @@ impl Iterator for Entries {
     // Called from many places that are in no hurry.
     #[inline(never)]
     fn next(&mut self) -> Option<Entry> {
-        let series = *self.dictionary.series.get(self.series)?;
+        let series = self.dictionary.series.get(self.series)?;
         let place = *self.dictionary.places_of(series).get(self.place)?;
         let entry = self.dictionary.entry(series, self.object, place);
         self.place += 1;

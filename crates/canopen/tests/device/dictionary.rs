@@ -6,7 +6,7 @@ use canopen::sdo::Abort;
 #[test]
 fn every_row_has_its_entry_and_its_place() {
     let mut offset = 0;
-    let mut image: Vec<u8> = DICTIONARY.defaults().to_vec();
+    let mut image = vec![0; DICTIONARY.image_size()];
     assert_eq!(rows().count(), DICTIONARY.entries().count());
     for (row, entry) in rows() {
         assert_eq!((row.index, row.sub), (entry.index(), entry.sub()));

@@ -6,8 +6,8 @@ mod shift;
 
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
-use crate::{Personality, communication, encoder, flags, pressure};
-use canopen::dictionary::{self, Access, Dictionary, Object, Type};
+use crate::{Personality, communication, dictionaries, encoder, flags, pressure};
+use canopen::dictionary::{self, Access, Object, Type};
 
 /// From the indexes of a device profile to those of the second device.
 const SHIFT: u16 = 0x800;
@@ -55,13 +55,12 @@ const PARTS: &[&[Object]] = &[
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);
-static FLAGS: flags::Fields = flags::Fields::new(&DICTIONARY);
-static PRESSURE: pressure::Fields = pressure::Fields::new(&DICTIONARY, SHIFT);
-static ENCODER: encoder::Fields = encoder::Fields::new(&DICTIONARY, ENCODER_TYPE.index);
+static FLAGS: flags::Fields = flags::Fields::new(dictionaries::COMBINED);
+static PRESSURE: pressure::Fields = pressure::Fields::new(dictionaries::COMBINED, SHIFT);
+static ENCODER: encoder::Fields = encoder::Fields::new(dictionaries::COMBINED, ENCODER_TYPE.index);
 
 pub(crate) static DEFINITION: Definition = Definition {
-    dictionary: &DICTIONARY,
+    dictionary: dictionaries::COMBINED,
     flags: Some(&FLAGS),
     pressure: Some(&PRESSURE),
     encoder: Some(&ENCODER),

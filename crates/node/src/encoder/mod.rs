@@ -17,8 +17,8 @@ pub(crate) use values::{Fields, device_type};
 
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
-use crate::{Personality, communication};
-use canopen::dictionary::{self, Dictionary, Object};
+use crate::{Personality, communication, dictionaries};
+use canopen::dictionary::{self, Object};
 
 /// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
@@ -48,11 +48,15 @@ const PARTS: &[&[Object]] = &[
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);
-static FIELDS: Fields = Fields::new(&DICTIONARY, 0x1000);
+static FIELDS: Fields = Fields::new(dictionaries::ENCODER, 0x1000);
 
-pub(crate) static DEFINITION: Definition =
-    Definition { dictionary: &DICTIONARY, flags: None, pressure: None, encoder: Some(&FIELDS), lift: None };
+pub(crate) static DEFINITION: Definition = Definition {
+    dictionary: dictionaries::ENCODER,
+    flags: None,
+    pressure: None,
+    encoder: Some(&FIELDS),
+    lift: None,
+};
 
 #[cfg(test)]
 mod tests;

@@ -15,7 +15,9 @@ struct Node {
 }
 
 fn defaults() -> [u8; IMAGE_SIZE] {
-    *DICTIONARY.defaults().first_chunk().unwrap()
+    let mut image = [0; IMAGE_SIZE];
+    dictionaries::ENCODER.load_defaults(&mut image);
+    image
 }
 
 impl Node {
@@ -44,7 +46,7 @@ impl Node {
     }
 
     fn write_late(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
-        let entry = DICTIONARY.find(index, sub)?;
+        let entry = dictionaries::ENCODER.find(index, sub)?;
         let size = entry.field().get(&self.image).len();
         let bytes = &value.to_le_bytes()[..size];
         let row = OBJECTS.iter().find(|row| (row.index, row.sub) == (index, sub)).unwrap();
@@ -56,14 +58,14 @@ impl Node {
     }
 
     fn read(&self, index: u16, sub: u8) -> u32 {
-        let bytes = DICTIONARY.find(index, sub).unwrap().field().get(&self.image);
+        let bytes = dictionaries::ENCODER.find(index, sub).unwrap().field().get(&self.image);
         bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
     }
 }
 
 #[test]
 fn the_defaults_of_the_table_are_those_of_the_measurement() {
-    assert_eq!(FIELDS.parameters(DICTIONARY.defaults()), Parameters::default());
+    assert_eq!(FIELDS.parameters(&defaults()), Parameters::default());
 }
 
 /// The objects of the encoder itself.

@@ -15,8 +15,8 @@ pub(crate) use values::Fields;
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
 use crate::pressure::CALIBRATION;
-use crate::{Personality, communication};
-use canopen::dictionary::{self, Dictionary, Object};
+use crate::{Personality, communication, dictionaries};
+use canopen::dictionary::{self, Object};
 
 /// The table: everything there is to say about every object, sorted.
 pub static OBJECTS: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
@@ -45,11 +45,15 @@ const PARTS: &[&[Object]] = &[
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);
-static FIELDS: Fields = Fields::new(&DICTIONARY);
+static FIELDS: Fields = Fields::new(dictionaries::LIFT);
 
-pub(crate) static DEFINITION: Definition =
-    Definition { dictionary: &DICTIONARY, flags: None, pressure: None, encoder: None, lift: Some(&FIELDS) };
+pub(crate) static DEFINITION: Definition = Definition {
+    dictionary: dictionaries::LIFT,
+    flags: None,
+    pressure: None,
+    encoder: None,
+    lift: Some(&FIELDS),
+};
 
 #[cfg(test)]
 mod tests;

@@ -36,7 +36,9 @@ fn pressure(permille: u32) -> RawSample {
 }
 
 fn defaults() -> [u8; IMAGE_SIZE] {
-    *DICTIONARY.defaults().first_chunk().unwrap()
+    let mut image = [0; IMAGE_SIZE];
+    dictionaries::LIFT.load_defaults(&mut image);
+    image
 }
 
 impl Node {
@@ -67,7 +69,7 @@ impl Node {
     }
 
     fn write_late(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
-        let entry = DICTIONARY.find(index, sub)?;
+        let entry = dictionaries::LIFT.find(index, sub)?;
         let size = entry.field().get(&self.image).len();
         self.write_bytes(&entry, &value.to_le_bytes()[..size])
     }
@@ -82,20 +84,20 @@ impl Node {
     }
 
     fn write_real(&mut self, index: u16, sub: u8, value: f32) {
-        let entry = DICTIONARY.find(index, sub).unwrap();
+        let entry = dictionaries::LIFT.find(index, sub).unwrap();
         self.write_bytes(&entry, &value.to_le_bytes()).unwrap();
         self.lift.apply(&FIELDS.parameters(&self.image));
     }
 
     fn read(&self, index: u16, sub: u8) -> u64 {
-        let bytes = DICTIONARY.find(index, sub).unwrap().field().get(&self.image);
+        let bytes = dictionaries::LIFT.find(index, sub).unwrap().field().get(&self.image);
         bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
     }
 }
 
 #[test]
 fn the_defaults_of_the_table_are_those_of_the_measurement() {
-    assert_eq!(FIELDS.parameters(DICTIONARY.defaults()), Parameters::default());
+    assert_eq!(FIELDS.parameters(&defaults()), Parameters::default());
 }
 
 #[test]
@@ -156,7 +158,9 @@ fn a_preset_is_read_at_once_and_stays() {
     // It is a parameter: after a reset that finds it stored it is the same.
     let stored = node.image;
     node.image = defaults();
-    DICTIONARY.field(0x2302, 1).set(&mut node.image, DICTIONARY.field(0x2302, 1).get(&stored));
+    dictionaries::LIFT
+        .field(0x2302, 1)
+        .set(&mut node.image, dictionaries::LIFT.field(0x2302, 1).get(&stored));
     node.lift.apply(&FIELDS.parameters(&node.image));
     node.sample();
     assert_eq!(node.read(0x6383, 1), 77_100);

@@ -14,8 +14,8 @@ pub(crate) use values::Fields;
 
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
-use crate::{Personality, communication, flags};
-use canopen::dictionary::{self, Dictionary, Object};
+use crate::{Personality, communication, dictionaries, flags};
+use canopen::dictionary::{self, Object};
 
 /// CiA 404, two analogue input blocks.
 pub(crate) const DEVICE_TYPE: i64 = 0x0002_0194;
@@ -43,12 +43,11 @@ const PARTS: &[&[Object]] = &[
 /// Bytes of the image of all values.
 pub(crate) const IMAGE_SIZE: usize = dictionary::image_size(&OBJECTS);
 
-static DICTIONARY: Dictionary = canopen::dictionary!(&OBJECTS);
-static FLAGS: flags::Fields = flags::Fields::new(&DICTIONARY);
-static FIELDS: Fields = Fields::new(&DICTIONARY, 0);
+static FLAGS: flags::Fields = flags::Fields::new(dictionaries::PRESSURE);
+static FIELDS: Fields = Fields::new(dictionaries::PRESSURE, 0);
 
 pub(crate) static DEFINITION: Definition = Definition {
-    dictionary: &DICTIONARY,
+    dictionary: dictionaries::PRESSURE,
     flags: Some(&FLAGS),
     pressure: Some(&FIELDS),
     encoder: None,

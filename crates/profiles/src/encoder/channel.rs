@@ -56,6 +56,8 @@ impl Pending {
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     input: Input,
+    /// Of the sensor, for what is kept of it.
+    resolution: u32,
     position: Position,
     speedometer: Speedometer,
     speed_factor: f32,
@@ -68,6 +70,7 @@ pub(super) struct Channel {
 
 impl Channel {
     /// A channel that has not measured yet, with what it kept.
+    #[inline(never)]
     pub(super) fn new(
         all: &Parameters,
         own: &ChannelParameters,
@@ -80,6 +83,7 @@ impl Channel {
         let left = kept.left(sensor.kind, resolution);
         let mut channel = Channel {
             input: Input::new(sensor, all.module.offset, left),
+            resolution,
             position: Position::new(scale, offset),
             speedometer: Speedometer::new(0),
             speed_factor: 0.0,
@@ -94,6 +98,7 @@ impl Channel {
     }
 
     /// Takes over parameters, from the next sample on. Another sensor makes another channel.
+    #[inline(never)]
     pub(super) fn apply(&mut self, all: &Parameters, own: &ChannelParameters, sensor: Sensor) {
         if !sensor.is_like(self.input.sensor()) {
             *self = Channel::new(all, own, sensor, &KeptChannel::default());
@@ -107,6 +112,7 @@ impl Channel {
         self.configure(all, own, &scale);
     }
 
+    #[inline(never)]
     fn configure(&mut self, all: &Parameters, own: &ChannelParameters, scale: &Scale) {
         let factor = all.speed_factor(self.input.sensor());
         self.speed_factor = if scale.is_reversed() { -factor } else { factor };
@@ -116,6 +122,7 @@ impl Channel {
     }
 
     /// Processes one sample.
+    #[inline(never)]
     pub(super) fn sample(&mut self, raw: &RawEncoder) -> ChannelValues {
         let seen = self.input.read(raw, self.position.scale());
         self.commissioning.observe(self.input.sensor(), &seen);
@@ -144,8 +151,8 @@ impl Channel {
 
     /// What outlives a loss of power.
     pub(super) fn kept(&self) -> KeptChannel {
-        let sensor = self.input.sensor();
-        let kept = |left| KeptChannel::new(sensor.kind, sensor.resolution(), left, &self.position);
+        let kind = self.input.sensor().kind;
+        let kept = |left| KeptChannel::new(kind, self.resolution, left, &self.position);
         self.input.left().map(kept).unwrap_or_default()
     }
 }

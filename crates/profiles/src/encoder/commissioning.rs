@@ -118,9 +118,13 @@ impl Commissioning {
 
     /// Looks at a sample.
     pub(super) fn observe(&mut self, sensor: &Sensor, seen: &Observation) {
-        if self.progress == Progress::Off || self.progress.is_failure() {
-            return;
+        if self.progress != Progress::Off && !self.progress.is_failure() {
+            self.go_on(sensor, seen);
         }
+    }
+
+    #[inline(never)]
+    fn go_on(&mut self, sensor: &Sensor, seen: &Observation) {
         self.millis = self.millis.saturating_add(1);
         self.rest = if seen.moved == 0 { self.rest.saturating_add(1) } else { 0 };
         self.run.follow(seen);

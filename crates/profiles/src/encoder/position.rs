@@ -48,6 +48,7 @@ impl Position {
     }
 
     /// Makes the value `preset` where the shaft is; a value outside of the range changes nothing.
+    #[inline(never)]
     pub fn preset(&mut self, preset: u32, shaft: Shaft) {
         if let Some(offset) = self.scale.offset_for(preset, shaft) {
             *self = Position::new(self.scale, offset);
@@ -56,6 +57,7 @@ impl Position {
 
     /// Takes another scale. In other units the offset has lost its meaning and is 0 again; the same units counted the
     /// other way leave the value as it is. CiA 406 is silent about both.
+    #[inline(never)]
     pub fn rescale(&mut self, scale: Scale, shaft: Shaft) {
         if scale == self.scale {
             return;

@@ -197,6 +197,7 @@ impl Scale {
 
     /// Position at the start of a turn as counted, moved by an offset.
     #[must_use]
+    #[inline(never)]
     pub fn start(&self, turns: i64, offset: i32) -> u32 {
         // Both factors are below 2^32, and so is what is added: the sum stays below 2^64.
         let units = self.modulo(turns) * u64::from(self.units) + self.modulo(offset.into());

@@ -117,6 +117,7 @@ impl Sensor {
 
     /// What it resolves.
     #[must_use]
+    #[inline(never)]
     pub fn native(&self) -> Native {
         let Sensor { resolution, counted, format, .. } = *self;
         let per_revolution = power(format.step_bits());

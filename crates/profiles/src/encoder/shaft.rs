@@ -118,6 +118,7 @@ impl Tracker {
 }
 
 /// Division rounded towards minus infinity.
+#[inline(never)]
 fn div_floor(value: i64, divisor: NonZeroU32) -> i64 {
     let divisor = NonZeroU64::from(divisor);
     let quotient = |n: u64| i64::try_from(n / divisor).unwrap_or(i64::MAX);

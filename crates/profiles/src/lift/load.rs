@@ -124,6 +124,7 @@ impl LoadUnit {
     }
 
     /// Takes over parameters, from the next sample on. The filter only starts afresh when it is another one.
+    #[inline(never)]
     pub fn apply(&mut self, parameters: &Parameters) {
         let fresh = LoadUnit::new(parameters);
         let filter = if fresh.filter.is_like(&self.filter) { self.filter } else { fresh.filter };

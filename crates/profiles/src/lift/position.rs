@@ -138,6 +138,7 @@ impl Parameters {
     }
 
     /// What the encoder gets: both channels count the way.
+    #[inline(never)]
     fn encoder(&self) -> encoder::Parameters {
         let channel = |own: ChannelParameters| ChannelParameters {
             kind: own.kind,
@@ -216,6 +217,7 @@ impl Unit {
         Some(Unit { source, is_inverted, offset: own.offset, range, limits: own.limits, fixed })
     }
 
+    #[inline(never)]
     fn values(&self, channels: &[ChannelValues; 2], warnings: u16) -> UnitValues {
         let channel = self.source.of(channels);
         let way = i64::from(channel.position);
@@ -274,6 +276,7 @@ impl PositionUnits {
     }
 
     /// Takes over parameters, from the next sample on.
+    #[inline(never)]
     pub fn apply(&mut self, parameters: &Parameters) {
         let encoder = parameters.encoder();
         self.encoder.apply(&encoder);

@@ -27,6 +27,7 @@ impl Polynomial {
     }
 
     /// Where it is largest and smallest in an interval: at the ends, or at its vertex. A straight line has none.
+    #[inline(never)]
     fn extremes(&self, low: f32, high: f32) -> [f32; 3] {
         let vertex = -self.linear / (2.0 * self.quadratic);
         let inside = if vertex.is_finite() { vertex.max(low).min(high) } else { low };

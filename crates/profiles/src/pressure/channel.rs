@@ -1,6 +1,6 @@
 //! One analogue input channel of CiA 404: from the field value to the process value in three formats, and its status.
 
-use super::unit::power_of_ten;
+use super::precise::Precise;
 use super::{Filter, Unit};
 
 /// 6150h bit 0: clipped or not measured.
@@ -154,9 +154,12 @@ fn fits16(value: f32) -> bool {
     value > f32::from(i16::MIN) - 1.0 && value < f32::from(i16::MAX) + 1.0
 }
 
-#[allow(clippy::cast_possible_truncation)]
+/// Ten to the power of so many digits; beyond the 38 of single precision nothing fits any format.
 fn shift(digits: u8) -> f32 {
-    i8::try_from(digits).map_or(f32::INFINITY, |digits| power_of_ten(digits) as f32)
+    match i8::try_from(digits) {
+        Ok(digits) if digits <= 38 => Precise::ONE.shifted(digits).rounded(),
+        _ => f32::INFINITY,
+    }
 }
 
 #[cfg(test)]
@@ -266,5 +269,13 @@ mod tests {
         assert_eq!(channel.sample(8.0, true).process_value32, 102, "a quarter of the way");
         channel.apply(&average(8));
         assert_eq!(channel.sample(16.0, true).process_value32, 16, "another filter starts afresh");
+    }
+
+    #[test]
+    #[allow(clippy::cast_possible_truncation)]
+    fn digits_shift_by_powers_of_ten() {
+        for digits in 0..=u8::MAX {
+            assert_eq!(shift(digits).to_bits(), (10_f64.powi(digits.into()) as f32).to_bits(), "{digits}");
+        }
     }
 }

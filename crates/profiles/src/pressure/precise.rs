@@ -17,6 +17,14 @@ pub(super) struct Precise {
 
 impl Precise {
     pub(super) const ZERO: Precise = Precise { high: 0.0, low: 0.0 };
+    pub(super) const ONE: Precise = Precise { high: 1.0, low: 0.0 };
+
+    /// The nearest number to one of double precision: for constants, the target computes those with difficulty.
+    #[allow(clippy::cast_possible_truncation)]
+    pub(super) const fn near_double(value: f64) -> Precise {
+        let high = value as f32;
+        Precise { high, low: (value - high as f64) as f32 }
+    }
 
     /// A number of single precision, held at [`LARGEST`] beyond it.
     pub(super) fn of(value: f32) -> Precise {
@@ -35,6 +43,14 @@ impl Precise {
 
     pub(super) fn minus(self, other: Precise) -> Precise {
         self.plus(Precise { high: -other.high, low: -other.low })
+    }
+
+    /// So many powers of ten up, or down. One up is the sum of eight times and twice the number, which are exact.
+    pub(super) fn shifted(self, digits: i8) -> Precise {
+        let times = |value: Precise, factor| Precise { high: value.high * factor, low: value.low * factor };
+        (0..digits.unsigned_abs()).fold(self, |value, _| {
+            if digits > 0 { times(value, 8.0).plus(times(value, 2.0)) } else { value.over(10) }
+        })
     }
 
     /// Divided by a whole number, at least 1.

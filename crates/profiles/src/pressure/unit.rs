@@ -1,5 +1,7 @@
 //! Physical units of the process value, object 6131h (CiA 303-2 codes, and the codes A0h.. that CiA leaves to profiles).
 
+use super::precise::Precise;
+
 /// How a field value in Pa or K becomes a process value: `value / divisor - zero`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
@@ -23,39 +25,38 @@ impl Unit {
     pub fn pressure(code: u32) -> Option<Unit> {
         let (unit, prefix) = split(code)?;
         let pascal = match unit {
-            0x22 => 1.0,
-            0x4E => 100_000.0,
+            0x22 => const { Precise::near_double(1.0) },
+            0x4E => const { Precise::near_double(100_000.0) },
             // Pound-force per square inch, of the international pound and inch.
-            0xAB => 0.453_592_37 * GRAVITY / (0.0254 * 0.0254),
+            0xAB => const { Precise::near_double(0.453_592_37 * GRAVITY / (0.0254 * 0.0254)) },
             // Millimetre of mercury at 0 degC, 13 595.1 kg/m3.
-            0xA0 => 13.595_1 * GRAVITY,
+            0xA0 => const { Precise::near_double(13.595_1 * GRAVITY) },
             // Technical atmosphere, kgf/cm2.
-            0xA1 => 10_000.0 * GRAVITY,
+            0xA1 => const { Precise::near_double(10_000.0 * GRAVITY) },
             // Millimetre of water at 4 degC, 999.972 kg/m3.
-            0xA2 => 0.999_972 * GRAVITY,
-            0xA4 => 101_325.0,
+            0xA2 => const { Precise::near_double(0.999_972 * GRAVITY) },
+            0xA4 => const { Precise::near_double(101_325.0) },
             _ => return None,
         };
-        Some(Unit::prefixed(pascal, 0.0, prefix))
+        Some(Unit::prefixed(pascal, Precise::ZERO, prefix))
     }
 
     /// A temperature unit by the value of 6131h:2; `None` for any that is not supported.
     #[must_use]
     pub fn temperature(code: u32) -> Option<Unit> {
         let (unit, prefix) = split(code)?;
-        match unit {
-            0x05 => Some(Unit::prefixed(1.0, 0.0, prefix)),
-            0x2D => Some(Unit::prefixed(1.0, 273.15, prefix)),
-            0xAC => Some(Unit::prefixed(5.0 / 9.0, 459.67, prefix)),
-            _ => None,
-        }
+        let (kelvin, zero) = match unit {
+            0x05 => const { (Precise::ONE, Precise::ZERO) },
+            0x2D => const { (Precise::ONE, Precise::near_double(273.15)) },
+            0xAC => const { (Precise::near_double(5.0 / 9.0), Precise::near_double(459.67)) },
+            _ => return None,
+        };
+        Some(Unit::prefixed(kelvin, zero, prefix))
     }
 
-    /// Computed in double precision and rounded once.
-    #[allow(clippy::cast_possible_truncation)]
-    fn prefixed(divisor: f64, zero: f64, prefix: i8) -> Unit {
-        let power = power_of_ten(prefix);
-        Unit { divisor: (divisor * power) as f32, zero: (zero / power) as f32 }
+    /// The nearest to what double precision gives.
+    fn prefixed(divisor: Precise, zero: Precise, prefix: i8) -> Unit {
+        Unit { divisor: divisor.shifted(prefix).rounded(), zero: zero.shifted(-prefix).rounded() }
     }
 
     /// The value of Pa or K in this unit.
@@ -72,12 +73,6 @@ fn split(code: u32) -> Option<(u8, i8)> {
     (prefix.unsigned_abs() <= MAX_PREFIX.unsigned_abs()).then_some((unit, prefix))
 }
 
-/// Exact up to 10^22 in double precision, so exact for every prefix and its reciprocal correctly rounded.
-pub(super) fn power_of_ten(exponent: i8) -> f64 {
-    let power = (0..exponent.unsigned_abs()).fold(1.0, |power, _| power * 10.0);
-    if exponent < 0 { 1.0 / power } else { power }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,6 +81,34 @@ mod tests {
     fn the_defaults_are_what_their_codes_say() {
         assert_eq!(Unit::pressure(0x004E_0000), Some(Unit::BAR));
         assert_eq!(Unit::temperature(0x002D_0000), Some(Unit::CELSIUS));
+    }
+
+    /// Every unit with every prefix is rounded as from double precision.
+    #[test]
+    #[allow(clippy::cast_possible_truncation)]
+    fn agrees_with_double_precision() {
+        let pressures = [
+            (0x22, 1.0),
+            (0x4E, 100_000.0),
+            (0xAB, 0.453_592_37 * GRAVITY / (0.0254 * 0.0254)),
+            (0xA0, 13.595_1 * GRAVITY),
+            (0xA1, 10_000.0 * GRAVITY),
+            (0xA2, 0.999_972 * GRAVITY),
+            (0xA4, 101_325.0),
+        ];
+        let temperatures = [(0x05, 1.0, 0.0), (0x2D, 1.0, 273.15), (0xAC, 5.0 / 9.0, 459.67)];
+        for prefix in -MAX_PREFIX..=MAX_PREFIX {
+            let code = |unit| u32::from_le_bytes([0, 0, unit, prefix.to_le_bytes()[0]]);
+            let power = 10_f64.powi(prefix.into());
+            let rounded =
+                |divisor, zero| Unit { divisor: (divisor * power) as f32, zero: (zero / power) as f32 };
+            for (unit, pascal) in pressures {
+                assert_eq!(Unit::pressure(code(unit)), Some(rounded(pascal, 0.0)), "{unit:X} {prefix}");
+            }
+            for (unit, kelvin, zero) in temperatures {
+                assert_eq!(Unit::temperature(code(unit)), Some(rounded(kelvin, zero)), "{unit:X} {prefix}");
+            }
+        }
     }
 
     #[test]

@@ -70,7 +70,7 @@ impl Board {
             unless_stored,
             personality,
             protocol: Protocol::new(&unless_stored),
-            measurement: Measurement::new(Start::First),
+            measurement: Measurement::new(personality, Start::First),
             flash: Flash::erased(),
             store: None,
             out: Queue::default(),
@@ -99,7 +99,7 @@ impl Board {
             self.protocol.load(&mut view);
             self.store = Store::prepare(view).ok();
         }
-        self.measurement = Measurement::new(kept);
+        self.measurement = Measurement::new(self.personality, kept);
         self.measurement.apply(&self.protocol.prepare());
         self.start();
     }

@@ -1,0 +1,188 @@
+//! The filling of the run-time tables. What is in them already is not put there again: places of the same shape, equal
+//! attributes, and default values that follow each other somewhere as they are needed.
+
+use super::compile::{effective_limits, event_timer, object_len, series_len};
+use super::entry::Attributes;
+use super::tables::{Place, Series};
+use super::{Counts, DefaultValue, Object, Rule, image_size};
+
+/// Room for tables, and how much of it is filled.
+pub(super) struct Filling {
+    pub(super) series: [Series; MOST],
+    pub(super) places: [Place; MOST],
+    pub(super) attributes: [Attributes; MOST_ATTRIBUTES],
+    pub(super) defaults: [u8; 4 * MOST],
+    pub(super) filled: Counts,
+}
+
+/// More series or places than these do not compile.
+const MOST: usize = 1024;
+/// A place names its attributes in a byte.
+const MOST_ATTRIBUTES: usize = 256;
+
+#[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges, and there is no room for more numbers.
+impl Filling {
+    pub(super) const fn of(all: &[&[Object]]) -> Filling {
+        let mut filling = Filling {
+            series: [Series { index: 0, offset: 0, first: 0, defaults: 0, given: 0, objects: 0, entries: 0 };
+                MOST],
+            places: [Place { sub: 0, attributes: 0, offset: 0 }; MOST],
+            attributes: [attributes(&all[0][0]); MOST_ATTRIBUTES],
+            defaults: [0; 4 * MOST],
+            filled: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
+        };
+        let mut i = 0;
+        while i < all.len() {
+            filling.add(all[i]);
+            i += 1;
+        }
+        filling
+    }
+
+    const fn add(&mut self, rows: &[Object]) {
+        let (mut row, mut offset) = (0, 0);
+        while row < rows.len() {
+            let entries = object_len(rows, row);
+            let series = rows.split_at(row).1.split_at(entries * series_len(rows, row)).0;
+            self.add_series(rows, series, entries, offset as u16);
+            (row, offset) = (row + series.len(), offset + image_size(series));
+        }
+    }
+
+    /// Objects of so many entries among `all` rows, the first at this place in the image.
+    const fn add_series(&mut self, all: &[Object], rows: &[Object], entries: usize, offset: u16) {
+        let given = self.write_defaults(rows);
+        self.series[self.filled.series] = Series {
+            index: rows[0].index,
+            offset,
+            first: self.add_places(all, rows.split_at(entries).0, offset) as u16,
+            defaults: self.add_defaults(given) as u16,
+            given: given as u16,
+            objects: (rows.len() / entries) as u8,
+            entries: entries as u8,
+        };
+        self.filled.series += 1;
+    }
+
+    /// The number of the first of them: where the same places have been before, or behind all others.
+    const fn add_places(&mut self, all: &[Object], object: &[Object], start_of_object: u16) -> usize {
+        let (start, mut row, mut next) = (self.filled.places, 0, 0);
+        while row < object.len() {
+            let attributes = self.add_attributes(attributes(&object[row])) as u8;
+            let offset = match object[row].rule {
+                Rule::EventTimerOf(number) => {
+                    let timer = image_size(all.split_at(event_timer(all, number)).0);
+                    (timer as u16).wrapping_sub(start_of_object)
+                }
+                _ => next,
+            };
+            self.places[start + row] = Place { sub: object[row].sub, attributes, offset };
+            (row, next) = (row + 1, next + object[row].stored_size() as u16);
+        }
+        let mut first = 0;
+        while !self.has_places(first, start, object.len()) {
+            first += 1;
+        }
+        self.filled.places = larger(start, first + object.len());
+        first
+    }
+
+    /// Whether the places from `first` on are those from `start` on.
+    const fn has_places(&self, first: usize, start: usize, len: usize) -> bool {
+        let mut i = 0;
+        while i < len {
+            let (a, b) = (&self.places[first + i], &self.places[start + i]);
+            if a.sub != b.sub || a.attributes != b.attributes || a.offset != b.offset {
+                return false;
+            }
+            i += 1;
+        }
+        true
+    }
+
+    const fn add_attributes(&mut self, attributes: Attributes) -> usize {
+        let mut number = 0;
+        while number < self.filled.attributes && !is_same(&self.attributes[number], &attributes) {
+            number += 1;
+        }
+        self.attributes[number] = attributes;
+        self.filled.attributes = larger(self.filled.attributes, number + 1);
+        number
+    }
+
+    /// Writes default values behind all others; gives their number without the zeros at the end.
+    const fn write_defaults(&mut self, rows: &[Object]) -> usize {
+        let (mut at, mut given, mut row) = (0, 0, 0);
+        while row < rows.len() {
+            let mut i = 0;
+            while i < rows[row].stored_size() {
+                let byte = default_byte(rows[row].default, i);
+                self.defaults[self.filled.defaults + at] = byte;
+                (at, i) = (at + 1, i + 1);
+                given = if byte == 0 { given } else { at };
+            }
+            row += 1;
+        }
+        given
+    }
+
+    /// The number of the first of those that have been written: where the same values have been before, or where they are.
+    const fn add_defaults(&mut self, given: usize) -> usize {
+        let (start, mut first) = (self.filled.defaults, 0);
+        while !self.has_defaults(first, start, given) {
+            first += 1;
+        }
+        self.filled.defaults = larger(start, first + given);
+        first
+    }
+
+    /// Whether the values from `first` on are those from `start` on.
+    const fn has_defaults(&self, first: usize, start: usize, len: usize) -> bool {
+        let mut i = 0;
+        while i < len && self.defaults[first + i] == self.defaults[start + i] {
+            i += 1;
+        }
+        i == len
+    }
+}
+
+const fn larger(a: usize, b: usize) -> usize {
+    if a > b { a } else { b }
+}
+
+pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
+    a.low == b.low
+        && a.high == b.high
+        && a.kind.code() == b.kind.code()
+        && a.kind.size() == b.kind.size()
+        && a.rule.code() == b.rule.code()
+        && a.access as u8 == b.access as u8
+        && a.mapping as u8 == b.mapping as u8
+        && a.group as u8 == b.group as u8
+        && a.node_relative == b.node_relative
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `check` has seen the ranges.
+pub(super) const fn attributes(row: &Object) -> Attributes {
+    let (low, high) = effective_limits(row);
+    Attributes {
+        low: row.kind.ordered(low as u32),
+        high: row.kind.ordered(high as u32),
+        kind: row.kind,
+        access: row.access,
+        mapping: row.mapping,
+        group: row.group,
+        rule: row.rule,
+        node_relative: matches!(row.default, DefaultValue::NodeId(_)),
+    }
+}
+
+const fn default_byte(value: DefaultValue, i: usize) -> u8 {
+    match value {
+        DefaultValue::Integer(value) => value.to_le_bytes()[i],
+        DefaultValue::Real(value) => value.to_le_bytes()[i],
+        DefaultValue::NodeId(base) => base.to_le_bytes()[i],
+        DefaultValue::Text(text) if i < text.len() => text.as_bytes()[i],
+        DefaultValue::Text(_) | DefaultValue::None => 0,
+    }
+}
