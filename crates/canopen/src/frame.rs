@@ -1,6 +1,7 @@
 //! The frames that CANopen uses: 11-bit identifiers, data or remote.
 
 use crate::CanId;
+use crate::copy::copy;
 
 /// A frame on the wire. CANopen services of this node use the CAN base frame format only (CiA 301, 7.3.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +17,7 @@ impl Frame {
     #[must_use]
     pub fn new(id: u16, bytes: &[u8]) -> Option<Frame> {
         let mut data = [0; 8];
-        data.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        copy(data.get_mut(..bytes.len())?, bytes);
         let len = u8::try_from(bytes.len()).ok()?;
         (id <= 0x7FF).then_some(Frame { id, remote: false, len, data })
     }

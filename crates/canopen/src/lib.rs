@@ -13,6 +13,7 @@
 #![warn(clippy::pedantic)]
 
 mod can_id;
+mod copy;
 mod device;
 pub mod dictionary;
 pub mod emcy;

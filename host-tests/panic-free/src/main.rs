@@ -129,9 +129,9 @@ extern "C" fn measure(
 
 /// What the encoder keeps, out and in again.
 #[unsafe(no_mangle)]
-extern "C" fn power_cycle(measurement: &mut Measurement, personality: Personality) {
+extern "C" fn power_cycle(measurement: &mut Measurement, personality: &Personality) {
     let kept = measurement.kept().map(|kept| Kept::from_words(&kept.to_words()));
-    *measurement = Measurement::new(personality, kept.map_or(Start::First, Start::Kept));
+    *measurement = Measurement::new(*personality, kept.map_or(Start::First, Start::Kept));
 }
 
 /// Storing.

@@ -4,7 +4,7 @@ use crate::support::{SECOND, world};
 
 const KIB: u32 = 1024;
 const FLASH: u32 = 96 * KIB;
-/// Of variables; the stack has 16 KiB of its own.
+/// Of variables; the stack has 20 KiB of its own.
 const RAM: u32 = 24 * KIB;
 
 #[test]

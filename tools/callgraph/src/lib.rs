@@ -22,8 +22,8 @@ pub use stack::{Bound, Level};
 /// The images, as cargo names them.
 pub const IMAGES: [&str; 2] = ["firmware", "bootloader"];
 
-/// Prints the known calls that lead to a panic. An error names the others, and what is known but not there. What is known of
-/// a function whose path contains `forget` is forgotten, to show that the check can fail.
+/// Prints the known calls that lead to a panic; an error names the others. What is known of a function whose path contains
+/// `forget` is forgotten, to show that the check can fail.
 pub fn check_panics(images: &Path, forget: Option<&str>) -> Result<()> {
     println!("| image | what can panic | calls | why |\n|---|---|---|---|");
     let known: Vec<_> = lists::KNOWN

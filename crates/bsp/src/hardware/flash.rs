@@ -52,7 +52,7 @@ impl Flash {
         // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
         // value too.
         let there = unsafe { core::slice::from_raw_parts(address as *const u8, bytes.len()) };
-        bytes.copy_from_slice(there);
+        bytes.iter_mut().zip(there).for_each(|(to, from)| *to = *from);
         Ok(())
     }
 

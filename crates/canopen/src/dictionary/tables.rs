@@ -16,6 +16,7 @@
 use super::entry::{Attributes, little_endian};
 use super::{Entry, Field};
 use crate::NodeId;
+use crate::copy::copy;
 use crate::device::PDOS;
 use crate::pdo::Direction;
 use crate::sdo::Abort;
@@ -103,7 +104,7 @@ impl Dictionary {
         image.fill(0);
         for series in self.series {
             let values = image.get_mut(usize::from(series.offset)..).unwrap_or_default();
-            values.iter_mut().zip(self.defaults_of(series)).for_each(|(value, default)| *value = *default);
+            copy(values, self.defaults_of(series));
         }
     }
 

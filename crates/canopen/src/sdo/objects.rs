@@ -1,6 +1,7 @@
 //! What the server serves, and the two ends of a transfer: where data comes from and where it goes.
 
 use super::{Abort, Bytes, Multiplexer, crc};
+use crate::copy::copy;
 use crate::{Instant, Part};
 
 /// The longest value that is handed over in one piece, and how much of a stream is.
@@ -45,7 +46,7 @@ impl Source {
     pub(super) fn new(at: Multiplexer, value: &[u8], buffer: &mut [u8; BUFFER]) -> Source {
         let len = value.len();
         if let Some(place) = buffer.get_mut(..len) {
-            place.copy_from_slice(value);
+            copy(place, value);
         }
         Source { at, len }
     }
@@ -134,7 +135,7 @@ impl Sink {
             self.hand_over(buffer, objects)?;
         }
         let rest = buffer.get_mut(self.held..).unwrap_or(&mut []);
-        rest.get_mut(..bytes.len()).ok_or(Abort::TooLong)?.copy_from_slice(bytes);
+        copy(rest.get_mut(..bytes.len()).ok_or(Abort::TooLong)?, bytes);
         self.len += bytes.len();
         self.held += bytes.len();
         Ok(())

@@ -127,7 +127,7 @@ impl Encoder {
 
 fn apply(channel: &mut Option<Channel>, all: &Parameters, own: &ChannelParameters, kept: &KeptChannel) {
     match (all.sensor(own), channel) {
-        (Some(sensor), Some(channel)) => channel.apply(all, own, sensor),
+        (Some(sensor), Some(channel)) if channel.is_of(&sensor) => channel.apply(all, own, sensor),
         (Some(sensor), channel) => *channel = Some(Channel::new(all, own, sensor, kept)),
         (None, channel) => *channel = None,
     }

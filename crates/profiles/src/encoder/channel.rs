@@ -97,13 +97,14 @@ impl Channel {
         channel
     }
 
-    /// Takes over parameters, from the next sample on. Another sensor makes another channel.
+    /// Whether it is one of this sensor: another sensor needs another channel.
+    pub(super) fn is_of(&self, sensor: &Sensor) -> bool {
+        sensor.is_like(self.input.sensor())
+    }
+
+    /// Takes over parameters, from the next sample on.
     #[inline(never)]
     pub(super) fn apply(&mut self, all: &Parameters, own: &ChannelParameters, sensor: Sensor) {
-        if !sensor.is_like(self.input.sensor()) {
-            *self = Channel::new(all, own, sensor, &KeptChannel::default());
-            return;
-        }
         let scale = all.scale(&sensor);
         let shaft = self.input.tracker().map(super::Tracker::shaft).unwrap_or_default();
         self.position.rescale(scale, shaft);
