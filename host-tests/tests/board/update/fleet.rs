@@ -1,7 +1,6 @@
 //! The command `nodectl update` on the bus of the emulated boards, in virtual time.
 
 use std::cell::RefCell;
-use std::io;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -10,7 +9,7 @@ use canopen::{Frame, Instant};
 use clap::Parser;
 use nodectl::Network;
 use nodectl::bus::{Bus, BusError, Received};
-use nodectl::cli::{Cli, Output, Session};
+use nodectl::cli::{Cli, Output, Paper, Session};
 use serde_json::{Value, json};
 use sign::image::Image;
 use sim::world::World;
@@ -113,20 +112,6 @@ pub(super) fn boards(count: u8) -> Shared {
     world
 }
 
-/// Takes what is printed.
-#[derive(Clone, Default)]
-struct Paper(Rc<RefCell<Vec<u8>>>);
-
-impl io::Write for Paper {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.borrow_mut().write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// `nodectl update --force`, as A is the older version: what it reports, a line for each node in the order in which they
 /// were done.
 pub(super) fn update(world: &Shared, nodes: &str, image: &Image, outage: Option<Outage>) -> Vec<Value> {
@@ -145,7 +130,7 @@ pub(super) fn update(world: &Shared, nodes: &str, image: &Image, outage: Option<
     let result = cli.run_in(&mut Session::with(Network::open(open).unwrap(), &cli.options, output));
     world.borrow_mut().close_port(port);
 
-    let printed = String::from_utf8(paper.0.take()).unwrap();
+    let printed = paper.take();
     result.unwrap_or_else(|failure| panic!("{failure}: {printed}"));
     println!("{:6.2} s: {printed}", world.borrow().now().as_secs_f64());
     printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()

@@ -8,6 +8,7 @@ mod nmt;
 mod node_set;
 mod options;
 mod output;
+mod paper;
 mod read;
 mod record;
 mod scan;
@@ -21,6 +22,7 @@ use clap::{Parser, Subcommand};
 pub use failure::Failure;
 pub use options::Options;
 pub use output::Output;
+pub use paper::Paper;
 pub use session::Session;
 
 /// Talks to CANopen nodes: read, write, watch, configure, update.

@@ -1,30 +1,12 @@
 //! The commands, in process: what they print and what they end with.
 
-use std::cell::RefCell;
-use std::io;
-use std::rc::Rc;
-
 use clap::Parser;
 use node::Personality;
-use nodectl::cli::{Cli, Failure, Output, Session};
+use nodectl::cli::{Cli, Failure, Output, Paper, Session};
 
 use crate::loader::{Loader, identification};
 use crate::pressure::Pressure;
 use crate::wire::Wire;
-
-/// Takes what is printed.
-#[derive(Clone, Default)]
-struct Paper(Rc<RefCell<Vec<u8>>>);
-
-impl io::Write for Paper {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.borrow_mut().write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
 
 /// Does a command; what it printed and how it ended.
 fn run<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (String, Result<(), Failure>) {
@@ -32,8 +14,7 @@ fn run<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (St
     let paper = Paper::default();
     let output = Output::new(paper.clone(), cli.options.json);
     let result = cli.run_in(&mut Session::with(wire.network(), &cli.options, output));
-    let printed = String::from_utf8(paper.0.take()).expect("text");
-    (printed, result)
+    (paper.take(), result)
 }
 
 fn printed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> String {
