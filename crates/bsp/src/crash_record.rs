@@ -3,6 +3,7 @@
 const MAGIC: u32 = 0x4352_5348;
 const FAULT: u32 = 1;
 const PANIC: u32 = 2;
+const INTERRUPT: u32 = 3;
 const FILE_WORDS: usize = 8;
 
 /// Words of a sealed record.
@@ -18,6 +19,9 @@ pub enum Crash {
     Fault(Fault),
     /// The program gave up.
     Panic(Place),
+    /// An interrupt came that nobody serves: its number in the NVIC, or, below 0, that of an exception of the core less 16
+    /// (PM0214, 2.3.2: IRQ number).
+    Interrupt(i16),
 }
 
 /// Registers at a fault (PM0214, 4.4). Program counter and link register are 0 when the stack could not be read, as
@@ -90,6 +94,7 @@ impl Crash {
         match *kind {
             FAULT => Some(Crash::Fault(fault(content))),
             PANIC => Some(Crash::Panic(place(content))),
+            INTERRUPT => Some(Crash::Interrupt(interrupt(content))),
             _ => None,
         }
     }
@@ -98,6 +103,7 @@ impl Crash {
         match self {
             Crash::Fault(f) => (FAULT, [f.pc, f.lr, f.sp, f.cfsr, f.hfsr, f.address, 0, 0, 0]),
             Crash::Panic(place) => (PANIC, place_words(place)),
+            Crash::Interrupt(number) => (INTERRUPT, [u32::from(number.cast_unsigned()); 1 + FILE_WORDS]),
         }
     }
 }
@@ -116,6 +122,11 @@ fn place(content: &[u32]) -> Place {
     let (chunks, _) = file.as_chunks_mut::<4>();
     chunks.iter_mut().zip(words).for_each(|(to, from)| *to = from.to_le_bytes());
     Place { line, file }
+}
+
+fn interrupt(content: &[u32]) -> i16 {
+    let [low, high, ..] = content.first().copied().unwrap_or_default().to_le_bytes();
+    i16::from_le_bytes([low, high])
 }
 
 fn fault(content: &[u32]) -> Fault {
@@ -147,7 +158,7 @@ mod tests {
     #[test]
     fn a_crash_survives() {
         let panicked = Crash::Panic(Place::new("crates/canopen/src/sdo.rs", 77));
-        for crash in [FAULTED, panicked] {
+        for crash in [FAULTED, panicked, Crash::Interrupt(63), Crash::Interrupt(-2)] {
             assert_eq!(Crash::open(&crash.seal()), Some(crash));
         }
     }

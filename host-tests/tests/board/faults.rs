@@ -5,13 +5,20 @@ use chip::Peripherals;
 
 use crate::support::{SECOND, comes_back, run, running};
 
-/// The first word of RAM, below which the stack must not grow.
+/// The first word of RAM, below which the stack must not grow, and a place that no image uses.
 const RAM: u32 = 0x2000_0000;
+const UNUSED: u32 = RAM + 0x1_0000;
 /// The start of what the bootloader looks at: the application's vector table (memory.x).
 const APPLICATION: u32 = 0x0801_0200;
 const VECTORS: usize = 512;
 /// Control register 1 of the timer that starts the conversions.
 const TIM3_CR1: u32 = 0x4000_0400;
+/// An interrupt that the node has no use for, its bit in word 1 of the NVIC, and that word of the registers that enable an
+/// interrupt and that set it pending (RM0390, table 38; PM0214, 4.3).
+const CAN2_TX: u32 = 63;
+const CAN2_TX_BIT: u32 = 1 << (CAN2_TX - 32);
+const NVIC_ISER1: u32 = 0xE000_E104;
+const NVIC_ISPR1: u32 = 0xE000_E204;
 /// EMCY code for a reset that nobody asked for (object 3000h:3, bit 6).
 const UNEXPECTED_RESET: u16 = 0x6101;
 /// Stack pointer and program counter.
@@ -34,6 +41,22 @@ fn a_wild_jump_ends_in_a_recorded_reset_with_its_address() {
     world.machine(0).set_register(PC, 0x3000_0000);
     let log = comes_back(&mut world);
     assert!(log.contains("fault at 0x30000000"), "{log}");
+}
+
+/// The program enables an interrupt for which it has no handler, and the interrupt comes.
+#[test]
+fn an_interrupt_that_nobody_serves_ends_in_a_recorded_reset() {
+    /// STR r2, \[r0\]; STR r2, \[r1\]; B to itself.
+    const CODE: [u8; 6] = [0x02, 0x60, 0x0A, 0x60, 0xFE, 0xE7];
+    let mut world = running();
+    let machine = world.machine(0);
+    machine.write(UNUSED, &CODE).unwrap();
+    for (register, value) in [(0, NVIC_ISER1), (1, NVIC_ISPR1), (2, CAN2_TX_BIT), (PC, UNUSED)] {
+        machine.set_register(register, value);
+    }
+    let log = comes_back(&mut world);
+    assert!(log.contains(&format!("interrupt {CAN2_TX},")), "{log}");
+    assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET), "{log}");
 }
 
 #[test]

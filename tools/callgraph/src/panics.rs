@@ -53,11 +53,10 @@ impl fmt::Display for Site {
     }
 }
 
-/// Every such call of an image.
+/// Every such call of an image. The linker leaves out a panic handler that nothing calls.
 pub(crate) fn sites(path: &Path, image: &Image<'_>, graph: &Graph) -> Result<Vec<Site>> {
     let loader = Loader::new(path).map_err(|error| anyhow!("{}: {error}", path.display()))?;
     let panics = panics(image, graph, &loader)?;
-    ensure!(!panics.is_empty(), "{} has no panic handler", path.display());
     let mut sites = vec![];
     for (_, body) in graph.bodies().filter(|(start, _)| !panics.contains(start)) {
         for way in body.ways.iter().filter(|way| panics.contains(&way.to)) {

@@ -1,4 +1,4 @@
-//! The crash record, and what writes one at a panic.
+//! The crash record: what writes it, and what the next start does with it.
 
 use core::panic::Location;
 
@@ -19,6 +19,7 @@ pub(super) fn is_recorded() -> bool {
 
 /// Writes the record and restarts.
 pub(crate) fn restart(crash: &Crash) -> ! {
+    cortex_m::interrupt::disable();
     retained::set_crash(crash.seal());
     cortex_m::peripheral::SCB::sys_reset()
 }
@@ -29,6 +30,9 @@ pub fn log(crash: &Crash) {
         Crash::Fault(fault) => log_fault(fault),
         Crash::Panic(place) => {
             defmt::error!("the last run ended in a panic at {=str}:{=u32}", place.file(), place.line());
+        }
+        Crash::Interrupt(number) => {
+            defmt::error!("the last run ended in interrupt {=i16}, which nobody serves", number)
         }
     }
 }
@@ -50,7 +54,6 @@ fn log_fault(fault: &Fault) {
 /// What the panic handler of an image does. It is not the handler itself because one that uses the place is linked with the
 /// names of all places, for which the bootloader has no room.
 pub fn panicked(place: Option<&Location<'_>>) -> ! {
-    cortex_m::interrupt::disable();
     let place = place.map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));
     restart(&Crash::Panic(place))
 }

@@ -67,5 +67,5 @@ fn stacked(sp: u32) -> Option<[u32; 2]> {
 /// An interrupt without a handler: the program enabled what it does not serve.
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
-    panic!("unexpected exception {number}")
+    crash::restart(&Crash::Interrupt(number))
 }
