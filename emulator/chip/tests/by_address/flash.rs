@@ -3,23 +3,11 @@
 use canbus::Time;
 use chip::{Board, BusFault, Effect, Peripherals, Stm32f4, Variant};
 
+use crate::flash_interface::{
+    BSY, CR, EOP, EOPIE, ERRIE, KEYR, KEYS, LOCK, MER, PG, PGAERR, PGPERR, PGSERR, SR, STRT, WRPERR, X32, erasure,
+};
 use crate::support::Rig;
 
-const FLASH: u32 = 0x4002_3C00;
-const KEYR: u32 = FLASH + 0x04;
-const SR: u32 = FLASH + 0x0C;
-const CR: u32 = FLASH + 0x10;
-const BSY: u32 = 1 << 16;
-const LOCK: u32 = 1 << 31;
-const PG: u32 = 1;
-const SER: u32 = 1 << 1;
-const MER: u32 = 1 << 2;
-const STRT: u32 = 1 << 16;
-const X32: u32 = 2 << 8;
-const WRPERR: u32 = 1 << 4;
-const PGAERR: u32 = 1 << 5;
-const PGPERR: u32 = 1 << 6;
-const PGSERR: u32 = 1 << 7;
 const FLASH_IRQ: u8 = 4;
 /// Sector 2, 16 KiB.
 const PAGE: u32 = 0x0800_8000;
@@ -27,26 +15,12 @@ const PAGE_END: u32 = 0x0800_C000;
 
 fn unlocked() -> Rig {
     let mut rig = Rig::new();
-    rig.write(KEYR, 0x4567_0123);
-    rig.write(KEYR, 0xCDEF_89AB);
+    rig.unlock_flash();
     rig
-}
-
-fn erase(rig: &mut Rig, sector: u32) {
-    rig.write(CR, SER | sector << 3 | X32);
-    rig.write(CR, SER | sector << 3 | X32 | STRT);
 }
 
 fn word(rig: &Rig, address: u32) -> u32 {
     u32::from_le_bytes([0, 1, 2, 3].map(|n| rig.byte(address + n)))
-}
-
-fn wait_ready(rig: &mut Rig) -> Time {
-    let start = rig.now;
-    while rig.read(SR) & BSY != 0 {
-        rig.wait(Time::from_micros(16));
-    }
-    rig.now - start
 }
 
 #[test]
@@ -64,13 +38,12 @@ fn it_unlocks_with_both_keys_and_locks_again() {
 #[test]
 fn a_wrong_key_is_a_bus_error_until_the_next_reset() {
     let mut rig = Rig::new();
-    rig.write(KEYR, 0x4567_0123);
+    rig.write(KEYR, KEYS[0]);
     let now = rig.now;
     assert_eq!(rig.chip.write(KEYR, 4, 0x1234, now), Err(BusFault));
-    assert_eq!(rig.chip.write(KEYR, 4, 0x4567_0123, now), Err(BusFault));
+    assert_eq!(rig.chip.write(KEYR, 4, KEYS[0], now), Err(BusFault));
     rig.chip.reset(false, now);
-    rig.write(KEYR, 0x4567_0123);
-    rig.write(KEYR, 0xCDEF_89AB);
+    rig.unlock_flash();
     assert_eq!(rig.read(CR), 0);
 }
 
@@ -82,10 +55,10 @@ fn an_erase_takes_its_time_and_stalls_the_core() {
         let mut rig = unlocked();
         rig.memory.0.extend(range.clone().map(|address| (address, 0x5A)));
         rig.memory.0.insert(range.start - 1, 0x5A);
-        erase(&mut rig, sector);
+        rig.erase(sector);
         let end = rig.now + Time::from_millis(millis);
         assert!(rig.effects.contains(&Effect::StallFlash(end)));
-        assert_eq!(wait_ready(&mut rig), Time::from_millis(millis));
+        assert_eq!(rig.wait_for_flash(), Time::from_millis(millis));
         assert!(range.clone().all(|address| rig.byte(address) == 0xFF));
         assert_eq!(rig.byte(range.start - 1), 0x5A, "no more than the sector");
     }
@@ -96,9 +69,9 @@ fn programming_clears_bits_and_never_sets_them() {
     let mut rig = unlocked();
     rig.write(CR, PG | X32);
     rig.program(PAGE, &0xFFFF_00FF_u32.to_le_bytes());
-    assert_eq!(wait_ready(&mut rig), Time::from_micros(16));
+    assert_eq!(rig.wait_for_flash(), Time::from_micros(16));
     rig.program(PAGE, &0x0FFF_FFFF_u32.to_le_bytes());
-    wait_ready(&mut rig);
+    rig.wait_for_flash();
     assert_eq!(word(&rig, PAGE), 0x0FFF_00FF);
     assert_eq!(rig.read(SR), 0);
 }
@@ -158,10 +131,9 @@ fn a_store_without_pg_is_a_sequence_error_that_stays() {
 fn a_protected_sector_is_neither_erased_nor_programmed() {
     let mut rig = unlocked();
     rig.chip = Stm32f4::new(Variant::F446, Board { write_protected: 0b100, ..Board::default() });
-    rig.write(KEYR, 0x4567_0123);
-    rig.write(KEYR, 0xCDEF_89AB);
+    rig.unlock_flash();
     rig.memory.0.insert(PAGE, 0x5A);
-    erase(&mut rig, 2);
+    rig.erase(2);
     assert_eq!(rig.read(SR), WRPERR);
     rig.write(SR, WRPERR);
     rig.write(CR, PG | X32);
@@ -175,13 +147,13 @@ fn a_protected_sector_is_neither_erased_nor_programmed() {
 #[test]
 fn end_of_operation_raises_its_interrupt_when_enabled() {
     let mut rig = unlocked();
-    rig.write(CR, SER | 2 << 3 | X32 | 1 << 24);
-    rig.write(CR, SER | 2 << 3 | X32 | 1 << 24 | STRT);
+    rig.write(CR, erasure(2) | EOPIE);
+    rig.write(CR, erasure(2) | EOPIE | STRT);
     let start = rig.now;
     assert_eq!(rig.run_to_irq(FLASH_IRQ, Time::from_millis(500)), Some(start + Time::from_millis(250)));
-    rig.write(SR, 1);
+    rig.write(SR, EOP);
     assert!(!rig.irq(FLASH_IRQ));
-    rig.write(CR, PG | X32 | 1 << 25);
+    rig.write(CR, PG | X32 | ERRIE);
     rig.program(PAGE, &[0; 2]);
     assert!(rig.irq(FLASH_IRQ), "OPERR");
 }
@@ -210,7 +182,7 @@ fn a_cut_while_erasing_leaves_part_of_the_sector() {
     let mut rig = unlocked();
     rig.memory.0.extend((PAGE..PAGE_END).map(|address| (address, 0)));
     rig.chip.flash_mut().cut_power_at_operation(1);
-    erase(&mut rig, 2);
+    rig.erase(2);
     assert!(!rig.effects.contains(&Effect::PowerCut));
     rig.wait(Time::from_millis(125));
     assert!(rig.effects.contains(&Effect::PowerCut));
@@ -223,7 +195,7 @@ fn a_cut_while_erasing_leaves_part_of_the_sector() {
 fn a_reset_while_erasing_tears_the_sector_too() {
     let mut rig = unlocked();
     rig.memory.0.extend((PAGE..PAGE_END).map(|address| (address, 0)));
-    erase(&mut rig, 2);
+    rig.erase(2);
     rig.wait(Time::from_millis(10));
     rig.chip.reset(false, rig.now);
     rig.read(SR);
@@ -236,10 +208,9 @@ fn a_reset_while_erasing_tears_the_sector_too() {
 #[test]
 fn the_f407_has_twelve_sectors() {
     let mut rig = Rig::with(Variant::F407);
-    rig.write(KEYR, 0x4567_0123);
-    rig.write(KEYR, 0xCDEF_89AB);
+    rig.unlock_flash();
     rig.memory.0.insert(0x080F_FFFF, 0);
-    erase(&mut rig, 11);
-    wait_ready(&mut rig);
+    rig.erase(11);
+    rig.wait_for_flash();
     assert_eq!(rig.byte(0x080F_FFFF), 0xFF);
 }

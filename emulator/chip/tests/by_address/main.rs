@@ -5,6 +5,7 @@ mod clocks;
 mod conversions;
 mod encoder;
 mod flash;
+mod flash_interface;
 mod others;
 mod protection;
 mod support;

@@ -4,18 +4,9 @@ use canbus::Time;
 use chip::{BusFault, Peripherals};
 use protect::{Error, OptionBytes, ReadOut, Registers, current, program};
 
+use crate::flash_interface::{CR, FLASH, LOCK, PG, SR, STRT, WRPERR, X32, erasure};
 use crate::support::Rig;
 
-const FLASH: u32 = 0x4002_3C00;
-const KEYR: u32 = FLASH + 0x04;
-const SR: u32 = FLASH + 0x0C;
-const CR: u32 = FLASH + 0x10;
-const BSY: u32 = 1 << 16;
-const WRPERR: u32 = 1 << 4;
-const PG: u32 = 1;
-const SER: u32 = 1 << 1;
-const STRT: u32 = 1 << 16;
-const X32: u32 = 2 << 8;
 /// First words of sectors 0, 1 and 4: the bootloader, and the application.
 const BOOTLOADER: [(u32, u32); 2] = [(0, 0x0800_0000), (1, 0x0800_4000)];
 const APPLICATION: (u32, u32) = (4, 0x0801_0000);
@@ -38,22 +29,19 @@ impl Registers for Rig {
 
 /// What the flash says to an erase of a sector and to a word programmed at its start.
 fn erase_and_program(rig: &mut Rig, (sector, start): (u32, u32)) -> [u32; 2] {
-    Rig::write(rig, KEYR, 0x4567_0123);
-    Rig::write(rig, KEYR, 0xCDEF_89AB);
-    Rig::write(rig, CR, SER | sector << 3 | X32 | STRT);
+    rig.unlock_flash();
+    Rig::write(rig, CR, erasure(sector) | STRT);
     let erase = settled(rig);
     Rig::write(rig, CR, PG | X32);
     rig.program(start, &[0; 4]);
     let program = settled(rig);
-    Rig::write(rig, CR, 1 << 31);
+    Rig::write(rig, CR, LOCK);
     [erase, program]
 }
 
 /// The error flags at the end, cleared.
 fn settled(rig: &mut Rig) -> u32 {
-    while Rig::read(rig, SR) & BSY != 0 {
-        rig.wait(Time::from_millis(1));
-    }
+    rig.wait_for_flash();
     let flags = Rig::read(rig, SR);
     Rig::write(rig, SR, flags);
     flags
