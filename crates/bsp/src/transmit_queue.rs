@@ -2,6 +2,9 @@
 //!
 //! The bus itself prefers the lowest identifier. A plain queue in front of the mailboxes would undo that: a heartbeat
 //! that came first would hold up a SYNC (priority inversion).
+//!
+//! Of heartbeats and PDOs only the newest waits. Else a node that more urgent frames have kept silent would fill the queue with
+//! what has long ceased to be so, and would tell it all in the first gap.
 
 use canopen::{Frame, QueueFull, Transmit};
 use heapless::Vec;
@@ -26,28 +29,36 @@ pub trait Mailboxes {
     fn offer(&mut self, frame: &Frame) -> Offer;
 }
 
+/// A frame that waits.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    frame: Frame,
+    /// A newer one of its identifier takes its place.
+    is_state: bool,
+}
+
 /// The queue.
 #[derive(Debug, Default)]
 pub struct TransmitQueue {
     /// The most urgent frame is the last one.
-    frames: Vec<Frame, CAPACITY>,
+    waiting: Vec<Waiting, CAPACITY>,
 }
 
 impl TransmitQueue {
     /// An empty queue.
     #[must_use]
     pub const fn new() -> TransmitQueue {
-        TransmitQueue { frames: Vec::new() }
+        TransmitQueue { waiting: Vec::new() }
     }
 
     /// Moves frames into the mailboxes until they take no more.
     pub fn pump(&mut self, mailboxes: &mut impl Mailboxes) {
-        while let Some(frame) = self.frames.last() {
+        while let Some(Waiting { frame, .. }) = self.waiting.last() {
             match mailboxes.offer(frame) {
                 Offer::Refused => return,
-                Offer::Taken => drop(self.frames.pop()),
+                Offer::Taken => drop(self.waiting.pop()),
                 Offer::Replaced(other) => {
-                    self.frames.pop();
+                    self.waiting.pop();
                     // The frame that left made room for this one.
                     let _ = self.push_first(other);
                 }
@@ -58,40 +69,58 @@ impl TransmitQueue {
     /// Whether nothing waits.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
+        self.waiting.is_empty()
     }
 
     /// Drops everything that waits.
     pub fn clear(&mut self) {
-        self.frames.clear();
+        self.waiting.clear();
     }
 
-    /// Adds a frame before those of its identifier: it was taken before them.
+    /// Adds a frame before those of its identifier: it was taken before them. As there is one of an identifier in the mailboxes
+    /// at most, there is one of these at most, and it need not make way.
     fn push_first(&mut self, frame: Frame) -> Result<(), QueueFull> {
-        self.insert(self.frames.partition_point(|other| other.id() >= frame.id()), frame)
+        let index = self.waiting.partition_point(|other| other.frame.id() >= frame.id());
+        self.insert(index, Waiting { frame, is_state: false })
+    }
+
+    /// The place behind those of this identifier.
+    fn place(&self, frame: &Frame) -> usize {
+        self.waiting.partition_point(|other| other.frame.id() > frame.id())
     }
 
     /// Moves what is behind the place one further. `Vec::insert` panics at a place behind the end.
-    fn insert(&mut self, index: usize, frame: Frame) -> Result<(), QueueFull> {
-        if self.frames.is_full() {
+    fn insert(&mut self, index: usize, new: Waiting) -> Result<(), QueueFull> {
+        if self.waiting.is_full() {
             return Err(QueueFull);
         }
-        let mut moved = frame;
-        for place in self.frames.iter_mut().skip(index) {
+        let mut moved = new;
+        for place in self.waiting.iter_mut().skip(index) {
             core::mem::swap(place, &mut moved);
         }
-        self.frames.push(moved).map_err(|_| QueueFull)
+        self.waiting.push(moved).map_err(|_| QueueFull)
     }
 }
 
 impl Transmit for TransmitQueue {
     /// Adds a frame behind those of its identifier.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
-        self.insert(self.frames.partition_point(|other| other.id() > frame.id()), frame)
+        self.insert(self.place(&frame), Waiting { frame, is_state: false })
+    }
+
+    /// The same, or in place of the last of its identifier, if that is a state as well: what was sent between two states keeps
+    /// them apart.
+    fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        let index = self.place(&frame);
+        match self.waiting.get_mut(index).filter(|last| last.is_state && last.frame.id() == frame.id()) {
+            Some(last) => last.frame = frame,
+            None => self.insert(index, Waiting { frame, is_state: true })?,
+        }
+        Ok(())
     }
 
     fn room(&self) -> usize {
-        CAPACITY - self.frames.len()
+        CAPACITY - self.waiting.len()
     }
 }
 
@@ -176,6 +205,55 @@ mod tests {
         let order = sent(&mut queue, &mut bus);
         assert_eq!(order.len(), CAPACITY + 3);
         assert!(order.is_sorted());
+    }
+
+    #[test]
+    fn of_a_state_the_newest_waits() {
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        for tag in 0..100 {
+            queue.send_state(frame(0x701, tag)).unwrap();
+            queue.send_state(frame(0x181, tag)).unwrap();
+            queue.pump(&mut bus);
+        }
+        let order = sent(&mut queue, &mut bus);
+        assert_eq!(order, [(0x181, 0), (0x181, 99), (0x701, 99)], "and the one that was in a mailbox");
+    }
+
+    #[test]
+    fn a_state_takes_the_place_of_no_other_frame_and_passes_none() {
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        queue.send_state(frame(0x701, 1)).unwrap();
+        queue.send(frame(0x701, 2)).unwrap();
+        queue.send_state(frame(0x701, 3)).unwrap();
+        queue.send_state(frame(0x702, 4)).unwrap();
+        queue.send(frame(0x701, 5)).unwrap();
+        let order = sent(&mut queue, &mut bus);
+        assert_eq!(order, [(0x701, 1), (0x701, 2), (0x701, 3), (0x701, 5), (0x702, 4)]);
+    }
+
+    #[test]
+    fn what_comes_back_from_a_mailbox_is_not_lost_to_a_newer_one() {
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        queue.send_state(frame(0x701, 1)).unwrap();
+        queue.pump(&mut bus);
+        for id in [0x581, 0x281, 0x181] {
+            queue.send(frame(id, 0)).unwrap();
+            queue.pump(&mut bus);
+        }
+        for tag in 2..5 {
+            queue.send_state(frame(0x701, tag)).unwrap();
+        }
+        let order = sent(&mut queue, &mut bus);
+        assert_eq!(order, [(0x181, 0), (0x281, 0), (0x581, 0), (0x701, 1), (0x701, 4)]);
+    }
+
+    #[test]
+    fn a_full_queue_takes_a_state_that_waits_in_it() {
+        let mut queue = TransmitQueue::new();
+        queue.send_state(frame(0x181, 0)).unwrap();
+        while queue.send(frame(1, 0)).is_ok() {}
+        assert_eq!(queue.send_state(frame(0x181, 1)), Ok(()));
+        assert_eq!(queue.send_state(frame(0x182, 0)), Err(QueueFull));
     }
 
     #[test]

@@ -14,6 +14,15 @@ pub trait Transmit {
     /// `QueueFull` when there is no room; the frame is then not queued.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull>;
 
+    /// Queues a frame that tells how things are now: a heartbeat, a PDO. A newer one of its identifier may take its place as
+    /// long as it waits, for then it tells how things were. A queue that does not know the difference sends all of them.
+    ///
+    /// # Errors
+    /// As [`send`](Transmit::send).
+    fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.send(frame)
+    }
+
     /// How many frames `send` would take now.
     fn room(&self) -> usize;
 }
@@ -31,6 +40,12 @@ impl<T: Transmit> Turn<'_, T> {
     #[inline(never)]
     pub(crate) fn send(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send(frame).is_ok()
+    }
+
+    /// The same for a frame of which only the newest counts.
+    #[inline(never)]
+    pub(crate) fn send_state(&mut self, frame: Frame) -> bool {
+        self.is_open && self.out.send_state(frame).is_ok()
     }
 
     /// How many frames `send` would take now.

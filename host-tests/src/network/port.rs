@@ -101,6 +101,10 @@ impl Transmit for Port {
         self.queue.send(frame)
     }
 
+    fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.queue.send_state(frame)
+    }
+
     fn room(&self) -> usize {
         self.queue.room()
     }

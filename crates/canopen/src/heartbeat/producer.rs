@@ -41,8 +41,12 @@ impl Producer {
         if turn.now < self.due {
             return;
         }
-        let code = if self.boot_up { State::Initialising.code() } else { state.code() };
-        if !turn.send(Frame::data_frame(id, 1, [code, 0, 0, 0, 0, 0, 0, 0])) {
+        let message = |state: State| Frame::data_frame(id, 1, [state.code(), 0, 0, 0, 0, 0, 0, 0]);
+        let sent = match self.boot_up {
+            true => turn.send(message(State::Initialising)),
+            false => turn.send_state(message(state)),
+        };
+        if !sent {
             self.due = turn.now + RETRY;
             return;
         }

@@ -152,6 +152,7 @@ impl Scanner {
                 return;
             }
             let data = watched.value(image);
+            // The next message has the same identifier and another object, so none takes the place of another.
             if !turn.send(Frame::data_frame(settings.id, 8, settings.message(watched, data))) {
                 self.inhibited_until = turn.now + RETRY;
                 return;

@@ -124,7 +124,7 @@ impl Tpdo {
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // The client asks again if the queue is full: a sample of the past need not be kept for it.
-                turn.send(Frame::data_frame(settings.id, settings.layout.len(), sampled));
+                turn.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
                 self.send(image, turn);
@@ -177,7 +177,7 @@ impl Tpdo {
     fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         let data = settings.layout.gather(image);
-        let sent = turn.send(Frame::data_frame(settings.id, settings.layout.len(), data));
+        let sent = turn.send_state(Frame::data_frame(settings.id, settings.layout.len(), data));
         self.pending = !sent;
         self.inhibited_until = turn.now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
         if sent {

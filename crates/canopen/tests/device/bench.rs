@@ -177,6 +177,8 @@ impl Application for Numbers {
 /// A transmit queue that keeps all it gets, as long as it has room.
 pub(crate) struct Queue {
     pub(crate) frames: Vec<Frame>,
+    /// Identifiers of those that came as states.
+    pub(crate) states: Vec<u16>,
     pub(crate) room: usize,
 }
 
@@ -184,6 +186,12 @@ impl Transmit for Queue {
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.room = self.room.checked_sub(1).ok_or(QueueFull)?;
         self.frames.push(frame);
+        Ok(())
+    }
+
+    fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.send(frame)?;
+        self.states.push(frame.id());
         Ok(())
     }
 
@@ -231,7 +239,11 @@ impl Bench {
 
     fn with_node_id(node_id: Option<NodeId>) -> Bench {
         let device = Device::new(&DICTIONARY, node_id, Numbers::default());
-        Bench { device, out: Queue { frames: vec![], room: usize::MAX }, now: Instant(1_000_000) }
+        Bench {
+            device,
+            out: Queue { frames: vec![], states: vec![], room: usize::MAX },
+            now: Instant(1_000_000),
+        }
     }
 
     pub(crate) fn start(&mut self) {

@@ -12,6 +12,7 @@ mod nmt;
 mod robustness;
 mod rpdo;
 mod sdo;
+mod states;
 mod store;
 mod sync;
 mod tpdo;

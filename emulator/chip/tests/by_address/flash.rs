@@ -4,7 +4,8 @@ use canbus::Time;
 use chip::{Board, BusFault, Effect, Peripherals, Stm32f4, Variant};
 
 use crate::flash_interface::{
-    BSY, CR, EOP, EOPIE, ERRIE, KEYR, KEYS, LOCK, MER, PG, PGAERR, PGPERR, PGSERR, SR, STRT, WRPERR, X32, erasure,
+    BSY, CR, EOP, EOPIE, ERRIE, KEYR, KEYS, LOCK, MER, PG, PGAERR, PGPERR, PGSERR, SR, STRT, WRPERR, X32,
+    erasure,
 };
 use crate::support::Rig;
 
