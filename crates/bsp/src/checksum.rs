@@ -1,6 +1,11 @@
-//! CRC-32 with a table, which takes 1 KiB of flash: far faster than one without, and too large for a stack. It is a
-//! reference, so that the image has the table once: that of crate `storage` is equal to it.
+//! CRC-32 (ISO HDLC) in two sizes.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-pub(crate) static CRC: &Crc<u32> = &Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// For a few bytes now and then: without a table.
+pub(crate) const SMALL: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// For a whole program: with a table, which takes 1 KiB of flash and is too large for a stack. It is a reference, so that the
+/// image has the table once: that of crate `storage` is equal to it.
+#[cfg(target_os = "none")]
+pub(crate) static FAST: &Crc<u32> = &Crc::<u32>::new(&CRC_32_ISO_HDLC);

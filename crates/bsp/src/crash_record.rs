@@ -1,5 +1,6 @@
-//! What is left of a crash for the next start: a few words in RAM that no start-up code touches, sealed with a sum.
+//! What is left of a crash for the next start: a few words in RAM that no start-up code touches, sealed with a CRC.
 
+use crate::checksum::SMALL;
 const MAGIC: u32 = 0x4352_5348;
 const FAULT: u32 = 1;
 const PANIC: u32 = 2;
@@ -136,10 +137,11 @@ fn fault(content: &[u32]) -> Fault {
     }
 }
 
-/// A sum of all words but the last. What it must tell apart is a record and the noise in RAM after power-on, and a CRC
-/// would be another 200 bytes of the bootloader.
+/// The CRC of all words but the last.
 fn checksum(words: &Sealed) -> u32 {
-    words.iter().take(WORDS - 1).fold(!0, |sum, word| sum.rotate_left(5).wrapping_add(*word))
+    let mut digest = SMALL.digest();
+    words.iter().take(WORDS - 1).for_each(|word| digest.update(&word.to_le_bytes()));
+    digest.finalize()
 }
 
 #[cfg(test)]

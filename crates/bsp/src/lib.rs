@@ -12,7 +12,6 @@ pub mod back_off;
 pub mod bit_rate_detection;
 pub mod bit_timing;
 pub mod bus_state;
-#[cfg(target_os = "none")]
 mod checksum;
 pub mod crash_record;
 pub mod debounce;

@@ -1,8 +1,6 @@
 //! The serial number of 1018h sub-index 4 from the unique identifier of the chip.
 
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+use crate::checksum::SMALL;
 
 /// 32 bits of the 96 of the unique identifier (RM0390, 34.1): its CRC-32.
 ///
@@ -10,7 +8,7 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 /// line must store a number of its own.
 #[must_use]
 pub fn serial_number(unique_id: &[u8; 12]) -> u32 {
-    CRC.checksum(unique_id)
+    SMALL.checksum(unique_id)
 }
 
 #[cfg(test)]

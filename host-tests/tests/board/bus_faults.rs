@@ -3,7 +3,9 @@
 use canbus::{Fault, Position, SeenBy, Time};
 use chip::Peripherals;
 
-use crate::support::{Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, run, running, world};
+use crate::support::{
+    Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, TPDO1, frame, run, running, world,
+};
 
 /// Interrupt enable of CAN1 (RM0390, 30.9.2).
 const CAN1_IER: u32 = 0x4000_6414;
@@ -78,7 +80,7 @@ fn a_participant_with_a_wrong_bit_rate_is_outlived() {
 }
 
 /// For two minutes somebody sends nothing but a frame that comes before all of the node's: it is silent all the time, goes on
-/// measuring, and is back with the first gap.
+/// measuring, and is back with the first gap. Of its heartbeats and PDOs it has kept what was in a mailbox and the newest.
 #[test]
 fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
     const BIT_RATE: u32 = 125_000;
@@ -86,6 +88,9 @@ fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
     const MINUTES: u64 = 2;
     /// More than 100 ms of frames of eight bytes.
     const FRAMES: usize = 120;
+    const HEARTBEAT: u16 = 0x701;
+    /// More than the whole queue takes, less than the period of heartbeat and PDO.
+    const GAP: Time = Time::from_millis(50);
     let mut world = world("--bitrate 125");
     let babbler = Master::join_at(&mut world, BIT_RATE);
     let before = run(&mut world, SECOND * 2).nodes[0].clone();
@@ -100,6 +105,13 @@ fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
     assert!(node.heard.heartbeats - before.heard.heartbeats <= 1, "it found a gap: {during}");
     assert_eq!((node.receiving.lost, during.bus.errors), (0, 0), "{during}");
     world.close_port(babbler.port);
+    world.take_frames();
+    world.run_until(world.now() + GAP);
+    let told = world.take_frames();
+    for id in [TPDO1, HEARTBEAT].map(|id| frame(id, &[]).id()) {
+        let count = told.iter().filter(|stamped| stamped.frame.id() == id).count();
+        assert!((1..=2).contains(&count), "{count} of {id:?}: {during}");
+    }
     let back = run(&mut world, SECOND * 2).nodes[0].clone();
     let after = run(&mut world, SECOND * 5);
     let node = &after.nodes[0];

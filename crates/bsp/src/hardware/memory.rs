@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use update::{HEADER_LEN, Header};
 
-use crate::checksum::CRC;
+use crate::checksum::FAST;
 
 unsafe extern "C" {
     static _stack_start: u8;
@@ -72,7 +72,7 @@ fn own_crc() -> u32 {
     let len = end.saturating_sub(start) as usize;
     // SAFETY: the linker puts the program there: flash, readable for ever, and nobody programs it while it runs.
     let program = unsafe { core::slice::from_raw_parts(start as *const u8, len) };
-    CRC.checksum(program)
+    FAST.checksum(program)
 }
 
 /// Size of each of the two pages: a sector (memory.x).
