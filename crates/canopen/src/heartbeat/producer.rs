@@ -42,9 +42,10 @@ impl Producer {
             return;
         }
         let message = |state: State| Frame::data_frame(id, 1, [state.code(), 0, 0, 0, 0, 0, 0, 0]);
-        let sent = match self.boot_up {
-            true => turn.send(message(State::Initialising)),
-            false => turn.send_state(message(state)),
+        let sent = if self.boot_up {
+            turn.send(message(State::Initialising))
+        } else {
+            turn.send_state(message(state))
         };
         if !sent {
             self.due = turn.now + RETRY;
