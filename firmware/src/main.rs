@@ -11,8 +11,7 @@
 //! | 1 | `keep` | stores parameters: whatever it waits for, nobody waits for it |
 //! | 0 | `idle` | sleeps |
 //!
-//! Log lines mask no interrupt, whatever the priority: see the features of
-//! defmt-rtt in the workspace.
+//! Log lines mask no interrupt, whatever the priority: see the features of defmt-rtt in the workspace.
 #![no_std]
 #![no_main]
 
@@ -36,10 +35,10 @@ const PROCESS: Interrupt = Interrupt::TIM2;
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
 /// Pended by whoever has something to store. The interrupt is that of a peripheral which the board does not use.
 const KEEPER: Interrupt = Interrupt::SDIO;
-/// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
-const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 /// Pended by whoever has put a frame into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
+/// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
+const FIRST_SAMPLE: Duration = Duration::from_millis(2);
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {

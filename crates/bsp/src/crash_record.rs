@@ -7,8 +7,11 @@ const PANIC: u32 = 2;
 const INTERRUPT: u32 = 3;
 const FILE_WORDS: usize = 8;
 
-/// Words of a sealed record.
-pub const WORDS: usize = 4 + FILE_WORDS;
+/// What the record says of the crash: a line and a name take most.
+type Content = [u32; 1 + FILE_WORDS];
+
+/// Words of a sealed record: a mark, the kind of crash, what is said of it, and the CRC.
+pub const WORDS: usize = 3 + size_of::<Content>() / 4;
 
 /// The sealed form.
 pub type Sealed = [u32; WORDS];
@@ -27,7 +30,7 @@ pub enum Crash {
 
 /// Registers at a fault (PM0214, 4.4). Program counter and link register are 0 when the stack could not be read, as
 /// after an overflow.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// Where it happened.
     pub pc: u32,
@@ -100,41 +103,38 @@ impl Crash {
         }
     }
 
-    fn content(&self) -> (u32, [u32; 1 + FILE_WORDS]) {
+    fn content(&self) -> (u32, Content) {
         match self {
             Crash::Fault(f) => (FAULT, [f.pc, f.lr, f.sp, f.cfsr, f.hfsr, f.address, 0, 0, 0]),
             Crash::Panic(place) => (PANIC, place_words(place)),
-            Crash::Interrupt(number) => (INTERRUPT, [u32::from(number.cast_unsigned()); 1 + FILE_WORDS]),
+            Crash::Interrupt(number) => {
+                (INTERRUPT, [u32::from(number.cast_unsigned()), 0, 0, 0, 0, 0, 0, 0, 0])
+            }
         }
     }
 }
 
-fn place_words(place: &Place) -> [u32; 1 + FILE_WORDS] {
+fn place_words(place: &Place) -> Content {
     let mut words = [place.line; 1 + FILE_WORDS];
     let (chunks, _) = place.file.as_chunks::<4>();
     words.iter_mut().skip(1).zip(chunks).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
     words
 }
 
-fn place(content: &[u32]) -> Place {
-    let mut words = content.iter();
-    let line = words.next().copied().unwrap_or_default();
+fn fault(&[pc, lr, sp, cfsr, hfsr, address, ..]: &Content) -> Fault {
+    Fault { pc, lr, sp, cfsr, hfsr, address }
+}
+
+fn place([line, name @ ..]: &Content) -> Place {
     let mut file = [0; FILE_WORDS * 4];
     let (chunks, _) = file.as_chunks_mut::<4>();
-    chunks.iter_mut().zip(words).for_each(|(to, from)| *to = from.to_le_bytes());
-    Place { line, file }
+    chunks.iter_mut().zip(name).for_each(|(to, from)| *to = from.to_le_bytes());
+    Place { line: *line, file }
 }
 
-fn interrupt(content: &[u32]) -> i16 {
-    let [low, high, ..] = content.first().copied().unwrap_or_default().to_le_bytes();
+fn interrupt([number, ..]: &Content) -> i16 {
+    let [low, high, ..] = number.to_le_bytes();
     i16::from_le_bytes([low, high])
-}
-
-fn fault(content: &[u32]) -> Fault {
-    match *content {
-        [pc, lr, sp, cfsr, hfsr, address, ..] => Fault { pc, lr, sp, cfsr, hfsr, address },
-        _ => Fault::default(),
-    }
 }
 
 /// The CRC of all words but the last.

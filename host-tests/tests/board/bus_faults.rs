@@ -93,6 +93,8 @@ fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
     const GAP: Time = Time::from_millis(50);
     let mut world = world("--bitrate 125");
     let babbler = Master::join_at(&mut world, BIT_RATE);
+    world.run_until(SECOND);
+    babbler.send(&mut world, START_ALL.0, &START_ALL.1);
     let before = run(&mut world, SECOND * 2).nodes[0].clone();
     for step in 0..MINUTES * 600 {
         let waiting = if step == 0 { 2 * FRAMES } else { FRAMES };
