@@ -4,7 +4,8 @@ use crate::checksum::SMALL;
 const MAGIC: u32 = 0x4352_5348;
 const FAULT: u32 = 1;
 const PANIC: u32 = 2;
-const INTERRUPT: u32 = 3;
+const CLOCK: u32 = 3;
+const INTERRUPT: u32 = 4;
 const FILE_WORDS: usize = 8;
 
 /// What the record says of the crash: a line and a name take most.
@@ -23,6 +24,8 @@ pub enum Crash {
     Fault(Fault),
     /// The program gave up.
     Panic(Place),
+    /// The clock on OSC_IN failed.
+    Clock,
     /// An interrupt came that nobody serves: its number in the NVIC, or, below 0, that of an exception of the core less 16
     /// (PM0214, 2.3.2: IRQ number).
     Interrupt(i16),
@@ -98,6 +101,7 @@ impl Crash {
         match *kind {
             FAULT => Some(Crash::Fault(fault(content))),
             PANIC => Some(Crash::Panic(place(content))),
+            CLOCK => Some(Crash::Clock),
             INTERRUPT => Some(Crash::Interrupt(interrupt(content))),
             _ => None,
         }
@@ -107,6 +111,7 @@ impl Crash {
         match self {
             Crash::Fault(f) => (FAULT, [f.pc, f.lr, f.sp, f.cfsr, f.hfsr, f.address, 0, 0, 0]),
             Crash::Panic(place) => (PANIC, place_words(place)),
+            Crash::Clock => (CLOCK, Content::default()),
             Crash::Interrupt(number) => {
                 (INTERRUPT, [u32::from(number.cast_unsigned()), 0, 0, 0, 0, 0, 0, 0, 0])
             }
@@ -160,7 +165,7 @@ mod tests {
     #[test]
     fn a_crash_survives() {
         let panicked = Crash::Panic(Place::new("crates/canopen/src/sdo.rs", 77));
-        for crash in [FAULTED, panicked, Crash::Interrupt(63), Crash::Interrupt(-2)] {
+        for crash in [FAULTED, panicked, Crash::Clock, Crash::Interrupt(63), Crash::Interrupt(-2)] {
             assert_eq!(Crash::open(&crash.seal()), Some(crash));
         }
     }

@@ -43,7 +43,6 @@ impl<T: Transmit> Turn<'_, T> {
     }
 
     /// The same for a frame of which only the newest counts.
-    #[inline(never)]
     pub(crate) fn send_state(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send_state(frame).is_ok()
     }
