@@ -142,9 +142,11 @@ impl Dictionary {
     pub fn find(&self, index: u16, sub: u8) -> Result<Entry, Abort> {
         let (series, number) = self.series_of(index)?;
         // Most objects have the sub-indexes 0, 1, 2 and so on.
-        let places = self.places_of(series);
-        let direct = places.get(usize::from(sub)).filter(|place| place.sub == sub);
-        let place = direct.or_else(|| places.iter().find(|place| place.sub == sub));
+        let direct = self.places.get(usize::from(series.first) + usize::from(sub));
+        let place = match direct {
+            Some(place) if place.sub == sub && sub < series.entries => Some(place),
+            _ => self.places_of(series).iter().find(|place| place.sub == sub),
+        };
         place.and_then(|place| self.entry(series, number, *place)).ok_or(Abort::NoSubIndex)
     }
 
