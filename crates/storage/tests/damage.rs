@@ -7,7 +7,7 @@ use std::cell::RefCell;
 
 use common::{Changes, EMPTY, Model, after, as_changes, noise, read, read_good, restore, set, start};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
-use storage::mock::{MockFlash, PowerCut, splitmix};
+use storage::mock::{MockFlash, PowerCut};
 use storage::{Error, Group, Health, Pages, Store, View};
 
 const PAGES: Pages = Pages::new(0, 512);
@@ -141,9 +141,8 @@ fn a_damaged_first_save_of_the_only_page_costs_only_what_no_later_save_holds() {
 fn an_overwritten_stretch_is_noticed_or_harmless() {
     for device in [Device::on_one_page(), Device::just_moved()] {
         for seed in 0..2000 {
-            let random = splitmix(seed).to_le_bytes();
-            let (at, len) =
-                (usize::from(u16::from_le_bytes([random[0], random[1]])) % 1024, usize::from(random[2]) % 64);
+            let mut random = fastrand::Rng::with_seed(seed);
+            let (at, len) = (random.usize(..1024), random.usize(..64));
             let fill = |index: usize| match seed % 3 {
                 0 => noise(seed, 64)[index],
                 1 => 0x00,
@@ -164,10 +163,10 @@ fn whatever_a_cut_erase_leaves_in_the_old_page_does_not_count() {
     let device = Device::just_moved();
     for seed in 0..500 {
         let mut flash = device.flash.clone();
+        let mut random = fastrand::Rng::with_seed(seed);
         for at in 0..512 {
-            let [raised, whole, ..] = splitmix(seed << 16 ^ at).to_le_bytes();
-            let raised = if u64::from(whole) < seed % 256 { 0xFF } else { raised };
-            flash.disturb(usize::try_from(at).unwrap(), |byte| byte | raised);
+            let raised = if random.u64(..256) < seed % 256 { 0xFF } else { random.u8(..) };
+            flash.disturb(at, |byte| byte | raised);
         }
         assert_eq!(read_good(&mut flash, PAGES), device.newest());
         start(&mut flash, PAGES).unwrap();

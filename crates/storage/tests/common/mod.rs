@@ -1,7 +1,7 @@
 //! The plain model that the store is compared with, and what runs both.
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use storage::mock::{MockFlash, PowerCut, splitmix};
+use storage::mock::{MockFlash, PowerCut};
 use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};
 
 /// A version and a value, or nothing.
@@ -37,7 +37,8 @@ pub(crate) fn restore(group: Group) -> (Group, Value) {
 
 /// `len` bytes that look random and are the same each time.
 pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
-    (0..len as u64).map(|i| splitmix(seed << 16 ^ i).to_le_bytes()[3]).collect()
+    let mut random = fastrand::Rng::with_seed(seed);
+    (0..len).map(|_| random.u8(..)).collect()
 }
 
 /// The model after a save.

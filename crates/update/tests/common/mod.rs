@@ -1,7 +1,7 @@
 //! A small node with sectors of different sizes, images for it, and what bootloader and master do with them.
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use update::mock::{MockFlash, splitmix};
+use update::mock::MockFlash;
 use update::{
     Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Start, Status, Target,
     Updater, Version, boot,
@@ -80,7 +80,8 @@ pub(crate) fn image_b() -> Image {
 
 /// `len` bytes that look random and are the same each time.
 pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
-    (0..len as u64).map(|i| splitmix(seed << 16 ^ i).to_le_bytes()[3]).collect()
+    let mut random = fastrand::Rng::with_seed(seed);
+    (0..len).map(|_| random.u8(..)).collect()
 }
 
 /// A flash in which `image` was installed by an update.

@@ -1,0 +1,164 @@
+//! The cells of a NOR flash, by the word, for the mock flashes of tests: they panic when a rule of the real flash is
+//! broken, count operations, and lose power in the middle of the one they are told to.
+//!
+//! What a cut leaves behind is modelled on the pessimistic side: the bits that were being changed are *weak*, they may
+//! read as either value, and as another one after the next power-up, until the word is erased or programmed with zeros.
+//! A word that was cut without a visible trace is therefore still known to the model, and programming it with anything
+//! but zeros is a broken rule.
+
+mod word;
+
+use std::ops::Range;
+
+use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
+use fastrand::Rng;
+
+pub use word::Weak;
+use word::Word;
+
+/// Bytes of a word.
+pub const WORD: usize = 4;
+
+/// The power is off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PowerCut;
+
+impl NorFlashError for PowerCut {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+/// All words of a flash, and its power.
+#[derive(Clone, Debug)]
+pub struct Cells {
+    words: Vec<Word>,
+    operations: u32,
+    programmed: u32,
+    cut_at: Option<u32>,
+    powered: bool,
+    weak: Weak,
+    random: Rng,
+}
+
+impl Cells {
+    /// An erased flash of `size` bytes. `seed` decides how weak bits read that do so by chance.
+    #[must_use]
+    pub fn new(size: usize, seed: u64) -> Cells {
+        Cells {
+            words: vec![Word::ERASED; size / WORD],
+            operations: 0,
+            programmed: 0,
+            cut_at: None,
+            powered: true,
+            weak: Weak::Random,
+            random: Rng::with_seed(seed),
+        }
+    }
+
+    /// Bytes in all.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.words.len() * WORD
+    }
+
+    /// Programs (one word each) and erases so far.
+    #[must_use]
+    pub fn operations(&self) -> u32 {
+        self.operations
+    }
+
+    /// Words programmed so far.
+    #[must_use]
+    pub fn programmed(&self) -> u32 {
+        self.programmed
+    }
+
+    /// Cuts the power in the middle of the operation that comes after `operations` more.
+    pub fn cut_after(&mut self, operations: u32, weak: Weak) {
+        self.cut_at = Some(self.operations + operations);
+        self.weak = weak;
+    }
+
+    /// Whether the power was cut.
+    #[must_use]
+    pub fn is_down(&self) -> bool {
+        !self.powered
+    }
+
+    /// Power again, and no cut to come. Weak bits read as the last cut says.
+    pub fn power_up(&mut self) {
+        (self.powered, self.cut_at) = (true, None);
+        for word in &mut self.words {
+            word.power_up(self.weak, self.random.u32(..));
+        }
+    }
+
+    /// The content, byte by byte.
+    #[must_use]
+    pub fn bytes(&self) -> Vec<u8> {
+        self.words.iter().flat_map(|word| word.value().to_le_bytes()).collect()
+    }
+
+    /// Changes a byte behind the driver's back, as radiation, wear or a foreign program would.
+    pub fn disturb(&mut self, offset: usize, change: impl FnOnce(u8) -> u8) {
+        self.words[offset / WORD].disturb(offset % WORD, change);
+    }
+
+    /// Reads whole words.
+    ///
+    /// # Errors
+    /// [`PowerCut`] when the power is off.
+    pub fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        if !self.powered {
+            return Err(PowerCut);
+        }
+        for (chunk, word) in bytes.chunks_exact_mut(WORD).zip(&self.words[offset / WORD..]) {
+            chunk.copy_from_slice(&word.value().to_le_bytes());
+        }
+        Ok(())
+    }
+
+    /// Programs whole words, one operation each.
+    ///
+    /// # Errors
+    /// [`PowerCut`] when the power is off, or goes off.
+    ///
+    /// # Panics
+    /// When a word is neither erased nor programmed with zeros.
+    pub fn program(&mut self, offset: usize, bytes: &[u8]) -> Result<(), PowerCut> {
+        for (index, chunk) in (offset / WORD..).zip(bytes.chunks_exact(WORD)) {
+            let target = u32::from_le_bytes(chunk.try_into().expect("four bytes"));
+            let is_cut = self.begin()?;
+            self.words[index].program(target, is_cut);
+            self.outcome()?;
+            self.programmed += 1;
+        }
+        Ok(())
+    }
+
+    /// Erases a unit, which is one operation.
+    ///
+    /// # Errors
+    /// [`PowerCut`] when the power is off, or goes off.
+    pub fn erase(&mut self, unit: Range<usize>) -> Result<(), PowerCut> {
+        let is_cut = self.begin()?;
+        for word in &mut self.words[unit.start / WORD..unit.end / WORD] {
+            word.erase(is_cut);
+        }
+        self.outcome()
+    }
+
+    /// Counts an operation; tells whether it is the one that is cut.
+    fn begin(&mut self) -> Result<bool, PowerCut> {
+        self.outcome()?;
+        let is_cut = self.cut_at == Some(self.operations);
+        self.operations += 1;
+        self.powered = !is_cut;
+        Ok(is_cut)
+    }
+
+    fn outcome(&self) -> Result<(), PowerCut> {
+        if self.powered { Ok(()) } else { Err(PowerCut) }
+    }
+}
