@@ -30,7 +30,9 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
         let entry = self.dictionary.find(at.index, at.sub)?;
-        entry.check_writable()?;
+        if !entry.is_writable() {
+            return Err(Abort::ReadOnly);
+        }
         Ok(stream_of(&entry).map_or(Writable::Value(entry.field.size.into()), Writable::Stream))
     }
 
@@ -38,7 +40,9 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         let found = self.dictionary.find(at.index, at.sub);
         // By reference: to move it out of the result takes a dozen instructions.
         let entry = found.as_ref().map_err(|abort| *abort)?;
-        entry.check_writable()?;
+        if !entry.is_writable() {
+            return Err(Abort::ReadOnly);
+        }
         if let Some(stream) = stream_of(entry) {
             return self.write_domain(stream, bytes);
         }

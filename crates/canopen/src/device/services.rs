@@ -43,12 +43,12 @@ impl<A: Application, const N: usize> Device<A, N> {
         if was_idle && !self.server.is_idle() || self.server.is_within_block() {
             self.core.services_due = self.core.services_due.min(self.server.deadline());
         }
+        // Only a request without a reply starts a block.
         if has_reply {
-            self.respond(turn);
-        } else {
-            // One that still waits is obsolete: its client has gone on.
-            self.reply_due = Instant::NEVER;
+            return self.respond(turn);
         }
+        // A reply that still waits is obsolete: its client has gone on.
+        self.reply_due = Instant::NEVER;
         if !A::SERVICES_ONLY && self.server.is_sending() {
             self.send_block(turn);
         }

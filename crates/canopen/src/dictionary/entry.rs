@@ -49,8 +49,8 @@ impl Entry {
         self.attributes.rule
     }
 
-    pub(crate) fn check_writable(&self) -> Result<(), Abort> {
-        if self.attributes.access.is_writable() { Ok(()) } else { Err(Abort::ReadOnly) }
+    pub(crate) const fn is_writable(&self) -> bool {
+        self.attributes.access.is_writable()
     }
 
     /// Checks the length of a value to be written. A string may be shorter than its place.
@@ -67,6 +67,7 @@ impl Entry {
     }
 
     /// Checks a value of the right length that is to be written, by its first four bytes.
+    #[inline]
     pub(crate) fn check_value(&self, value: u32) -> Result<(), Abort> {
         match self.attributes.kind {
             Type::Real32 => check_real(f32::from_bits(value)),

@@ -5,13 +5,13 @@ use crate::sdo::Abort;
 
 /// The limits of an integer of at most 32 bits; anything else takes any value.
 ///
-/// A value is within them when, modulo the size of its type, it is no further behind the lowest than the highest is: one
-/// comparison, with a sign and without.
+/// A value is within them when, modulo 2^8, 2^16 or 2^32 by its type, it is no further from the lowest than the highest is:
+/// one comparison, with a sign and without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Limits {
-    /// The lowest value. Its first bit is that of the word, as in all numbers here: so they wrap as those of the type.
+    /// The lowest value, at the top of the word: there a short number wraps as one of its type does.
     low: u32,
-    /// From there to the highest.
+    /// From there to the highest, at the top too.
     span: u32,
 }
 
@@ -48,7 +48,7 @@ impl Limits {
     }
 }
 
-/// A value of so many bytes with its first bit where a word has it.
+/// A value of so many bytes at the top of a word. One without limits may have any size.
 const fn shifted(size: u8, value: u32) -> u32 {
     value.wrapping_shl(0_u32.wrapping_sub(size as u32 * 8))
 }

@@ -36,7 +36,7 @@ impl Receiver {
     }
 
     /// Takes a frame if it is the next segment, and neither the first nor the last of a block: most frames of a transfer
-    /// are nothing else. `None` for any other.
+    /// are nothing else; only within a block is anything but 1 the next. `None` for any other.
     #[inline]
     pub(super) fn take_next(
         &mut self,

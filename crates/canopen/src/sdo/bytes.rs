@@ -14,10 +14,13 @@ impl<const N: usize> Bytes<N> {
     /// The first `len` bytes of `data`, at most all of them.
     #[must_use]
     pub fn new(mut data: [u8; N], len: u8) -> Bytes<N> {
+        if len >= Self::CAPACITY {
+            return Bytes { data, len: Self::CAPACITY };
+        }
         for byte in data.iter_mut().skip(usize::from(len)) {
             *byte = 0;
         }
-        Bytes { data, len: len.min(Self::CAPACITY) }
+        Bytes { data, len }
     }
 
     /// The first bytes of a slice, at most `N`.
@@ -54,7 +57,7 @@ impl<const N: usize> Bytes<N> {
     /// The bytes.
     #[must_use]
     pub fn as_slice(&self) -> &[u8] {
-        self.data.get(..usize::from(self.len)).unwrap_or(&[])
+        self.data.get(..usize::from(self.len)).unwrap_or(&self.data)
     }
 
     /// The bytes, then zeros.

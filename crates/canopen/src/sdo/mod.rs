@@ -33,12 +33,8 @@ pub struct Multiplexer {
 }
 
 impl Multiplexer {
-    #[allow(clippy::cast_possible_truncation)] // Bytes of the word are what is wanted.
     pub(crate) const fn parse(frame: &[u8; 8]) -> Multiplexer {
-        // As one word, from which `frame` makes one again.
-        let [head @ .., _, _, _, _] = frame;
-        let head = u32::from_le_bytes(*head);
-        Multiplexer { index: (head >> 8) as u16, sub: (head >> 24) as u8 }
+        Multiplexer { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
     }
 
     /// A frame with it, its command specifier and four bytes.

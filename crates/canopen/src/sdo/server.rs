@@ -157,12 +157,11 @@ impl Server {
 
     /// The end of a request: an error ends the transfer, and the reply to a write that takes its time is kept back.
     fn conclude(&mut self, answer: Answer, objects: &mut impl Objects, now: Instant) -> bool {
-        let has_reply = self.settle(answer, now);
-        let is_held = answer == Ok(true) && objects.take_deferred();
-        if is_held {
+        if answer == Ok(true) && objects.take_deferred() {
             self.transfer = Transfer::Held;
+            return self.settle(Ok(false), now);
         }
-        has_reply && !is_held
+        self.settle(answer, now)
     }
 
     /// Whether there is a reply that was kept back and for which its client still waits.

@@ -89,14 +89,14 @@ impl Server {
         now: Instant,
     ) -> Answer {
         self.begin(at);
-        match &initiate {
+        match initiate {
             Initiate::Expedited(bytes) => objects.write(at, bytes.as_slice(), now)?,
             Initiate::Unsized(data) => {
-                let value = unsized_value(*data, at, objects)?;
+                let value = unsized_value(data, at, objects)?;
                 objects.write(at, value.as_slice(), now)?;
             }
             Initiate::Segmented(size) => {
-                self.transfer = Transfer::Download(Download::new(Sink::open(at, *size, objects)?));
+                self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
             }
         }
         Ok(self.say(Response::Downloaded(at)))
