@@ -3,6 +3,7 @@
 const MAGIC: u32 = 0x4352_5348;
 const FAULT: u32 = 1;
 const PANIC: u32 = 2;
+const CLOCK: u32 = 3;
 const FILE_WORDS: usize = 8;
 
 /// Words of a sealed record.
@@ -18,6 +19,8 @@ pub enum Crash {
     Fault(Fault),
     /// The program gave up.
     Panic(Place),
+    /// The clock on OSC_IN failed.
+    Clock,
 }
 
 /// Registers at a fault (PM0214, 4.4). Program counter and link register are 0 when the stack could not be read, as
@@ -90,6 +93,7 @@ impl Crash {
         match *kind {
             FAULT => Some(Crash::Fault(fault(content))),
             PANIC => Some(Crash::Panic(place(content))),
+            CLOCK => Some(Crash::Clock),
             _ => None,
         }
     }
@@ -98,6 +102,7 @@ impl Crash {
         match self {
             Crash::Fault(f) => (FAULT, [f.pc, f.lr, f.sp, f.cfsr, f.hfsr, f.address, 0, 0, 0]),
             Crash::Panic(place) => (PANIC, place_words(place)),
+            Crash::Clock => (CLOCK, [0; 1 + FILE_WORDS]),
         }
     }
 }
@@ -147,7 +152,7 @@ mod tests {
     #[test]
     fn a_crash_survives() {
         let panicked = Crash::Panic(Place::new("crates/canopen/src/sdo.rs", 77));
-        for crash in [FAULTED, panicked] {
+        for crash in [FAULTED, panicked, Crash::Clock] {
             assert_eq!(Crash::open(&crash.seal()), Some(crash));
         }
     }

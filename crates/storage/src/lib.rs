@@ -34,7 +34,7 @@
 //!
 //! When neither page has room, `save` answers [`Error::RestartNeeded`] and changes nothing. A start leaves at least one
 //! empty page, so at least a page's worth of saves fits between two starts. With pages of 16 KiB and 10,000 erase cycles
-//! (`tests/figures.rs` computes the table, whose first two sets are those of the pressure transmitter). What is stored
+//! (`tests/store/figures.rs` computes the table, whose first two sets are those of the pressure transmitter). What is stored
 //! already is not programmed again, so saving unchanged parameters costs nothing:
 //!
 //! | saved at once | saves from empty pages on | saves until worn out | words of one save |

@@ -4,14 +4,19 @@ use std::ops::Range;
 
 use canbus::Time;
 
-/// Levels of the chip's interrupt lines: bit `n` is IRQ `n` of the vector table.
+/// Levels of the chip's interrupt lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct IrqLines(pub u128);
+pub struct IrqLines {
+    /// Bit `n` is IRQ `n` of the vector table.
+    pub irqs: u128,
+    /// The interrupt that no program can mask.
+    pub nmi: bool,
+}
 
 impl IrqLines {
     /// Sets or clears one line.
     pub fn set(&mut self, irq: u8, level: bool) {
-        self.0 = self.0 & !(1 << irq) | u128::from(level) << irq;
+        self.irqs = self.irqs & !(1 << irq) | u128::from(level) << irq;
     }
 }
 

@@ -112,6 +112,10 @@ const PLL: usize = 2;
 const POWER_ON_FLAGS: u32 = 0x0E00_0000;
 const RESET_FLAGS: u32 = 0xFE00_0000;
 const PINRSTF: u32 = 1 << 26;
+/// The clock security system: CSSON of RCC_CR, CSSF and CSSC of RCC_CIR.
+const CSSON: u32 = 19;
+const CSSF: u32 = 7;
+const CSSC: u32 = 23;
 const HSI_HERTZ: u64 = 16_000_000;
 
 /// The reset and clock controller.
@@ -122,7 +126,10 @@ pub(crate) struct Rcc {
     plain: RegisterFile,
     /// HSI, HSE, PLL, PLLI2S, PLLSAI. Start-up times as in the data sheet (DS10693, electrical characteristics).
     sources: [Source; 5],
-    trim_and_bypass: u32,
+    /// HSITRIM, HSEBYP and CSSON.
+    settings: u32,
+    /// The clock security system has seen HSE fail.
+    has_failed: bool,
     lsi_ready: Time,
     reset_flags: u32,
     /// The clock source in use, coded as SW.
@@ -142,7 +149,8 @@ impl Rcc {
                 Source::new(26, 100),
                 Source::new(28, 100),
             ],
-            trim_and_bypass: 0x80,
+            settings: 0x80,
+            has_failed: false,
             lsi_ready: Time::NEVER,
             reset_flags: POWER_ON_FLAGS,
             in_use: 0,
@@ -162,12 +170,37 @@ impl Rcc {
         self.reset_flags = flags;
     }
 
-    /// Takes the clock on OSC_IN away (`None`) or gives one, from now on. Without it HSE never gets ready.
-    pub(crate) fn set_hse(&mut self, hertz: Option<u64>) {
-        self.hse_hertz = hertz;
-        if hertz.is_none() {
-            self.sources[HSE].ready = Time::NEVER;
+    /// Takes the clock on OSC_IN away (`None`) or gives one, from now on. Without it HSE never gets ready; a system clock
+    /// that comes from it goes on, as if from HSI, unless the clock security system is on.
+    pub(crate) fn set_hse(&mut self, hertz: Option<u64>, now: Time) {
+        if hertz == self.hse_hertz {
+            return;
         }
+        self.hse_hertz = hertz;
+        let was_watched = bit(self.settings, CSSON) && self.sources[HSE].ready <= now;
+        let ready = self.ready_at(HSE, now);
+        self.sources[HSE].ready = if self.sources[HSE].on { ready } else { Time::NEVER };
+        if hertz.is_none() && was_watched {
+            self.fail();
+        }
+    }
+
+    /// What the clock security system does where HSE fails (RM0390, 6.2.7).
+    fn fail(&mut self) {
+        self.has_failed = true;
+        if self.uses(HSE) {
+            self.sources[HSI].switch(true, Time::ZERO);
+            self.sources[PLL].switch(false, Time::NEVER);
+            self.in_use = HSI as u32;
+            let cfgr = self.plain.get(CFGR) & !0b11;
+            let _ = self.plain.write(CFGR, cfgr);
+        }
+        self.sources[HSE].switch(false, Time::NEVER);
+    }
+
+    /// Whether NMI is raised: until the program has taken note of the failure.
+    pub(crate) fn clock_has_failed(&self) -> bool {
+        self.has_failed
     }
 
     /// Whether the clock of a peripheral runs and its reset is not held.
@@ -195,11 +228,9 @@ impl Rcc {
 
     pub(crate) fn read(&self, offset: u32, now: Time) -> Option<u32> {
         match offset {
-            CR => {
-                Some(self.sources.iter().fold(self.trim_and_bypass, |word, source| word | source.bits(now)))
-            }
+            CR => Some(self.sources.iter().fold(self.settings, |word, source| word | source.bits(now))),
             CFGR => Some(self.plain.get(CFGR) | self.in_use << 2),
-            CIR => Some(0),
+            CIR => Some(flag(self.has_failed, CSSF)),
             // No LSE crystal is modelled: it never gets ready.
             BDCR => Some(0),
             CSR => Some(
@@ -213,10 +244,16 @@ impl Rcc {
     /// Writes a register. `None` when it, or a bit that is set in it, is not modelled.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         match offset {
-            CR => self.write_control(value, now),
+            CR => {
+                self.write_control(value, now);
+                Some(())
+            }
             CFGR => self.plain.write(CFGR, value),
             // Ready interrupts are not modelled; clearing their flags has no effect.
-            CIR => (value & 0x7F00 == 0).then_some(()),
+            CIR => {
+                self.has_failed &= !bit(value, CSSC);
+                (value & 0x7F00 == 0).then_some(())
+            }
             BDCR => (value & 0xFFFF == 0).then_some(()),
             CSR => {
                 self.write_status(value, now);
@@ -228,16 +265,14 @@ impl Rcc {
         }
     }
 
-    fn write_control(&mut self, value: u32, now: Time) -> Option<()> {
-        self.trim_and_bypass = value & 0x0004_00F8;
+    fn write_control(&mut self, value: u32, now: Time) {
+        self.settings = value & 0x000C_00F8;
         for index in 0..self.sources.len() {
             // A source in use cannot be stopped by software.
             let on = bit(value, self.sources[index].on_bit) || self.uses(index);
             let ready = self.ready_at(index, now);
             self.sources[index].switch(on, ready);
         }
-        let clock_security = bit(value, 19);
-        (!clock_security).then_some(())
     }
 
     /// When a source that is switched on now gets ready.

@@ -85,6 +85,7 @@ impl Stm32f4 {
         }
         self.can.advance(now);
         self.flash.advance(now, &mut self.effects);
+        self.rcc.set_hse(self.board.hse.filter(|_| self.plant.has_crystal(now)), now);
         self.rcc.advance(now);
         self.update_clocks(now);
         self.watch(now);
@@ -139,6 +140,7 @@ impl Stm32f4 {
         let spis = (0..self.spis.len()).map(|index| self.spi_deadline(index, now));
         let others = [
             self.rcc.deadline(),
+            self.plant.next_crystal_edge(now),
             self.conversion_deadline(),
             self.encoder_deadline(now),
             self.flash.deadline(),
@@ -154,8 +156,8 @@ impl Stm32f4 {
     }
 
     fn levels(&self) -> IrqLines {
-        let mut lines = IrqLines::default();
-        let mut raise = |irq: u8, level: bool| lines.0 |= u128::from(level) << irq;
+        let mut lines = IrqLines { nmi: self.rcc.clock_has_failed(), ..IrqLines::default() };
+        let mut raise = |irq: u8, level: bool| lines.irqs |= u128::from(level) << irq;
         self.timers.iter().zip(&TIMERS).for_each(|(timer, place)| raise(place.irq, timer.interrupt()));
         self.spis.iter().zip(&SPIS).for_each(|(spi, place)| raise(place.irq, spi.interrupt()));
         for (dma, irqs) in self.dmas.iter().zip(DMA_IRQS) {

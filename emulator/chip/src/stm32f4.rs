@@ -111,12 +111,6 @@ impl Stm32f4 {
         self.clocks
     }
 
-    /// Takes the clock on OSC_IN away (`None`) or gives one, in hertz: the HSE is then dead or alive.
-    /// A dead one never gets ready; a system clock that already comes from it goes on.
-    pub fn set_hse(&mut self, hertz: Option<u64>) {
-        self.rcc.set_hse(hertz);
-    }
-
     /// The level that the program drives on a pin (port `'A'` to `'I'`, pin 0 to 15); `None` when it drives none.
     pub fn output(&self, port: char, pin: u32) -> Option<bool> {
         let index = (port as usize).checked_sub('A' as usize)?;

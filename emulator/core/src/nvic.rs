@@ -47,7 +47,8 @@ impl Nvic {
     /// Takes the levels of the interrupt lines. A rising line pends; a line that stays high pends again when its
     /// exception ends.
     pub(crate) fn sample(&mut self, lines: IrqLines) {
-        let lines = lines.0 << 16;
+        let nmi = if lines.nmi { Exception::NMI.bit() } else { 0 };
+        let lines = lines.irqs << 16 | nmi;
         self.pending |= lines & !self.lines;
         self.lines = lines;
     }

@@ -2,6 +2,7 @@
 
 use canbus::Time;
 use chip::Peripherals;
+use chip::plant::{Fault, FaultKind};
 use sim::world::World;
 
 use crate::support::{Master, SECOND, comes_back, run, running, world};
@@ -27,7 +28,6 @@ const ADC1_CR2: u32 = 0x4001_2008;
 /// The parameter pages (memory.x).
 const PAGE: u32 = 0x0800_8000;
 const PAGE_SIZE: u32 = 0x4000;
-const HSE: u64 = 8_000_000;
 /// SDO abort code for a failure of the hardware (CiA 301, table 22).
 const HARDWARE: u32 = 0x0606_0000;
 
@@ -85,20 +85,42 @@ fn run_broken(world: &mut World, irq: u32, instruction: [u8; 2]) -> u32 {
     handler
 }
 
+/// Stops the clock on OSC_IN, from now until so much later.
+fn stop_crystal(world: &mut World, until: Time) {
+    let fault = Fault { kind: FaultKind::NoCrystal, from: world.now(), until: world.now() + until };
+    let now = world.now();
+    world.machine(0).peripherals_mut().plant_mut(now).add_fault(fault);
+}
+
 /// Without the crystal the node never gets on the bus, and the watchdog has it try again and again.
 #[test]
 fn a_node_without_its_clock_is_silent_and_comes_back_with_it() {
     let mut world = running();
-    world.machine(0).peripherals_mut().set_hse(None);
+    stop_crystal(&mut world, SECOND * 5);
     let now = world.now();
     world.machine(0).power_on(now);
     let silent = run(&mut world, SECOND * 5).nodes[0].clone();
     assert_eq!(silent.heard.boot_ups, 1, "the one before");
     assert!(!silent.incidents.is_empty(), "the watchdog has reset it");
-    world.machine(0).peripherals_mut().set_hse(Some(HSE));
     let after = run(&mut world, SECOND * 5);
     assert_eq!(after.nodes[0].heard.boot_ups, 2, "{after}");
     assert!(after.nodes[0].heard.heartbeats > silent.heard.heartbeats, "{after}");
+}
+
+/// The clock security system tells it at once: with HSI for a clock the node would destroy the frames of everybody.
+#[test]
+fn a_node_whose_clock_fails_leaves_the_bus_at_once() {
+    let mut world = world("--bitrate 1000 --load 50 --node 1:pressure --node 2:pressure");
+    let before = run(&mut world, SECOND);
+    stop_crystal(&mut world, SECOND * 3);
+    let silent = run(&mut world, SECOND * 3);
+    assert!(silent.bus.errors <= before.bus.errors + 1, "{silent}");
+    let after = run(&mut world, SECOND * 5);
+    let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
+    assert!(log.concat().contains("the clock on OSC_IN failed"), "{log:?}");
+    assert_eq!(after.nodes[0].heard.boot_ups, 2, "{after}");
+    assert!(after.nodes[0].heard.heartbeats > silent.nodes[0].heard.heartbeats, "{after}");
+    assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET));
 }
 
 /// The 32-bit counter of microseconds comes to its half and to its end, as it does every 71 minutes.

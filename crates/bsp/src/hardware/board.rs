@@ -8,6 +8,7 @@ use stm32f4xx_hal::rcc::{Config, Rcc};
 use super::ParameterFlash;
 use super::backup::BackupMemory;
 use super::can::Controller;
+use super::clock_tree;
 use super::digital::{Buttons, Lamps};
 use super::encoder::{self, Encoder};
 use super::flash::Flash;
@@ -148,5 +149,6 @@ fn clocks(rcc: RCC) -> Rcc {
     let config = if cfg!(feature = "stm32f446") { config.bypass_hse_oscillator() } else { config };
     let rcc = rcc.freeze(config);
     assert_eq!(rcc.clocks.pclk1().raw(), APB1_HZ);
+    clock_tree::watch(&rcc);
     rcc
 }

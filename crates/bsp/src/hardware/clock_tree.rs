@@ -1,5 +1,5 @@
 //! The clocks of `board`, register by register: the HAL computes them at run time, which takes 2 KiB that the bootloader does
-//! not have.
+//! not have. And what watches the clock in both images.
 
 use stm32f4xx_hal::pac::{FLASH, RCC};
 
@@ -25,10 +25,18 @@ pub(super) fn raise(rcc: &RCC, flash: &FLASH) {
     rcc.cfgr().modify(|_, w| w.ppre1().div4().ppre2().div2());
     rcc.cfgr().modify(|_, w| w.sw().pll());
     while !rcc.cfgr().read().sws().is_pll() {}
+    watch(rcc);
+}
+
+/// Switches the clock security system on: where HSE fails from now on, the core goes on from HSI, and NMI comes
+/// (RM0390, 6.2.7).
+pub(super) fn watch(rcc: &RCC) {
+    rcc.cr().modify(|_, w| w.csson().set_bit());
 }
 
 /// Puts them back as a reset leaves them, for the application to raise (RM0390, 6.3.1 to 6.3.3).
 pub(super) fn lower(rcc: &RCC) {
+    rcc.cr().modify(|_, w| w.csson().clear_bit());
     rcc.cfgr().reset();
     while !rcc.cfgr().read().sws().is_hsi() {}
     rcc.cr().modify(|_, w| w.pllon().clear_bit().hseon().clear_bit());

@@ -30,6 +30,7 @@ pub fn log(crash: &Crash) {
         Crash::Panic(place) => {
             defmt::error!("the last run ended in a panic at {=str}:{=u32}", place.file(), place.line());
         }
+        Crash::Clock => defmt::error!("the last run ended when the clock on OSC_IN failed"),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The handlers of what must never happen: every fault, and interrupts that nobody asked for.
+//! The handlers of what must never happen: every fault, a clock that fails, and interrupts that nobody asked for.
 //!
 //! The stack lies at the very start of RAM, so that one that overflows leaves RAM and faults. The handler of that fault
 //! has no stack to run on: it takes a small one of its own before anything else.
@@ -62,6 +62,13 @@ fn stacked(sp: u32) -> Option<[u32; 2]> {
     let readable = sp.is_multiple_of(4) && sp >= stack.start && sp.checked_add(32)? <= stack.end;
     // SAFETY: the words lie in the stack, whose owner has ended.
     readable.then(|| unsafe { ((sp + 20) as *const [u32; 2]).read_volatile() })
+}
+
+/// The clock on OSC_IN has failed: the core runs from HSI now, and the bit timing is wrong. The reset takes the node off the
+/// bus; it comes back with the clock.
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() -> ! {
+    crash::restart(&Crash::Clock)
 }
 
 /// An interrupt without a handler: the program enabled what it does not serve.

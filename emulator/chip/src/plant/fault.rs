@@ -26,9 +26,11 @@ pub enum FaultKind {
     WrongCode,
     /// No battery behind VBAT, or an empty one: a loss of the main supply is one of the backup domain too.
     BatteryEmpty,
+    /// The clock on OSC_IN has stopped.
+    NoCrystal,
 }
 
-const NAMES: [(&str, FaultKind); 9] = [
+const NAMES: [(&str, FaultKind); 10] = [
     ("open-sensor", FaultKind::OpenSensor),
     ("rail-high", FaultKind::RailHigh),
     ("rail-low", FaultKind::RailLow),
@@ -38,6 +40,7 @@ const NAMES: [(&str, FaultKind); 9] = [
     ("open-ssi", FaultKind::OpenSsi),
     ("wrong-code", FaultKind::WrongCode),
     ("battery-empty", FaultKind::BatteryEmpty),
+    ("no-crystal", FaultKind::NoCrystal),
 ];
 
 /// A fault and when it is there.
@@ -54,6 +57,11 @@ pub struct Fault {
 impl Fault {
     pub(super) fn is_active(&self, now: Time) -> bool {
         self.from <= now && now < self.until
+    }
+
+    /// Its next start or end; never when both are over.
+    pub(super) fn next_edge(&self, now: Time) -> Time {
+        [self.from, self.until].into_iter().find(|edge| now < *edge).unwrap_or(Time::NEVER)
     }
 }
 

@@ -167,6 +167,17 @@ impl Plant {
         !self.has(FaultKind::BatteryEmpty, now)
     }
 
+    /// Whether there is a clock on OSC_IN.
+    pub(crate) fn has_crystal(&self, now: Time) -> bool {
+        !self.has(FaultKind::NoCrystal, now)
+    }
+
+    /// When that changes next.
+    pub(crate) fn next_crystal_edge(&self, now: Time) -> Time {
+        let faults = self.faults.iter().filter(|fault| fault.kind == FaultKind::NoCrystal);
+        faults.map(|fault| fault.next_edge(now)).fold(Time::NEVER, Time::min)
+    }
+
     /// Which contacts are closed.
     pub(crate) fn closed(&self, now: Time) -> [bool; BUTTONS] {
         self.buttons.map(|button| button.is_closed(now))

@@ -5,6 +5,7 @@ use canbus::Time;
 use chip::{BusFault, Direction, Effect, Peripherals, Reason, Variant};
 
 const CFGR: u32 = RCC + 0x08;
+const CIR: u32 = RCC + 0x0C;
 const CSR: u32 = RCC + 0x74;
 const PWR: u32 = 0x4000_7000;
 const GPIOA: u32 = 0x4002_0000;
@@ -41,7 +42,7 @@ fn a_switch_to_a_pll_that_is_not_ready_waits_for_it() {
 #[test]
 fn without_a_clock_on_osc_in_hse_and_its_pll_never_get_ready() {
     let mut rig = Rig::new();
-    rig.chip.set_hse(None);
+    rig.chip.plant_mut(Time::ZERO).add_fault("no-crystal@0".parse().unwrap());
     rig.write(RCC + 4, 4 | 144 << 6 | 1 << 22);
     rig.set(RCC, 1 << 16 | 1 << 24);
     rig.wait(Time::from_millis(100));
@@ -126,4 +127,36 @@ fn narrow_accesses_touch_their_lane() {
     rig.chip.write(GPIOA + 0x1A, 2, 0x000F, rig.now).unwrap();
     assert_eq!(rig.read(GPIOA + 0x14), 0xF0);
     assert_eq!(rig.chip.read(GPIOA + 3, 1, rig.now), Ok(0xA8));
+}
+
+/// RM0390, 6.2.7: HSE and the PLL that it feeds are switched off, the system runs from HSI, and NMI stays until CSSC.
+#[test]
+fn the_clock_security_system_switches_to_hsi_and_raises_nmi() {
+    let mut rig = Rig::new();
+    rig.firmware_clocks();
+    rig.set(RCC, 1 << 19);
+    rig.chip.plant_mut(rig.now).add_fault("no-crystal@0.01..0.02".parse().unwrap());
+    rig.wait(Time::from_millis(5));
+    assert!(!rig.chip.lines().nmi);
+    rig.wait(Time::from_millis(10));
+    assert!(rig.chip.lines().nmi);
+    assert_eq!(rig.read(RCC) & 0x0303_0003, 3, "HSI alone is on");
+    assert_eq!(rig.read(CFGR) & 0xF, 0, "and in use");
+    assert_eq!(rig.chip.clocks().hclk, 16_000_000);
+    assert_eq!(rig.read(CIR), 1 << 7);
+    rig.write(CIR, 1 << 23);
+    assert!(!rig.chip.lines().nmi);
+    rig.wait(Time::from_millis(20));
+    rig.firmware_clocks();
+    assert_eq!(rig.chip.clocks().hclk, 144_000_000, "the crystal is back");
+}
+
+#[test]
+fn without_the_clock_security_system_nobody_is_told() {
+    let mut rig = Rig::new();
+    rig.firmware_clocks();
+    rig.chip.plant_mut(rig.now).add_fault("no-crystal@0.01".parse().unwrap());
+    rig.wait(Time::from_millis(20));
+    assert!(!rig.chip.lines().nmi);
+    assert_eq!(rig.read(RCC) >> 17 & 1, 0, "HSERDY");
 }

@@ -94,7 +94,7 @@ impl Rig {
     /// Goes on until an interrupt line is up, and tells when that is; `None` when it stays down for `limit`.
     pub(crate) fn run_to_irq(&mut self, irq: u8, limit: Time) -> Option<Time> {
         let end = self.now + limit;
-        while self.chip.lines().0 >> irq & 1 == 0 {
+        while self.chip.lines().irqs >> irq & 1 == 0 {
             let next = self.chip.deadline();
             if next > end {
                 return None;
@@ -105,7 +105,7 @@ impl Rig {
     }
 
     pub(crate) fn irq(&self, irq: u8) -> bool {
-        self.chip.lines().0 >> irq & 1 != 0
+        self.chip.lines().irqs >> irq & 1 != 0
     }
 
     fn take_effects(&mut self) {

@@ -1,10 +1,8 @@
 //! Images that must not run: each is refused with its code, and the application in place starts as before.
 
-mod common;
-
-use common::{
+use crate::bench::{
     HEADER, Image, PRODUCT, REVISION, assert_starts, description, download, flash_with, image_a, image_b,
-    keys, noise, target,
+    keys, noise, run, target, update,
 };
 use update::{Area, CONTEXT, Description, Refusal, SIGNED_LEN, Status, Updater};
 
@@ -191,7 +189,7 @@ fn a_client_that_does_not_say_the_size_is_refused_the_same() {
         let mut flash = flash_with(&image_a(), 1);
         let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
         updater.clear().unwrap();
-        common::run(&mut updater).unwrap();
+        run(&mut updater).unwrap();
         updater.begin(None).unwrap();
         let outcome =
             image.chunks(7).try_for_each(|piece| updater.receive(piece)).and_then(|()| updater.finish());
@@ -206,7 +204,7 @@ fn what_was_changed_for_the_table_is_good_without_the_change() {
         assert_eq!(image, image_b().bytes());
     }
     let mut flash = flash_with(&image_a(), 1);
-    common::update(&mut flash, &image_b().bytes()).unwrap();
+    update(&mut flash, &image_b().bytes()).unwrap();
     assert_starts(&mut flash, &image_b());
     assert_eq!(CONTEXT, b"CANopen node image 1");
 }

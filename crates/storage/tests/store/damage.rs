@@ -1,11 +1,9 @@
 //! Flash content that no power cut explains: flipped bits, overwritten stretches, half erased and foreign pages.
 //! Whatever is read must have been saved once, transaction by transaction, and must not claim to be newer than it is.
 
-mod common;
-
 use std::cell::RefCell;
 
-use common::{Changes, EMPTY, Model, after, as_changes, noise, read, read_good, restore, set, start};
+use crate::model::{Changes, EMPTY, Model, after, as_changes, noise, read, read_good, restore, set, start};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use storage::mock::{MockFlash, PowerCut};
 use storage::{Error, Group, Health, Pages, Store, View};

@@ -1,8 +1,6 @@
 //! Cuts in the words that decide, each followed by cuts in the recovery: what reads well once may not do so again.
 
-mod common;
-
-use common::{Image, description, flash_with, holds, install, stage, start};
+use crate::bench::{Image, description, flash_with, holds, install, stage, start};
 use update::Decision;
 use update::mock::{MockFlash, Weak};
 

@@ -1,8 +1,6 @@
 //! Random lives of a device against the model; proptest shrinks what fails. The seed is fixed.
 
-mod common;
-
-use common::{Changes, EMPTY, Step, noise, recover, run};
+use crate::model::{Changes, EMPTY, Step, noise, recover, run};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};

@@ -1,14 +1,14 @@
 //! The interlocks of the PDO objects: whatever is written to them in whatever order, no PDO exists that cannot be, and
 //! none changes while it exists (CiA 301, 7.5.2.35 to 38).
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Rule, Type};
 use canopen::pdo::MappedObject;
-use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response};
-use canopen::{Application, CobId, Device, Frame, Instant, NodeId, QueueFull, Transmit};
+use canopen::{CobId, Device, Frame, Instant, NodeId};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 
-const ID: u8 = 5;
+use crate::bench::{ID, Nothing, Sent, download};
+
 const PDOS: u16 = 8;
 
 const fn parameter(index: u16, sub: u8, kind: Type, rule: Rule) -> Object {
@@ -88,50 +88,12 @@ static TABLE: [Object; COUNT] = dictionary::gather(ROWS);
 const SIZE: usize = dictionary::image_size(&TABLE);
 const DICTIONARY: Dictionary = canopen::dictionary!(&TABLE);
 
-struct Nothing;
-
-impl Application for Nothing {
-    fn initialise(&mut self, _: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        Ok(())
-    }
-}
-
-/// Keeps the last frame of the SDO server.
-#[derive(Default)]
-struct Responses(Option<Frame>);
-
-impl Transmit for Responses {
-    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
-        if frame.id() & 0x780 == 0x580 {
-            self.0 = Some(frame);
-        }
-        Ok(())
-    }
-
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-}
-
 type Node = Device<Nothing, SIZE>;
 
 fn node() -> Node {
     let mut device = Device::new(&DICTIONARY, NodeId::new(ID).unwrap(), Nothing);
-    device.start(Instant(0), &mut Responses::default());
+    device.start(Instant(0), &mut Sent::default());
     device
-}
-
-fn write(device: &mut Node, write: &Write) -> bool {
-    let at = Multiplexer { index: write.index, sub: write.sub };
-    let request = Request::Download(at, Initiate::Expedited(Bytes::from_slice(&write.bytes)));
-    let mut out = Responses::default();
-    let frame = Frame::new(0x600 + u16::from(ID), &request.encode()).unwrap();
-    device.on_service_frame(&frame, Instant(0), &mut out);
-    let response = Response::parse(out.0.unwrap().data().try_into().unwrap());
-    assert!(matches!(response, Some(Response::Downloaded(_) | Response::Abort(..))));
-    response == Some(Response::Downloaded(at))
 }
 
 fn bytes(device: &Node, index: u16, sub: u8) -> Vec<u8> {
@@ -266,7 +228,7 @@ struct Seen {
 
 fn step(device: &mut Node, next: &Write, seen: &mut Seen) -> Result<(), TestCaseError> {
     let (image, before) = (device.image().to_vec(), Pdo::read(device, next.index));
-    let is_taken = write(device, next);
+    let is_taken = download(device, (next.index, next.sub), &next.bytes, Instant(0)).is_ok();
     let after = Pdo::read(device, next.index);
     if is_taken {
         prop_assert_eq!(bytes(device, next.index, next.sub), next.bytes.clone());
@@ -317,11 +279,7 @@ fn no_sequence_of_writes_makes_a_pdo_that_cannot_be() {
         .run(&sequences(), |(is_operational, sequence)| {
             let mut device = node();
             if is_operational {
-                device.on_process_frame(
-                    &Frame::new(0, &[1, 0]).unwrap(),
-                    Instant(0),
-                    &mut Responses::default(),
-                );
+                device.on_process_frame(&Frame::new(0, &[1, 0]).unwrap(), Instant(0), &mut Sent::default());
             }
             for next in sequence {
                 step(&mut device, &next, &mut seen.borrow_mut())?;

@@ -1,8 +1,8 @@
 //! The power is cut at every single operation of a long scenario, and again at every operation of the recovery.
 
-mod common;
-
-use common::{EMPTY, Model, Step, after, as_changes, noise, read_good, recover, restore, run, set, start};
+use crate::model::{
+    EMPTY, Model, Step, after, as_changes, noise, read_good, recover, restore, run, set, start,
+};
 use storage::mock::{MockFlash, Weak};
 use storage::{Group, Pages};
 

@@ -1,8 +1,6 @@
-//! The figures that the documentation of the crate states: `cargo test -p storage --test figures -- --nocapture`
+//! The figures that the documentation of the crate states: `cargo test -p storage --test store -- --nocapture figures`
 
-mod common;
-
-use common::{Changes, as_changes, set, start};
+use crate::model::{Changes, as_changes, set, start};
 use storage::mock::MockFlash;
 use storage::{Group, MAX_VALUE, Pages};
 

@@ -1,8 +1,8 @@
 //! The power is cut at every flash operation of whole updates, and again in the recovery.
 
-mod common;
-
-use common::{Image, SECTORS, flash_with, holds, image_a, image_b, install, noise, stage, start, update};
+use crate::bench::{
+    Image, SECTORS, flash_with, holds, image_a, image_b, install, noise, stage, start, update,
+};
 use update::mock::{MockFlash, Weak};
 use update::{Decision, Refusal, Stay};
 

@@ -1,10 +1,10 @@
 //! PDOs at numbers of the dictionary's choice, and PDOs to which a profile has given their CAN-IDs.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Rule, Type};
-use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response};
-use canopen::{Application, Device, Frame, Instant, NodeId, QueueFull, Transmit};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Rule, Type};
+use canopen::{Device, Frame, Instant, NodeId};
 
-const ID: u8 = 5;
+use crate::bench::{ID, Nothing, Sent, download};
+
 const NOW: Instant = Instant(1_000_000);
 
 const fn cob_id(index: u16, default: DefaultValue, rule: Rule) -> [Object; 3] {
@@ -54,30 +54,6 @@ static TABLE: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
 const SIZE: usize = dictionary::image_size(&TABLE);
 const DICTIONARY: Dictionary = canopen::dictionary!(&TABLE);
 
-struct Nothing;
-
-impl Application for Nothing {
-    fn initialise(&mut self, _: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        Ok(())
-    }
-}
-
-#[derive(Default)]
-struct Sent(Vec<Frame>);
-
-impl Transmit for Sent {
-    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
-        self.0.push(frame);
-        Ok(())
-    }
-
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-}
-
 struct Bench {
     device: Device<Nothing, SIZE>,
     sent: Sent,
@@ -114,16 +90,9 @@ impl Bench {
     }
 
     fn write_cob_id(&mut self, index: u16, value: u32) -> Result<(), u32> {
-        let at = Multiplexer { index, sub: 1 };
-        let request = Request::Download(at, Initiate::Expedited(Bytes::from_slice(&value.to_le_bytes())));
-        self.sent.0.clear();
-        self.receive(&Frame::new(0x600 + u16::from(ID), &request.encode()).unwrap());
-        let response = self.sent.0.iter().find(|frame| frame.id() == 0x580 + u16::from(ID)).unwrap();
-        match Response::parse(response.data().try_into().unwrap()) {
-            Some(Response::Downloaded(_)) => Ok(()),
-            Some(Response::Abort(_, code)) => Err(code),
-            other => panic!("{other:?}"),
-        }
+        let result = download(&mut self.device, (index, 1), &value.to_le_bytes(), NOW);
+        self.device.poll_process(NOW, &mut self.sent);
+        result
     }
 }
 

@@ -1,8 +1,6 @@
 //! The store without accidents, and with a flash that does not do what it is told.
 
-mod common;
-
-use common::{EMPTY, after, as_changes, noise, read_good, restore, set, start};
+use crate::model::{EMPTY, after, as_changes, noise, read_good, restore, set, start};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use storage::mock::MockFlash;
 use storage::{Change, DeviceRecord, Error, Group, Loaded, MAX_VALUE, Memory, Pages, Store, View};

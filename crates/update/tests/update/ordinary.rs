@@ -1,8 +1,6 @@
 //! Updates without accidents, commands in the wrong order, decisions at a start, and a flash that wears out.
 
-mod common;
-
-use common::{
+use crate::bench::{
     APPLICATION, HEADER, Image, STAGING, assert_starts, description, download, flash_with, holds, image_a,
     image_b, install, run, stage, start, target, update,
 };

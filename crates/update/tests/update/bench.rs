@@ -1,5 +1,4 @@
 //! A small node with sectors of different sizes, images for it, and what bootloader and master do with them.
-#![allow(dead_code, reason = "each test file uses a part")]
 
 use update::mock::MockFlash;
 use update::{

@@ -1,5 +1,4 @@
 //! The plain model that the store is compared with, and what runs both.
-#![allow(dead_code, reason = "each test file uses a part")]
 
 use storage::mock::{MockFlash, PowerCut};
 use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};

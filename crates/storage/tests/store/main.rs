@@ -1,0 +1,8 @@
+//! The store on mock flashes, beside a plain model of what should be stored.
+
+mod damage;
+mod figures;
+mod model;
+mod ordinary;
+mod power_cuts;
+mod random;

@@ -1,0 +1,8 @@
+//! Whole updates on a mock flash.
+
+mod bench;
+mod commit_cuts;
+mod corrupted;
+mod header;
+mod ordinary;
+mod power_cuts;
