@@ -33,8 +33,8 @@ impl Frame {
     }
 
     /// All eight bytes of a full data frame; `None` for any other.
-    pub(crate) fn full(&self) -> Option<[u8; 8]> {
-        (self.len == 8 && !self.remote).then_some(self.data)
+    pub(crate) fn full(&self) -> Option<&[u8; 8]> {
+        (self.len == 8 && !self.remote).then_some(&self.data)
     }
 
     /// A remote frame; `None` for an identifier above 7FFh or a length above eight.

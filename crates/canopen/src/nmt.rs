@@ -20,7 +20,7 @@ impl State {
     /// Whether SDO, SYNC and EMCY exist in this state (CiA 301, table 38).
     #[must_use]
     pub const fn has_services(self) -> bool {
-        matches!(self, State::PreOperational | State::Operational)
+        !matches!(self, State::Initialising | State::Stopped)
     }
 
     /// Whether PDOs exist in this state.

@@ -37,7 +37,6 @@ pub(crate) struct Turn<'a, T> {
 
 impl<T: Transmit> Turn<'_, T> {
     /// Queues a frame; whether there was room.
-    #[inline(never)]
     pub(crate) fn send(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send(frame).is_ok()
     }

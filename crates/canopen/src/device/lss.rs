@@ -21,7 +21,7 @@ pub(super) enum Switching {
 impl<A: Application, const N: usize> Device<A, N> {
     #[inline(never)]
     pub(super) fn on_lss(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
-        let Some(request) = frame.full().and_then(Request::parse) else { return };
+        let Some(request) = frame.full().copied().and_then(Request::parse) else { return };
         let identity = self.core.identity();
         let outcome = self.lss.take(request, &identity, self.core.node_id);
         let response = match outcome {

@@ -29,23 +29,31 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
     }
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
-        let entry = self.writable_entry(at)?;
+        let entry = self.dictionary.find(at.index, at.sub)?;
+        if !entry.is_writable() {
+            return Err(Abort::ReadOnly);
+        }
         Ok(stream_of(&entry).map_or(Writable::Value(entry.field.size.into()), Writable::Stream))
     }
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
-        let entry = self.writable_entry(at)?;
-        if let Some(stream) = stream_of(&entry) {
+        let found = self.dictionary.find(at.index, at.sub);
+        // By reference: to move it out of the result takes a dozen instructions.
+        let entry = found.as_ref().map_err(|abort| *abort)?;
+        if !entry.is_writable() {
+            return Err(Abort::ReadOnly);
+        }
+        if let Some(stream) = stream_of(entry) {
             return self.write_domain(stream, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
         entry.check_value(value)?;
-        self.admit(&entry, value, bytes)?;
-        if !entry.rule().is_computed() && !entry.rule().is_command() {
-            entry.field.set(&mut self.image, bytes);
+        match entry.rule() {
+            Rule::Plain => entry.field.set(&mut self.image, bytes),
+            _ => self.write_by_rule(entry, value, bytes, now)?,
         }
-        self.follow(&entry, value, now);
+        self.pending.parameters |= matches!(entry.attributes.group, Group::Application | Group::Calibration);
         Ok(())
     }
 
@@ -59,11 +67,6 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
 }
 
 impl<A: Application, const N: usize> Core<A, N> {
-    fn writable_entry(&self, at: Multiplexer) -> Result<Entry, Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
-        if entry.attributes.access.is_writable() { Ok(entry) } else { Err(Abort::ReadOnly) }
-    }
-
     fn write_domain(&mut self, stream: u8, bytes: &[u8]) -> Result<(), Abort> {
         self.stream(stream, Part::Begin(Some(bytes.len())))?;
         self.stream(stream, Part::Data(0, bytes))?;
@@ -91,6 +94,17 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     fn word(&self, field: Field) -> u32 {
         little_endian(field.get(&self.image))
+    }
+
+    /// Replaces the value of an entry that does more than holding one.
+    #[inline(never)]
+    fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Instant) -> Result<(), Abort> {
+        self.admit(entry, value, bytes)?;
+        if !entry.rule().is_computed() && !entry.rule().is_command() {
+            entry.field.set(&mut self.image, bytes);
+        }
+        self.follow(entry, value, now);
+        Ok(())
     }
 
     /// Whether the rule of the entry allows the value.
@@ -121,9 +135,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// What follows from a new value.
     fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
-        self.pending.parameters |= matches!(entry.attributes.group, Group::Application | Group::Calibration);
         match entry.rule() {
-            Rule::Plain => return,
             Rule::Application(_) => self.pending.parameters = true,
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             _ if A::SERVICES_ONLY => (),

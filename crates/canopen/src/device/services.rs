@@ -15,35 +15,40 @@ const RESERVED_ROOM: usize = 10;
 impl<A: Application, const N: usize> Device<A, N> {
     /// A frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let turn = &mut self.turn(now, out);
         if frame.id() == self.core.service(SDO_REQUEST).get() {
-            self.on_sdo(frame, turn);
+            self.on_sdo(frame, now, out);
         } else if frame.id() == lss::REQUEST.get() {
-            self.on_lss(frame, turn);
+            self.on_lss(frame, &mut self.turn(now, out));
         } else if frame.id() & 0x780 == ERROR_CONTROL && !A::SERVICES_ONLY {
             self.core.on_heartbeat(frame, now);
         }
     }
 
     /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-    fn on_sdo(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
+    fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         let has_sdo = self.core.state.has_services();
         let Some(request) = frame.full().filter(|_| has_sdo) else { return };
-        if let Some(has_reply) = self.server.take_expected(request, &mut self.core, turn.now) {
-            if has_reply {
-                self.respond(turn);
-            }
-            return;
+        match self.server.take_next(request, &mut self.core, now) {
+            Some(false) => (),
+            Some(true) => self.respond(&mut self.turn(now, out)),
+            None => self.on_request(request, &mut self.turn(now, out)),
         }
+    }
+
+    #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
+    fn on_request(&mut self, request: &[u8; 8], turn: &mut Turn<'_, impl Transmit>) {
+        let was_idle = self.server.is_idle();
         let has_reply = self.server.answer(request, &mut self.core, turn.now);
-        if !self.server.is_idle() {
+        // A deadline that was there is later now, but for the pause within a block.
+        if was_idle && !self.server.is_idle() || self.server.is_within_block() {
             self.core.services_due = self.core.services_due.min(self.server.deadline());
+        }
+        // Only a request without a reply starts a block.
+        if has_reply {
+            return self.respond(turn);
         }
         // A reply that still waits is obsolete: its client has gone on.
         self.reply_due = Instant::NEVER;
-        if has_reply {
-            self.respond(turn);
-        }
         if !A::SERVICES_ONLY && self.server.is_sending() {
             self.send_block(turn);
         }
@@ -65,8 +70,9 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// Sends the server's reply.
     pub(super) fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let id = self.core.service(SDO_RESPONSE);
-        self.reply_due = Instant::NEVER;
-        if !turn.send(Frame::data_frame(id, 8, self.server.reply())) {
+        if turn.send(Frame::data_frame(id, 8, self.server.reply())) {
+            self.reply_due = Instant::NEVER;
+        } else {
             self.reply_due = turn.now + RETRY;
             self.core.services_due = self.core.services_due.min(self.reply_due);
         }
@@ -75,22 +81,27 @@ impl<A: Application, const N: usize> Device<A, N> {
     /// Sends what is due. Returns the instant of the next call.
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         if now >= self.core.services_due {
-            self.poll_switching(now);
-            let turn = &mut self.turn(now, out);
-            self.poll_lss(turn);
-            self.poll_heartbeat(turn);
-            if !A::SERVICES_ONLY {
-                self.poll_watches(now);
-            }
-            if self.core.state.has_services() {
-                if !A::SERVICES_ONLY {
-                    self.core.emcy.poll(turn);
-                }
-                self.poll_sdo(turn);
-            }
-            self.core.services_due = self.next_service();
+            self.send_services(now, out);
         }
         self.core.services_due
+    }
+
+    #[inline(never)]
+    fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
+        self.poll_switching(now);
+        let turn = &mut self.turn(now, out);
+        self.poll_lss(turn);
+        self.poll_heartbeat(turn);
+        if !A::SERVICES_ONLY {
+            self.poll_watches(now);
+        }
+        if self.core.state.has_services() {
+            if !A::SERVICES_ONLY {
+                self.core.emcy.poll(turn);
+            }
+            self.poll_sdo(turn);
+        }
+        self.core.services_due = self.next_service();
     }
 
     fn poll_heartbeat(&mut self, turn: &mut Turn<'_, impl Transmit>) {

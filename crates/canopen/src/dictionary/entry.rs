@@ -1,14 +1,13 @@
 //! One entry of a dictionary at run time.
 
+use super::limits::Limits;
 use super::{Access, Field, Group, Mapping, Rule, Type};
 use crate::sdo::Abort;
 
 /// What entries can have in common: everything but their names in the dictionary and their places in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attributes {
-    /// Limits of an integer of at most 32 bits, as [`Type::ordered`] gives it. Longer ones take any value.
-    pub(crate) low: u32,
-    pub(crate) high: u32,
+    pub(crate) limits: Limits,
     pub(crate) kind: Type,
     pub(crate) access: Access,
     pub(crate) mapping: Mapping,
@@ -50,6 +49,10 @@ impl Entry {
         self.attributes.rule
     }
 
+    pub(crate) const fn is_writable(&self) -> bool {
+        self.attributes.access.is_writable()
+    }
+
     /// Checks the length of a value to be written. A string may be shorter than its place.
     pub(crate) fn check_length(&self, len: usize) -> Result<(), Abort> {
         let size = usize::from(self.field.size);
@@ -64,21 +67,12 @@ impl Entry {
     }
 
     /// Checks a value of the right length that is to be written, by its first four bytes.
+    #[inline]
     pub(crate) fn check_value(&self, value: u32) -> Result<(), Abort> {
         match self.attributes.kind {
-            Type::VisibleString(_) | Type::Domain | Type::Unsigned48 | Type::Unsigned64 => Ok(()),
             Type::Real32 => check_real(f32::from_bits(value)),
-            kind => self.attributes.check_limits(kind.ordered(value)),
+            kind => self.attributes.limits.check(kind, self.field.size, value),
         }
-    }
-}
-
-impl Attributes {
-    fn check_limits(&self, value: u32) -> Result<(), Abort> {
-        if value > self.high {
-            return Err(Abort::ValueTooHigh);
-        }
-        if value < self.low { Err(Abort::ValueTooLow) } else { Ok(()) }
     }
 }
 

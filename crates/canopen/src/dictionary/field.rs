@@ -43,8 +43,11 @@ impl Field {
 
     /// Eight bytes from the start of the value; those beyond the image are zero.
     pub(crate) fn eight(self, image: &[u8]) -> [u8; 8] {
-        let rest = image.get(usize::from(self.offset)..).unwrap_or(&[]);
-        rest.first_chunk().copied().unwrap_or_else(|| padded(rest))
+        let rest = image.get(usize::from(self.offset)..);
+        match rest.and_then(<[u8]>::first_chunk) {
+            Some(all) => *all,
+            None => padded(rest.unwrap_or(&[])),
+        }
     }
 
     /// The first `K` bytes from the start of the value.

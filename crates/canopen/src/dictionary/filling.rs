@@ -3,6 +3,7 @@
 
 use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::Attributes;
+use super::limits::Limits;
 use super::tables::{Place, Series};
 use super::{Counts, DefaultValue, Object, Rule, image_size};
 
@@ -151,8 +152,7 @@ const fn larger(a: usize, b: usize) -> usize {
 }
 
 pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
-    a.low == b.low
-        && a.high == b.high
+    a.limits.is_same(b.limits)
         && a.kind.code() == b.kind.code()
         && a.kind.size() == b.kind.size()
         && a.rule.code() == b.rule.code()
@@ -162,12 +162,10 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.node_relative == b.node_relative
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `check` has seen the ranges.
 pub(super) const fn attributes(row: &Object) -> Attributes {
     let (low, high) = effective_limits(row);
     Attributes {
-        low: row.kind.ordered(low as u32),
-        high: row.kind.ordered(high as u32),
+        limits: Limits::new(row.kind, low, high),
         kind: row.kind,
         access: row.access,
         mapping: row.mapping,

@@ -12,6 +12,7 @@ mod compile;
 mod entry;
 mod field;
 mod filling;
+mod limits;
 mod object;
 mod packed;
 mod tables;

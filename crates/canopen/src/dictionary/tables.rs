@@ -110,7 +110,7 @@ impl Dictionary {
 
     /// The default value of an entry, without the zeros at its end.
     pub(crate) fn default(&self, entry: &Entry) -> &'static [u8] {
-        let Ok((series, _)) = self.series_of(entry.index) else { return &[] };
+        let Ok((series, _)) = self.series_of(entry.index, entry.sub) else { return &[] };
         let start = entry.field.offset.wrapping_sub(series.offset);
         let defaults = self.defaults_of(series).get(usize::from(start)..).unwrap_or_default();
         defaults.get(..usize::from(entry.field.size)).unwrap_or(defaults)
@@ -140,18 +140,22 @@ impl Dictionary {
     /// # Errors
     /// `NoObject` where the index is unknown, `NoSubIndex` where only the sub-index is.
     pub fn find(&self, index: u16, sub: u8) -> Result<Entry, Abort> {
-        let (series, number) = self.series_of(index)?;
+        let (series, number) = self.series_of(index, sub)?;
         // Most objects have the sub-indexes 0, 1, 2 and so on.
-        let places = self.places_of(series);
-        let direct = places.get(usize::from(sub)).filter(|place| place.sub == sub);
-        let place = direct.or_else(|| places.iter().find(|place| place.sub == sub));
+        let direct = self.places.get(usize::from(series.first) + usize::from(sub));
+        let place = match direct {
+            Some(place) if place.sub == sub && sub < series.entries => Some(place),
+            _ => self.places_of(series).iter().find(|place| place.sub == sub),
+        };
         place.and_then(|place| self.entry(series, number, *place)).ok_or(Abort::NoSubIndex)
     }
 
-    /// The series of an object, and its number there.
+    /// The series of an entry's object, and the number of the object there.
     #[inline]
-    fn series_of(&self, index: u16) -> Result<(&'static Series, u16), Abort> {
-        let after = self.series.partition_point(|series| series.index <= index);
+    fn series_of(&self, index: u16, sub: u8) -> Result<(&'static Series, u16), Abort> {
+        // As `Object::key`: an index alone would be extended to a word in every step.
+        let key = u32::from(index) << 8 | u32::from(sub);
+        let after = self.series.partition_point(|series| u32::from(series.index) << 8 <= key);
         let series = self.series.get(after.wrapping_sub(1)).ok_or(Abort::NoObject)?;
         let number = index.wrapping_sub(series.index);
         if number < series.objects.into() { Ok((series, number)) } else { Err(Abort::NoObject) }

@@ -75,35 +75,4 @@ impl Type {
             Type::Real32 | Type::VisibleString(_) | Type::Domain => None,
         }
     }
-
-    /// A number of 32 bits for the value of an integer type of at most as many, such that the numbers have the order of
-    /// the values: that of a signed type counts from the smallest INTEGER32.
-    pub(crate) const fn ordered(self, word: u32) -> u32 {
-        let unused = match self {
-            Type::Integer8 => 24,
-            Type::Integer16 => 16,
-            Type::Integer32 => 0,
-            _ => return word,
-        };
-        ((word << unused).cast_signed() >> unused).cast_unsigned() ^ 1 << 31
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Little-endian words of ascending values.
-    fn assert_ascending(kind: Type, words: &[u32]) {
-        assert!(words.iter().map(|&word| kind.ordered(word)).is_sorted_by(|a, b| a < b), "{kind:?}");
-    }
-
-    #[test]
-    fn integers_are_ordered_by_their_type() {
-        assert_ascending(Type::Integer8, &[0x80, 0xFE, 0xFF, 0, 1, 0x7F]);
-        assert_ascending(Type::Unsigned8, &[0, 1, 0x7F, 0x80, 0xFF]);
-        assert_ascending(Type::Integer16, &[0x8000, 0xFFFF, 0, 0x7FFF]);
-        assert_ascending(Type::Integer32, &[1 << 31, u32::MAX, 0, u32::MAX >> 1]);
-        assert_ascending(Type::Unsigned32, &[0, u32::MAX >> 1, 1 << 31, u32::MAX]);
-    }
 }

@@ -55,7 +55,7 @@ impl Mpdo {
         let node = NodeId::new(address & !DESTINATION);
         let address =
             if address & DESTINATION == 0 { Address::Source(node?) } else { Address::Destination(node) };
-        Some(Mpdo { address, at: Multiplexer::parse(frame), data })
+        Some(Mpdo { address, at: Multiplexer::parse(&frame), data })
     }
 
     /// The frame's data.

@@ -61,7 +61,7 @@ pub struct BlockEnd {
 }
 
 impl BlockEnd {
-    pub(super) fn parse(frame: [u8; 8]) -> BlockEnd {
+    pub(super) fn parse(frame: &[u8; 8]) -> BlockEnd {
         BlockEnd { unused: frame[0] >> 2 & 7, crc: u16::from_le_bytes([frame[1], frame[2]]) }
     }
 

@@ -9,8 +9,8 @@ use crate::Instant;
 pub(super) struct Receiver {
     sink: Sink,
     check_crc: bool,
-    /// Last segment of this block that came in sequence.
-    sequence: u8,
+    /// Sequence number of the segment that comes next.
+    next: u8,
     /// The segment that came last, in sequence or not, if it may be the one that comes next. One that comes twice in a
     /// row counts once.
     newest: Option<BlockSegment>,
@@ -22,7 +22,7 @@ pub(super) struct Receiver {
 
 impl Receiver {
     pub(super) fn new(sink: Sink, check_crc: bool) -> Receiver {
-        Receiver { sink, check_crc, sequence: 0, newest: None, has_begun: false, last: None }
+        Receiver { sink, check_crc, next: 1, newest: None, has_begun: false, last: None }
     }
 
     /// Whether frames are segments now, and not requests.
@@ -35,23 +35,22 @@ impl Receiver {
         self.wants_segments() && self.has_begun
     }
 
-    /// Whether the frame is the next segment, and neither the first nor the last of a block: most frames of a transfer
-    /// are nothing else.
-    pub(super) fn expects(&self, frame: [u8; 8]) -> bool {
-        let [sequence, ..] = frame;
-        matches!(sequence, 2..=126) && sequence == self.sequence + 1 && self.is_within_block()
-    }
-
-    /// Takes a frame that it expects.
-    pub(super) fn take_expected(
+    /// Takes a frame if it is the next segment, and neither the first nor the last of a block: most frames of a transfer
+    /// are nothing else; only within a block is anything but 1 the next. `None` for any other.
+    #[inline]
+    pub(super) fn take_next(
         &mut self,
-        frame: [u8; 8],
+        frame: &[u8; 8],
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
-    ) -> Result<(), Abort> {
+    ) -> Option<Result<(), Abort>> {
         let [sequence, data @ ..] = frame;
-        (self.sequence, self.newest) = (sequence, None);
-        self.sink.append_segment(data, buffer, objects)
+        if *sequence != self.next || !matches!(sequence, 2..=126) {
+            return None;
+        }
+        self.next += 1;
+        self.newest = None;
+        Some(self.sink.append_segment(data, buffer, objects))
     }
 
     /// Takes a segment; `true` at the end of a block. Segments after a gap are left to be sent again.
@@ -66,12 +65,12 @@ impl Receiver {
             return Ok(false);
         }
         let is_end = segment.last || segment.sequence == BlockSize::MAX;
-        if segment.sequence.get() == self.sequence + 1 {
-            self.sequence += 1;
+        if segment.sequence.get() == self.next {
+            self.next += 1;
             if segment.last {
                 self.last = Some(segment.data);
             } else {
-                self.sink.append_segment(segment.data, buffer, objects)?;
+                self.sink.append(&segment.data, buffer, objects)?;
             }
         }
         if is_end {
@@ -83,7 +82,7 @@ impl Receiver {
     /// The sequence number to acknowledge; the next block begins.
     pub(super) fn acknowledge(&mut self) -> u8 {
         self.has_begun = false;
-        core::mem::take(&mut self.sequence)
+        core::mem::replace(&mut self.next, 1) - 1
     }
 
     /// The end of the transfer.

@@ -1,20 +1,26 @@
 //! Up to `N` bytes, the rest zero.
 
 /// Up to `N` bytes (`N` below 256). What follows them is zero, so that equal content compares equal.
+///
+/// The alignment makes it a number of words, also as a part of something else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(align(4))]
 pub struct Bytes<const N: usize> {
-    len: u8,
     data: [u8; N],
+    len: u8,
 }
 
 impl<const N: usize> Bytes<N> {
     /// The first `len` bytes of `data`, at most all of them.
     #[must_use]
     pub fn new(mut data: [u8; N], len: u8) -> Bytes<N> {
+        if len >= Self::CAPACITY {
+            return Bytes { data, len: Self::CAPACITY };
+        }
         for byte in data.iter_mut().skip(usize::from(len)) {
             *byte = 0;
         }
-        Bytes { len: len.min(Self::CAPACITY), data }
+        Bytes { data, len }
     }
 
     /// The first bytes of a slice, at most `N`.
@@ -22,7 +28,7 @@ impl<const N: usize> Bytes<N> {
     #[inline]
     pub fn from_slice(bytes: &[u8]) -> Bytes<N> {
         if let Some(full) = bytes.first_chunk() {
-            return Bytes { len: Self::CAPACITY, data: *full };
+            return Bytes { data: *full, len: Self::CAPACITY };
         }
         let mut data = [0; N];
         let mut len = 0;
@@ -30,7 +36,7 @@ impl<const N: usize> Bytes<N> {
             *to = *from;
             len += 1;
         }
-        Bytes { len, data }
+        Bytes { data, len }
     }
 
     #[allow(clippy::cast_possible_truncation)] // N is below 256.
@@ -51,7 +57,7 @@ impl<const N: usize> Bytes<N> {
     /// The bytes.
     #[must_use]
     pub fn as_slice(&self) -> &[u8] {
-        self.data.get(..usize::from(self.len)).unwrap_or(&[])
+        self.data.get(..usize::from(self.len)).unwrap_or(&self.data)
     }
 
     /// The bytes, then zeros.

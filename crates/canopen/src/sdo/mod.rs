@@ -1,5 +1,8 @@
 //! SDO: access to the dictionary (CiA 301, 7.2.4). The messages, and the server that answers them.
 
+// A request is read where it lies: as a value it is two registers, and each of its bytes a shift.
+#![allow(clippy::trivially_copy_pass_by_ref)]
+
 mod abort;
 mod block;
 mod block_download;
@@ -30,14 +33,15 @@ pub struct Multiplexer {
 }
 
 impl Multiplexer {
-    pub(crate) const fn parse(frame: [u8; 8]) -> Multiplexer {
+    pub(crate) const fn parse(frame: &[u8; 8]) -> Multiplexer {
         Multiplexer { index: u16::from_le_bytes([frame[1], frame[2]]), sub: frame[3] }
     }
 
     /// A frame with it, its command specifier and four bytes.
     pub(crate) const fn frame(self, command: u8, data: [u8; 4]) -> [u8; 8] {
-        let [low, high] = self.index.to_le_bytes();
-        [command, low, high, self.sub, data[0], data[1], data[2], data[3]]
+        let head = command as u32 | (self.index as u32) << 8 | (self.sub as u32) << 24;
+        let [command, low, high, sub] = head.to_le_bytes();
+        [command, low, high, sub, data[0], data[1], data[2], data[3]]
     }
 }
 
@@ -53,10 +57,10 @@ pub struct Segment {
 }
 
 impl Segment {
-    fn parse(frame: [u8; 8]) -> Segment {
+    fn parse(frame: &[u8; 8]) -> Segment {
         let [command, data @ ..] = frame;
         let unused = command >> 1 & 7;
-        Segment { toggle: command & 0x10 != 0, last: command & 1 != 0, data: Bytes::new(data, 7 - unused) }
+        Segment { toggle: command & 0x10 != 0, last: command & 1 != 0, data: Bytes::new(*data, 7 - unused) }
     }
 
     fn encode(self, command: u8) -> [u8; 8] {
@@ -69,6 +73,6 @@ impl Segment {
 }
 
 /// Data bytes 4 to 7 of a frame.
-const fn tail(frame: [u8; 8]) -> [u8; 4] {
+const fn tail(frame: &[u8; 8]) -> [u8; 4] {
     [frame[4], frame[5], frame[6], frame[7]]
 }

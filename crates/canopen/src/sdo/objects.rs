@@ -4,8 +4,9 @@ use super::{Abort, Bytes, Multiplexer, crc};
 use crate::copy::copy;
 use crate::{Instant, Part};
 
-/// The longest value that is handed over in one piece, and how much of a stream is.
-pub(crate) const BUFFER: usize = 64;
+/// The longest value that is handed over in one piece, and how much of a stream is: whole segments, and whole words for
+/// the CRC and for copies.
+pub(crate) const BUFFER: usize = 112;
 
 /// How an entry takes a download.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,12 +92,13 @@ pub(super) struct Sink {
     announced: Option<usize>,
     /// The most bytes that it may have.
     limit: usize,
-    /// Bytes that have come.
-    len: usize,
-    /// How many of them are in the buffer.
-    held: usize,
-    /// CRC of those that are no longer there.
+    /// Bytes that have gone on, and their CRC.
+    gone: usize,
     crc: u16,
+    /// Bytes in the buffer.
+    held: usize,
+    /// The most bytes that may be there, by its size and by the limit.
+    brim: usize,
 }
 
 impl Sink {
@@ -119,43 +121,57 @@ impl Sink {
             }
         };
         let limit = announced.map_or(limit, |size| size.min(limit));
-        Ok(Sink { at, kind, announced, limit, len: 0, held: 0, crc: 0 })
+        Ok(Sink { at, kind, announced, limit, gone: 0, crc: 0, held: 0, brim: limit.min(BUFFER) })
     }
 
+    /// Bytes that have come.
+    fn len(&self) -> usize {
+        self.gone.saturating_add(self.held)
+    }
+
+    /// Takes up to seven bytes.
+    #[inline(never)]
     pub(super) fn append(
         &mut self,
         bytes: &[u8],
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        if self.limit.saturating_sub(self.len) < bytes.len() {
-            return Err(Abort::TooLong);
-        }
-        if BUFFER.saturating_sub(self.held) < bytes.len() {
-            self.hand_over(buffer, objects)?;
-        }
-        let rest = buffer.get_mut(self.held..).unwrap_or(&mut []);
-        copy(rest.get_mut(..bytes.len()).ok_or(Abort::TooLong)?, bytes);
-        self.len += bytes.len();
-        self.held += bytes.len();
+        self.make_room(bytes.len(), buffer, objects)?;
+        let end = self.held + bytes.len();
+        copy(buffer.get_mut(self.held..end).ok_or(Abort::TooLong)?, bytes);
+        self.held = end;
         Ok(())
     }
 
-    /// The same for a whole segment.
+    /// The same for a whole segment: with a length that the compiler knows, the copy is two words.
+    #[inline]
     pub(super) fn append_segment(
         &mut self,
-        data: [u8; 7],
+        data: &[u8; 7],
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        if self.held > BUFFER - data.len() {
-            self.hand_over(buffer, objects)?;
-        }
-        let has_room = self.limit.saturating_sub(self.len) >= data.len();
+        self.make_room(data.len(), buffer, objects)?;
         let place = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut());
-        *place.filter(|_| has_room).ok_or(Abort::TooLong)? = data;
-        self.len += data.len();
+        *place.ok_or(Abort::TooLong)? = *data;
         self.held += data.len();
+        Ok(())
+    }
+
+    #[inline]
+    fn make_room(
+        &mut self,
+        len: usize,
+        buffer: &[u8; BUFFER],
+        objects: &mut impl Objects,
+    ) -> Result<(), Abort> {
+        if self.held + len > self.brim {
+            self.hand_over(buffer, objects)?;
+            if self.held + len > self.brim {
+                return Err(Abort::TooLong);
+            }
+        }
         Ok(())
     }
 
@@ -167,8 +183,9 @@ impl Sink {
     ) -> Result<(), Abort> {
         let Writable::Stream(stream) = self.kind else { return Ok(()) };
         self.crc = self.crc(buffer);
-        let part = Part::Data(self.len.saturating_sub(self.held), self.held(buffer));
-        self.held = 0;
+        let part = Part::Data(self.gone, self.held(buffer));
+        (self.gone, self.held) = (self.len(), 0);
+        self.brim = self.limit.saturating_sub(self.gone).min(BUFFER);
         objects.stream(stream, part)
     }
 
@@ -187,12 +204,12 @@ impl Sink {
         objects: &mut impl Objects,
         now: Instant,
     ) -> Result<(), Abort> {
-        if self.announced.is_some_and(|size| size != self.len) {
+        if self.announced.is_some_and(|size| size != self.len()) {
             return Err(Abort::TooShort);
         }
         self.hand_over(buffer, objects)?;
         match self.kind {
-            Writable::Stream(stream) => objects.stream(stream, Part::End(self.len)),
+            Writable::Stream(stream) => objects.stream(stream, Part::End(self.gone)),
             Writable::Value(_) => objects.write(self.at, self.held(buffer), now),
         }
     }

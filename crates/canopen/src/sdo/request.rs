@@ -67,7 +67,7 @@ pub enum Initiate {
 impl Request {
     /// `None` for an unknown command specifier.
     #[must_use]
-    pub fn parse(frame: [u8; 8]) -> Option<Request> {
+    pub fn parse(frame: &[u8; 8]) -> Option<Request> {
         let multiplexer = Multiplexer::parse(frame);
         match frame[0] >> 5 {
             0 => Some(Request::DownloadSegment(Segment::parse(frame))),
@@ -85,7 +85,7 @@ impl Request {
         }
     }
 
-    fn parse_block_upload(frame: [u8; 8]) -> Request {
+    fn parse_block_upload(frame: &[u8; 8]) -> Request {
         match frame[0] & 3 {
             0 => Request::BlockUpload {
                 at: Multiplexer::parse(frame),
@@ -124,7 +124,7 @@ impl Request {
 }
 
 impl Initiate {
-    fn parse(frame: [u8; 8]) -> Initiate {
+    fn parse(frame: &[u8; 8]) -> Initiate {
         let (data, unused) = (tail(frame), frame[0] >> 2 & 3);
         match frame[0] & 0x03 {
             0b11 => Initiate::Expedited(Bytes::new(data, 4 - unused)),

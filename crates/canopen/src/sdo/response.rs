@@ -46,24 +46,24 @@ impl Response {
     /// `None` for an unknown command specifier.
     #[must_use]
     pub fn parse(frame: [u8; 8]) -> Option<Response> {
-        let multiplexer = Multiplexer::parse(frame);
+        let multiplexer = Multiplexer::parse(&frame);
         match frame[0] >> 5 {
-            0 => Some(Response::UploadedSegment(Segment::parse(frame))),
+            0 => Some(Response::UploadedSegment(Segment::parse(&frame))),
             1 => Some(Response::DownloadedSegment { toggle: frame[0] & 0x10 != 0 }),
-            2 => Some(Response::parse_upload(multiplexer, frame)),
+            2 => Some(Response::parse_upload(multiplexer, &frame)),
             3 => Some(Response::Downloaded(multiplexer)),
-            4 => Some(Response::Abort(multiplexer, u32::from_le_bytes(tail(frame)))),
-            5 => Response::parse_block_download(multiplexer, frame),
-            6 if frame[0] & 1 != 0 => Some(Response::BlockUploadEnd(BlockEnd::parse(frame))),
+            4 => Some(Response::Abort(multiplexer, u32::from_le_bytes(tail(&frame)))),
+            5 => Response::parse_block_download(multiplexer, &frame),
+            6 if frame[0] & 1 != 0 => Some(Response::BlockUploadEnd(BlockEnd::parse(&frame))),
             6 => {
-                let size = (frame[0] & 2 != 0).then(|| u32::from_le_bytes(tail(frame)));
+                let size = (frame[0] & 2 != 0).then(|| u32::from_le_bytes(tail(&frame)));
                 Some(Response::BlockUpload { at: multiplexer, crc: frame[0] & 4 != 0, size })
             }
             _ => None,
         }
     }
 
-    fn parse_block_download(multiplexer: Multiplexer, frame: [u8; 8]) -> Option<Response> {
+    fn parse_block_download(multiplexer: Multiplexer, frame: &[u8; 8]) -> Option<Response> {
         match frame[0] & 0x07 {
             0b000 | 0b100 => Some(Response::BlockDownload(multiplexer, BlockSize::new(frame[4])?)),
             0b010 => Some(Response::BlockAcknowledge(frame[1], BlockSize::new(frame[2])?)),
@@ -72,7 +72,7 @@ impl Response {
         }
     }
 
-    fn parse_upload(multiplexer: Multiplexer, frame: [u8; 8]) -> Response {
+    fn parse_upload(multiplexer: Multiplexer, frame: &[u8; 8]) -> Response {
         match frame[0] & 0x03 {
             0b11 => Response::Uploaded(multiplexer, Bytes::new(tail(frame), 4 - (frame[0] >> 2 & 3))),
             0b10 => Response::Uploaded(multiplexer, Bytes::new(tail(frame), 4)),
@@ -82,13 +82,14 @@ impl Response {
     }
 
     /// Whether a frame is the response to what begins a block download.
-    pub(super) fn begins_block_download(frame: [u8; 8]) -> bool {
+    pub(super) fn begins_block_download(frame: &[u8; 8]) -> bool {
         frame[0] == BLOCK_DOWNLOAD
     }
 
     /// The frame's data.
     #[must_use]
-    #[inline]
+    #[inline(always)]
+    #[allow(clippy::inline_always)] // The server knows which response it makes: of the match one arm is left there.
     pub fn encode(self) -> [u8; 8] {
         match self {
             Response::Downloaded(multiplexer) => multiplexer.frame(0x60, [0; 4]),

@@ -250,6 +250,21 @@ fn too_much_is_refused_when_it_comes() {
 }
 
 #[test]
+fn segments_beyond_the_announced_size_are_refused_when_they_come() {
+    for segments in [1, 2, 15, 16, 17, 120] {
+        let mut client = Client::new();
+        // The next segment has a byte too much.
+        let size = u32::from(segments) * 7 + 6;
+        client.bench.ask(Request::BlockDownload { at: DOMAIN, crc: true, size: Some(size) });
+        for sequence in 1..=segments {
+            assert_eq!(client.send_segment(segment(&data(2000), sequence.into(), sequence)), None);
+        }
+        let refused = client.send_segment(segment(&data(2000), segments.into(), segments + 1));
+        assert_eq!(refused, Some(Response::Abort(DOMAIN, 0x0607_0012)), "after {segments}");
+    }
+}
+
+#[test]
 fn a_client_that_gives_up_or_falls_silent_ends_the_transfer() {
     let mut client = Client::new();
     client.bench.device.application_mut().domain = data(2000);

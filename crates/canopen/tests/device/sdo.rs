@@ -153,6 +153,17 @@ fn a_silent_client_times_out() {
 }
 
 #[test]
+fn a_segment_that_comes_again_after_the_time_out_comes_too_late() {
+    let mut bench = Bench::booted();
+    let at = Multiplexer { index: 0x1008, sub: 0 };
+    bench.ask(Request::Upload(at));
+    let again = Request::UploadSegment { toggle: false };
+    assert!(matches!(bench.ask(again), Some(Response::UploadedSegment(_))));
+    bench.run(Duration::from_millis(1000));
+    assert_eq!(bench.ask(again), abort(at, 0x0504_0001));
+}
+
+#[test]
 fn an_abort_of_the_client_ends_the_transfer_without_an_answer() {
     let mut bench = Bench::booted();
     begin_download(&mut bench, None);

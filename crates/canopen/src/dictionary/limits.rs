@@ -1,0 +1,108 @@
+//! Which values an entry takes.
+
+use super::Type;
+use crate::sdo::Abort;
+
+/// The limits of an integer of at most 32 bits; anything else takes any value.
+///
+/// A value is within them when, modulo 2^8, 2^16 or 2^32 by its type, it is no further from the lowest than the highest is:
+/// one comparison, with a sign and without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Limits {
+    /// The lowest value, at the top of the word: there a short number wraps as one of its type does.
+    low: u32,
+    /// From there to the highest, at the top too.
+    span: u32,
+}
+
+impl Limits {
+    const NONE: Limits = Limits { low: 0, span: u32::MAX };
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `check` has seen the ranges.
+    pub(super) const fn new(kind: Type, low: i64, high: i64) -> Limits {
+        if kind.range().is_none() || kind.size() > 4 {
+            return Limits::NONE;
+        }
+        let (low, high) = (shifted(kind.size(), low as u32), shifted(kind.size(), high as u32));
+        Limits { low, span: high.wrapping_sub(low) }
+    }
+
+    pub(super) const fn is_same(self, other: Limits) -> bool {
+        self.low == other.low && self.span == other.span
+    }
+
+    /// Checks a value of a type of this size, by its first four bytes.
+    pub(super) fn check(self, kind: Type, size: u8, value: u32) -> Result<(), Abort> {
+        let value = shifted(size, value);
+        if value.wrapping_sub(self.low) <= self.span { Ok(()) } else { Err(self.excess(kind, value)) }
+    }
+
+    fn excess(self, kind: Type, value: u32) -> Abort {
+        let is_low = match kind {
+            Type::Integer8 | Type::Integer16 | Type::Integer32 => {
+                value.cast_signed() < self.low.cast_signed()
+            }
+            _ => value < self.low,
+        };
+        if is_low { Abort::ValueTooLow } else { Abort::ValueTooHigh }
+    }
+}
+
+/// A value of so many bytes at the top of a word. One without limits may have any size.
+const fn shifted(size: u8, value: u32) -> u32 {
+    value.wrapping_shl(0_u32.wrapping_sub(size as u32 * 8))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Words of values of a type with limits, and what becomes of them.
+    fn assert_checked(kind: Type, (low, high): (i64, i64), words: &[(u32, Result<(), Abort>)]) {
+        let limits = Limits::new(kind, low, high);
+        for &(word, expected) in words {
+            assert_eq!(limits.check(kind, kind.size(), word), expected, "{word:#X} as {kind:?}");
+        }
+    }
+
+    const LOW: Result<(), Abort> = Err(Abort::ValueTooLow);
+    const HIGH: Result<(), Abort> = Err(Abort::ValueTooHigh);
+
+    #[test]
+    fn limits_hold_with_a_sign_and_without() {
+        assert_checked(
+            Type::Integer8,
+            (-2, 1),
+            &[(0x80, LOW), (0xFD, LOW), (0xFE, Ok(())), (0, Ok(())), (1, Ok(())), (2, HIGH), (0x7F, HIGH)],
+        );
+        assert_checked(
+            Type::Integer16,
+            (-0x100, -1),
+            &[(0x8000, LOW), (0xFEFF, LOW), (0xFF00, Ok(())), (0xFFFF, Ok(())), (0, HIGH), (0x7FFF, HIGH)],
+        );
+        assert_checked(
+            Type::Integer32,
+            (5, i64::from(i32::MAX)),
+            &[(1 << 31, LOW), (4, LOW), (5, Ok(())), (u32::MAX >> 1, Ok(()))],
+        );
+        assert_checked(Type::Unsigned8, (1, 254), &[(0, LOW), (1, Ok(())), (254, Ok(())), (255, HIGH)]);
+        assert_checked(
+            Type::Unsigned32,
+            (0x10, 0xFFFF_FFF0),
+            &[(0xF, LOW), (0x10, Ok(())), (1 << 31, Ok(())), (0xFFFF_FFF1, HIGH)],
+        );
+    }
+
+    #[test]
+    fn a_type_without_limits_takes_any_value() {
+        for kind in [Type::Integer8, Type::Integer16, Type::Integer32, Type::Unsigned8, Type::Unsigned32] {
+            let (low, high) = kind.range().unwrap();
+            for word in [0, 1, 0x7F, 0x80, 0xFF] {
+                assert_checked(kind, (low, high), &[(word, Ok(()))]);
+            }
+        }
+        for kind in [Type::Unsigned48, Type::Unsigned64, Type::VisibleString(9), Type::Domain] {
+            assert_checked(kind, (0, 0), &[(0, Ok(())), (u32::MAX, Ok(()))]);
+        }
+    }
+}

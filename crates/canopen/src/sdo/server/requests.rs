@@ -1,0 +1,175 @@
+//! What the server does with each request.
+
+use super::{Answer, Server, Transfer};
+use crate::Instant;
+use crate::sdo::block_download::Receiver;
+use crate::sdo::block_upload::Sender;
+use crate::sdo::objects::{Sink, Source};
+use crate::sdo::segmented::{Download, Upload};
+use crate::sdo::{
+    Abort, BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Objects, Request, Response,
+    Segment, Writable,
+};
+
+impl Server {
+    /// A request that is no segment of a block; `is_repeated` for the same as the one before.
+    #[inline]
+    pub(super) fn dispatch<O: Objects>(
+        &mut self,
+        frame: &[u8; 8],
+        is_repeated: bool,
+        objects: &mut O,
+        now: Instant,
+    ) -> Answer {
+        let Some(request) = Request::parse(frame) else { return Err(Abort::Command) };
+        match request {
+            Request::Upload(at) => self.upload(at, objects),
+            Request::Download(at, initiate) => self.download(at, initiate, objects, now),
+            Request::UploadSegment { toggle } => self.upload_segment(toggle, objects),
+            Request::DownloadSegment(segment) => self.download_segment(&segment, objects, now),
+            Request::Abort(..) => {
+                self.transfer = Transfer::Idle;
+                Ok(false)
+            }
+            Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
+            Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
+            _ if O::IS_SMALL => Err(Abort::Command),
+            Request::BlockUpload { at, block_size, threshold, .. } => {
+                self.block_upload(at, block_size, threshold, objects)
+            }
+            Request::BlockUploadStart => self.sender()?.start(is_repeated).map(|()| false),
+            Request::BlockAcknowledge { sequence, block_size } => {
+                match self.sender()?.acknowledge(sequence, block_size, is_repeated)? {
+                    Some(end) => Ok(self.say(Response::BlockUploadEnd(end))),
+                    None => Ok(false),
+                }
+            }
+            // The confirmation of the end is not answered; one that was refused is refused again.
+            Request::BlockUploadEnded if is_repeated && !self.is_answered => Ok(false),
+            Request::BlockUploadEnded => {
+                self.sender()?.ended()?;
+                self.transfer = Transfer::Idle;
+                Ok(false)
+            }
+        }
+    }
+
+    /// A new transfer; one that was under way is forgotten, as its client has started over.
+    fn begin(&mut self, at: Multiplexer) {
+        self.transfer = Transfer::Idle;
+        self.multiplexer = at;
+        self.is_answered = false;
+    }
+
+    fn upload(&mut self, at: Multiplexer, objects: &mut impl Objects) -> Answer {
+        self.begin(at);
+        let value = objects.read(at)?;
+        if value.len() <= 4 {
+            return Ok(self.say(Response::Uploaded(at, Bytes::from_slice(value))));
+        }
+        let source = Source::new(at, value, &mut self.buffer);
+        self.transfer = Transfer::Upload(Upload::new(source));
+        Ok(self.say(Response::UploadSegmented(at, Some(source.size()))))
+    }
+
+    fn upload_segment(&mut self, toggle: bool, objects: &impl Objects) -> Answer {
+        let Transfer::Upload(upload) = &mut self.transfer else { return Err(Abort::Command) };
+        let segment = upload.next(toggle, &self.buffer, objects)?;
+        if segment.last {
+            self.transfer = Transfer::Idle;
+        }
+        Ok(self.say(Response::UploadedSegment(segment)))
+    }
+
+    fn download(
+        &mut self,
+        at: Multiplexer,
+        initiate: Initiate,
+        objects: &mut impl Objects,
+        now: Instant,
+    ) -> Answer {
+        self.begin(at);
+        match initiate {
+            Initiate::Expedited(bytes) => objects.write(at, bytes.as_slice(), now)?,
+            Initiate::Unsized(data) => {
+                let value = unsized_value(data, at, objects)?;
+                objects.write(at, value.as_slice(), now)?;
+            }
+            Initiate::Segmented(size) => {
+                self.transfer = Transfer::Download(Download::new(Sink::open(at, size, objects)?));
+            }
+        }
+        Ok(self.say(Response::Downloaded(at)))
+    }
+
+    fn download_segment(&mut self, segment: &Segment, objects: &mut impl Objects, now: Instant) -> Answer {
+        let Transfer::Download(download) = &mut self.transfer else { return Err(Abort::Command) };
+        download.take(segment, &mut self.buffer, objects, now)?;
+        if segment.last {
+            self.transfer = Transfer::Idle;
+        }
+        Ok(self.say(Response::DownloadedSegment { toggle: segment.toggle }))
+    }
+
+    fn block_download(
+        &mut self,
+        at: Multiplexer,
+        crc: bool,
+        size: Option<u32>,
+        objects: &mut impl Objects,
+    ) -> Answer {
+        self.begin(at);
+        let sink = Sink::open(at, size, objects)?;
+        self.transfer = Transfer::BlockDownload(Receiver::new(sink, crc));
+        Ok(self.say(Response::BlockDownload(at, BlockSize::MAX)))
+    }
+
+    pub(super) fn take_block_segment(&mut self, segment: BlockSegment, objects: &mut impl Objects) -> Answer {
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
+        if !receiver.take(segment, &mut self.buffer, objects)? {
+            return Ok(false);
+        }
+        let sequence = receiver.acknowledge();
+        Ok(self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX)))
+    }
+
+    fn block_download_end(&mut self, end: BlockEnd, objects: &mut impl Objects, now: Instant) -> Answer {
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return Err(Abort::Command) };
+        receiver.end(end, &mut self.buffer, objects, now)?;
+        self.transfer = Transfer::Idle;
+        Ok(self.say(Response::BlockDownloaded))
+    }
+
+    /// A value of no more than `threshold` bytes goes by the simpler transfers.
+    fn block_upload(
+        &mut self,
+        at: Multiplexer,
+        block_size: u8,
+        threshold: u8,
+        objects: &mut impl Objects,
+    ) -> Answer {
+        self.begin(at);
+        let source = Source::new(at, objects.read(at)?, &mut self.buffer);
+        if source.len() <= usize::from(threshold) {
+            return self.upload(at, objects);
+        }
+        let block_size = BlockSize::new(block_size).ok_or(Abort::BlockSize)?;
+        self.transfer = Transfer::BlockUpload(Sender::new(source, block_size));
+        Ok(self.say(Response::BlockUpload { at, crc: true, size: Some(source.size()) }))
+    }
+
+    fn sender(&mut self) -> Result<&mut Sender, Abort> {
+        match &mut self.transfer {
+            Transfer::BlockUpload(sender) => Ok(sender),
+            _ => Err(Abort::Command),
+        }
+    }
+}
+
+/// The value of an expedited download that leaves its size to the type.
+fn unsized_value(data: [u8; 4], at: Multiplexer, objects: &impl Objects) -> Result<Bytes<4>, Abort> {
+    match objects.writable(at)? {
+        Writable::Value(size) => Ok(Bytes::from_slice(data.get(..size).unwrap_or(&data))),
+        Writable::Stream(_) => Ok(Bytes::new(data, 4)),
+    }
+}
