@@ -24,7 +24,7 @@ pub enum Crash {
     Fault(Fault),
     /// The program gave up.
     Panic(Place),
-    /// The clock on OSC_IN failed.
+    /// The clock on `OSC_IN` failed.
     Clock,
     /// An interrupt came that nobody serves: its number in the NVIC, or, below 0, that of an exception of the core less 16
     /// (PM0214, 2.3.2: IRQ number).
