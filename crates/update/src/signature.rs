@@ -188,7 +188,7 @@ mod tests {
     fn it_judges_as_the_library_does() {
         for seed in 0..100 {
             let keys = Keypair::from(&[seed; 32]);
-            let (hash, key) = (Sha512::digest(&[seed]).into(), keys.public.to_bytes());
+            let (hash, key) = (Sha512::digest([seed]).into(), keys.public.to_bytes());
             let mut signature = keys.sign_prehashed(&hash, Some(CONTEXT)).to_bytes();
             assert!(is_good(&hash, CONTEXT, &signature, &key) && is_good_to_salty(&hash, &signature, &key));
             signature[usize::from(seed) % SIGNATURE_LEN] ^= 1;
