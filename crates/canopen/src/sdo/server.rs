@@ -184,7 +184,6 @@ impl Server {
                 if receiver.is_within_block() && now < self.active + TIME_OUT =>
             {
                 let sequence = receiver.acknowledge();
-                self.is_answered = false;
                 self.say(Response::BlockAcknowledge(sequence, BlockSize::MAX))
             }
             _ => self.settle(Err(Abort::TimeOut), now),
