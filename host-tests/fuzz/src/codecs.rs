@@ -15,7 +15,7 @@ pub fn run(data: &[u8]) {
 }
 
 fn services(frame: [u8; 8]) {
-    again(frame, Request::parse, |request| request.encode());
+    again(frame, |frame| Request::parse(&frame), |request| request.encode());
     again(frame, Response::parse, |response| response.encode());
     again(frame, BlockSegment::parse, |segment| segment.encode());
     again(frame, lss::Request::parse, |request| request.encode());
