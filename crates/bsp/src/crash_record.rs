@@ -1,6 +1,7 @@
 //! What is left of a crash for the next start: a few words in RAM that no start-up code touches, sealed with a CRC.
 
 use crate::checksum::SMALL;
+
 const MAGIC: u32 = 0x4352_5348;
 const FAULT: u32 = 1;
 const PANIC: u32 = 2;

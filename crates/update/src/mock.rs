@@ -41,9 +41,7 @@ impl MockFlash {
 
     /// Neither reads nor programs while it erases.
     fn ready(&self) -> Result<(), PowerCut> {
-        if self.cells.is_down() {
-            return Err(PowerCut);
-        }
+        self.cells.check_power()?;
         assert_eq!(self.busy, 0, "the flash erases");
         Ok(())
     }
@@ -98,6 +96,7 @@ impl Flash for MockFlash {
 
     fn is_busy(&mut self) -> Result<bool, PowerCut> {
         self.busy = self.busy.saturating_sub(1);
-        if self.cells.is_down() { Err(PowerCut) } else { Ok(self.busy > 0) }
+        self.cells.check_power()?;
+        Ok(self.busy > 0)
     }
 }

@@ -86,6 +86,14 @@ impl Cells {
         !self.powered
     }
 
+    /// What every call begins with.
+    ///
+    /// # Errors
+    /// [`PowerCut`] when the power is off.
+    pub fn check_power(&self) -> Result<(), PowerCut> {
+        if self.powered { Ok(()) } else { Err(PowerCut) }
+    }
+
     /// Power again, and no cut to come. Weak bits read as the last cut says.
     pub fn power_up(&mut self) {
         (self.powered, self.cut_at) = (true, None);
@@ -110,9 +118,7 @@ impl Cells {
     /// # Errors
     /// [`PowerCut`] when the power is off.
     pub fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), PowerCut> {
-        if !self.powered {
-            return Err(PowerCut);
-        }
+        self.check_power()?;
         for (chunk, word) in bytes.chunks_exact_mut(WORD).zip(&self.words[offset / WORD..]) {
             chunk.copy_from_slice(&word.value().to_le_bytes());
         }
@@ -131,7 +137,7 @@ impl Cells {
             let target = u32::from_le_bytes(chunk.try_into().expect("four bytes"));
             let is_cut = self.begin()?;
             self.words[index].program(target, is_cut);
-            self.outcome()?;
+            self.check_power()?;
             self.programmed += 1;
         }
         Ok(())
@@ -146,19 +152,15 @@ impl Cells {
         for word in &mut self.words[unit.start / WORD..unit.end / WORD] {
             word.erase(is_cut);
         }
-        self.outcome()
+        self.check_power()
     }
 
     /// Counts an operation; tells whether it is the one that is cut.
     fn begin(&mut self) -> Result<bool, PowerCut> {
-        self.outcome()?;
+        self.check_power()?;
         let is_cut = self.cut_at == Some(self.operations);
         self.operations += 1;
         self.powered = !is_cut;
         Ok(is_cut)
-    }
-
-    fn outcome(&self) -> Result<(), PowerCut> {
-        if self.powered { Ok(()) } else { Err(PowerCut) }
     }
 }
