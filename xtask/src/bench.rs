@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use crate::command::{cargo, root, run, target_dir};
-use crate::native;
+use crate::command::{root, run, target_dir};
+use crate::own_tool::Tools;
+use crate::progress;
 use crate::target::{TRIPLE, Toolchain};
 
 /// What to do with the figures.
@@ -34,12 +35,11 @@ impl Options {
 }
 
 /// Measures and prints.
-pub(crate) fn measure(options: &Options) -> Result<()> {
-    native::ensure_emulator_tools()?;
+pub(crate) fn measure(options: &Options, tools: Tools) -> Result<()> {
     let images = build(options)?;
     let page = root().join("docs/performance.md");
-    let mut command = cargo();
-    command.args(["run", "--quiet", "--profile", "sim", "-p", "bench", "--", "--images"]).arg(images);
+    let mut command = tools.get("bench")?;
+    command.arg("--images").arg(images);
     if options.speed {
         command.arg("--speed");
     }
@@ -57,11 +57,13 @@ pub(crate) fn measure(options: &Options) -> Result<()> {
 
 /// The step of the test command: what is flashed has not become worse than stated.
 pub(crate) fn check() -> Result<()> {
-    measure(&Options { check: true, ..Options::default() })
+    measure(&Options { check: true, ..Options::default() }, Tools::Built)
 }
 
-fn build(options: &Options) -> Result<PathBuf> {
+/// Builds the programs whose instructions are counted; returns their directory.
+pub(crate) fn build(options: &Options) -> Result<PathBuf> {
     let profile = options.cargo_profile();
-    run(&mut Toolchain::ensure()?.cargo("build", &["--profile", profile, "-p", "bench-images"]))?;
+    let mut command = Toolchain::ensure()?.cargo("build", &["--profile", profile, "-p", "bench-images"]);
+    progress::build("bench images", &mut command)?;
     Ok(target_dir().join(TRIPLE).join(profile))
 }

@@ -4,20 +4,21 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::command::{cargo, run};
+use crate::command::run;
 use crate::images;
+use crate::own_tool::Tools;
 use crate::target::Toolchain;
 
 /// Prints which code of the images can panic; fails when some of it is not known.
-pub(crate) fn panics() -> Result<()> {
-    images::build_node(&Toolchain::ensure()?)?;
-    run(tool().arg("panics"))
+pub(crate) fn panics(tools: Tools) -> Result<()> {
+    images::compile_node(&Toolchain::ensure()?)?;
+    run(tool(tools)?.arg("panics"))
 }
 
 /// The same, and shows that it can fail.
 pub(crate) fn check_panics() -> Result<()> {
-    panics()?;
-    let forgetful = tool().args(["panics", "--forget", "defmt_rtt"]).output()?;
+    panics(Tools::Built)?;
+    let forgetful = tool(Tools::Built)?.args(["panics", "--forget", "defmt_rtt"]).output()?;
     let says = String::from_utf8_lossy(&forgetful.stderr);
     ensure!(
         !forgetful.status.success() && says.contains("defmt_rtt"),
@@ -27,16 +28,14 @@ pub(crate) fn check_panics() -> Result<()> {
 }
 
 /// Prints how deep the stack of each image can get; fails when that is more than is reserved for it.
-pub(crate) fn stack(paths: bool) -> Result<()> {
-    images::build_node(&Toolchain::ensure()?)?;
+pub(crate) fn stack(paths: bool, tools: Tools) -> Result<()> {
+    images::compile_node(&Toolchain::ensure()?)?;
     let paths = if paths { &["--paths"][..] } else { &[] };
-    run(tool().arg("stack").args(paths))
+    run(tool(tools)?.arg("stack").args(paths))
 }
 
-fn tool() -> Command {
-    let mut command = cargo();
-    command
-        .args(["run", "--quiet", "--profile", "sim", "-p", "callgraph", "--", "--images"])
-        .arg(images::dir());
-    command
+fn tool(tools: Tools) -> Result<Command> {
+    let mut command = tools.get("callgraph")?;
+    command.arg("--images").arg(images::dir());
+    Ok(command)
 }

@@ -1,9 +1,17 @@
 //! Running other programs.
 
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
+
+thread_local! {
+    /// Where the programs that this thread runs print to; the terminal when there is none.
+    static LOG: RefCell<Option<File>> = const { RefCell::new(None) };
+}
 
 /// The root of the workspace.
 pub(crate) fn root() -> &'static Path {
@@ -22,9 +30,29 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
+/// Lets everything that `action` runs on this thread print into a file.
+pub(crate) fn with_log<T>(log: File, action: impl FnOnce() -> T) -> T {
+    LOG.set(Some(log));
+    let result = action();
+    LOG.set(None);
+    result
+}
+
+/// A line for the log, or the terminal where there is none.
+pub(crate) fn say(line: &str) {
+    LOG.with_borrow_mut(|log| match log {
+        // A full disk ends the program that is run; a line about the program may be lost before.
+        Some(log) => drop(writeln!(log, "{line}")),
+        None => eprintln!("{line}"),
+    });
+}
+
 /// Runs to the end; an error names the program when it cannot start or fails.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let name = line(command);
+    if let Some((out, err)) = streams()? {
+        command.stdin(Stdio::null()).stdout(out).stderr(err);
+    }
     let status = command.status().with_context(|| format!("cannot start `{name}`"))?;
     if !status.success() {
         bail!("`{name}` failed ({status})");
@@ -32,15 +60,17 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// What a program prints, without the last line end; `None` when it is missing or fails.
-pub(crate) fn output(program: &str, args: &[&str]) -> Option<String> {
-    let output = Command::new(program).args(args).stderr(Stdio::null()).output().ok()?;
-    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
+fn streams() -> Result<Option<(File, File)>> {
+    LOG.with_borrow(|log| match log {
+        Some(log) => Ok(Some((log.try_clone()?, log.try_clone()?))),
+        None => Ok(None),
+    })
 }
 
-/// Whether a program can be started.
-pub(crate) fn exists(program: &str) -> bool {
-    Command::new(program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok()
+/// What a program prints, without the last line end; `None` when it is missing or fails.
+pub(crate) fn output(program: &str, args: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(args).stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
 fn line(command: &Command) -> String {

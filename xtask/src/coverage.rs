@@ -6,7 +6,8 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::command::{cargo, root, run};
-use crate::{native, tools};
+use crate::setup::system::{self, Package, is_installed};
+use crate::{target, tools};
 
 /// The crates that are measured, and those whose tests count as well.
 const PURE: [&str; 5] = ["canopen", "profiles", "storage", "update", "node"];
@@ -29,8 +30,10 @@ pub(crate) fn print() -> Result<()> {
         command.args(["-p", package]);
     }
     command.args(["--ignore-filename-regex", IGNORED]).env("PATH", tools::with("cargo-llvm-cov")?);
-    if std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0") {
-        native::ensure_packages(&native::missing_packages(&["llvm-22"]), "its llvm-cov reads the counters")?;
+    if target::is_closed() {
+        if !is_installed(Package::DebianLlvm) {
+            system::install(&[Package::DebianLlvm])?;
+        }
         let tool = |name: &str| Path::new(DEBIAN_LLVM).join(name);
         command.env("LLVM_COV", tool("llvm-cov")).env("LLVM_PROFDATA", tool("llvm-profdata"));
     } else {

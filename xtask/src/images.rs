@@ -1,10 +1,13 @@
 //! The ELF files for the Cortex-M4.
 
 use std::path::PathBuf;
+use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::command::{cargo, run, target_dir};
+use crate::command::{run, target_dir};
+use crate::own_tool::Tools;
+use crate::progress;
 use crate::target::{TRIPLE, Toolchain};
 
 /// Where the ELF files lie.
@@ -12,20 +15,32 @@ pub(crate) fn dir() -> PathBuf {
     target_dir().join(TRIPLE).join("release")
 }
 
-/// Builds the firmware and the bootloader.
-pub(crate) fn build_node(toolchain: &Toolchain) -> Result<()> {
-    run(&mut toolchain.cargo("build", &["--release", "-p", "firmware", "-p", "bootloader"]))?;
+/// Compiles the firmware and the bootloader.
+pub(crate) fn compile_node(toolchain: &Toolchain) -> Result<()> {
+    compile(toolchain, "firmware 1/2", &["firmware", "bootloader"])
+}
+
+/// Compiles everything that the tests run on the emulated core.
+pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
+    compile(toolchain, "images", &["firmware", "bootloader", "mechanics-images"])
+}
+
+fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {
+    let mut command = toolchain.cargo("build", &["--release"]);
+    progress::build(what, command.args(packages.iter().flat_map(|package| ["-p", package])))?;
     for name in ["firmware", "bootloader"] {
         ensure!(dir().join(name).exists(), "cargo built no {name} in {}", dir().display());
     }
-    // Signed with the development key: what a programmer writes and `nodectl update` takes.
-    run(cargo().args(["run", "--quiet", "-p", "sign", "--", "image"]).arg(dir().join("firmware")))
+    Ok(())
 }
 
-/// Builds everything that the tests run on the emulated core.
-pub(crate) fn build() -> Result<Toolchain> {
-    let toolchain = Toolchain::ensure()?;
-    build_node(&toolchain)?;
-    run(&mut toolchain.cargo("build", &["--release", "-p", "mechanics-images"]))?;
-    Ok(toolchain)
+/// Has the tool make the image that a programmer writes and `nodectl update` takes, signed with the development key.
+pub(crate) fn sign(mut tool: Command) -> Result<()> {
+    run(tool.arg("image").arg(dir().join("firmware")))
+}
+
+/// Compiles and signs everything that the tests run on the emulated core.
+pub(crate) fn build(tools: Tools) -> Result<()> {
+    compile_all(&Toolchain::ensure()?)?;
+    sign(tools.get("sign")?)
 }

@@ -8,12 +8,11 @@ mod eds;
 mod fuzz;
 mod images;
 mod mutants;
-mod native;
 mod own_tool;
 mod plots;
-mod python;
+mod progress;
+mod setup;
 mod sim;
-mod steps;
 mod target;
 mod test;
 mod timing;
@@ -22,14 +21,16 @@ mod tools;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use anyhow::Result;
+use clap::{CommandFactory as _, Parser, Subcommand};
+use own_tool::Tools;
 
 /// Everything that needs more than `cargo test`.
 #[derive(Parser)]
 #[command(name = "cargo xtask", version)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Subcommand)]
@@ -79,33 +80,57 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
-    /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
-    Test {
-        /// Run only the steps whose name contains this text
+    /// Bring what the other commands need: a compiler for the Cortex-M4, cmake, libclang, Python packages, tshark
+    Setup {
+        /// Only say what is missing, and how to install it
         #[arg(long)]
-        only: Option<String>,
+        dry_run: bool,
     },
+    /// Run every check: formatting, lints, documentation, host tests, the emulated board, the Python clients
+    Test(test::Flags),
+    /// Whether the build of the emulator will find a libclang that works; `setup` asks in a process of its own
+    #[command(hide = true)]
+    ProbeLibclang,
 }
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Images => images::build().map(|_| ExitCode::SUCCESS),
-        Command::Sim { flags } => sim::run(&flags),
-        Command::Eds => eds::write().map(|()| ExitCode::SUCCESS),
-        Command::Plots => plots::write().map(|()| ExitCode::SUCCESS),
-        Command::Sign { arguments } => own_tool::run("sign", &arguments).map(|()| ExitCode::SUCCESS),
-        Command::Protect { arguments } => own_tool::run("protect", &arguments).map(|()| ExitCode::SUCCESS),
-        Command::Fuzz(flags) => fuzz::run_fuzzer(&flags).map(|()| ExitCode::SUCCESS),
-        Command::Bench(options) => bench::measure(&options).map(|()| ExitCode::SUCCESS),
-        Command::Coverage => coverage::print().map(|()| ExitCode::SUCCESS),
-        Command::Mutants(flags) => mutants::print(&flags).map(|()| ExitCode::SUCCESS),
-        Command::Timing => timing::print().map(|()| ExitCode::SUCCESS),
-        Command::Panics => callgraph::panics().map(|()| ExitCode::SUCCESS),
-        Command::Stack { paths } => callgraph::stack(paths).map(|()| ExitCode::SUCCESS),
-        Command::Test { only } => test::run_tests(only.as_deref()).map(|()| ExitCode::SUCCESS),
+        Some(Command::Sim { flags }) => sim::run(&flags),
+        Some(command) => run(command).map(|()| ExitCode::SUCCESS),
+        None => list().map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
         ExitCode::from(2)
     })
+}
+
+fn run(command: Command) -> Result<()> {
+    match command {
+        Command::Images => images::build(Tools::ByCargo),
+        Command::Sim { .. } => unreachable!("`sim` is the only command with an exit status of its own"),
+        Command::Eds => eds::write(),
+        Command::Plots => plots::write(),
+        Command::Sign { arguments } => own_tool::run("sign", &arguments),
+        Command::Protect { arguments } => own_tool::run("protect", &arguments),
+        Command::Fuzz(flags) => fuzz::run_fuzzer(&flags),
+        Command::Bench(options) => bench::measure(&options, Tools::ByCargo),
+        Command::Coverage => coverage::print(),
+        Command::Mutants(flags) => mutants::print(&flags),
+        Command::Timing => timing::print(),
+        Command::Panics => callgraph::panics(Tools::ByCargo),
+        Command::Stack { paths } => callgraph::stack(paths, Tools::ByCargo),
+        Command::Setup { dry_run } => setup::run(dry_run),
+        Command::Test(flags) => test::run(&flags),
+        Command::ProbeLibclang => setup::probe(),
+    }
+}
+
+/// The commands, a line each.
+fn list() -> Result<()> {
+    for command in Cli::command().get_subcommands().filter(|command| !command.is_hide_set()) {
+        let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+        println!("cargo xtask {:<10} {}", command.get_name(), about.split(" (").next().unwrap_or_default());
+    }
+    Ok(())
 }

@@ -1,16 +1,44 @@
-//! Tools of the project that have flags of their own, run from wherever `cargo xtask` is called.
+//! Tools of the project: by cargo, or as the test command has built them.
 
 use std::ffi::OsString;
+use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::command::{self, cargo, root};
+use crate::command::{self, root, target_dir};
+use crate::setup::emulator;
 
-/// Runs the tool in the directory of the caller, so that paths mean what they say.
+/// Where the arguments of a tool go to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tools {
+    /// Cargo builds the tool first.
+    ByCargo,
+    /// The test command has built all of them: cargo would compile some crates again, with the features that one tool
+    /// alone needs.
+    Built,
+}
+
+impl Tools {
+    /// The tool, ready for its arguments.
+    pub(crate) fn get(self, name: &str) -> Result<Command> {
+        if self == Tools::Built {
+            let mut tool = Command::new(
+                target_dir().join("sim").join(format!("{name}{}", std::env::consts::EXE_SUFFIX)),
+            );
+            tool.current_dir(root());
+            return Ok(tool);
+        }
+        let mut command = emulator::cargo_with_emulator()?;
+        command.args(["run", "--quiet", "--profile", "sim", "-p", name, "--"]);
+        Ok(command)
+    }
+}
+
+/// Runs a tool that has flags of its own in the directory of the caller, so that paths mean what they say.
 pub(crate) fn run(tool: &str, arguments: &[OsString]) -> Result<()> {
     let here = std::env::current_dir().context("there is no current directory")?;
     let manifest = root().join("Cargo.toml");
-    let mut command = cargo();
+    let mut command = command::cargo();
     command.args(["run", "--quiet", "-p", tool, "--manifest-path"]).arg(manifest).arg("--").args(arguments);
     command::run(command.current_dir(here))
 }

@@ -1,28 +1,60 @@
-//! `cargo sim`: build both images, then hand over to the simulator.
+//! `cargo sim`: build both images and the simulator, then become the simulator.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
+use std::thread;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 
-use crate::command::{cargo, run as run_command, target_dir};
+use crate::command::target_dir;
+use crate::setup::{self, emulator};
 use crate::target::Toolchain;
-use crate::{images, native};
+use crate::{images, progress};
 
-/// Builds the simulator and returns its path.
-pub(crate) fn build() -> Result<PathBuf> {
-    native::ensure_emulator_tools()?;
-    run_command(cargo().args(["build", "--quiet", "--profile", "sim", "-p", "sim"]))?;
-    Ok(target_dir().join("sim").join(format!("sim{}", std::env::consts::EXE_SUFFIX)))
+/// Builds the simulator and the tool that signs images. Returns the directory of both.
+fn build() -> Result<PathBuf> {
+    let mut command = emulator::cargo_with_emulator()?;
+    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "sign"]);
+    progress::build("emulator 2/2", &mut command)?;
+    Ok(target_dir().join("sim"))
 }
 
-/// Runs the simulator with the user's flags; its exit status becomes ours.
+/// Builds at the same time what the Cortex-M4 and what this machine runs: each of the two leaves a core idle when it links.
+fn build_all() -> Result<PathBuf> {
+    thread::scope(|scope| {
+        let images = scope.spawn(|| images::compile_node(&Toolchain::ensure()?));
+        let programs = build();
+        images.join().map_err(|_| anyhow!("the build of the firmware was interrupted"))??;
+        programs
+    })
+}
+
+/// Runs the simulator with the user's flags in the place of this process, so that a signal to `cargo sim` reaches the
+/// simulator.
 pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
-    images::build_node(&Toolchain::ensure()?)?;
-    let program = build()?;
-    let status = with_images(&program).args(flags).status();
-    let status = status.with_context(|| format!("cannot start {}", program.display()))?;
+    setup::check(setup::SIM)?;
+    let programs = build_all()?;
+    images::sign(Command::new(programs.join(program("sign"))))?;
+    become_program(with_images(&programs.join(program("sim"))).args(flags))
+}
+
+/// The name of an executable file.
+fn program(name: &str) -> String {
+    format!("{name}{}", std::env::consts::EXE_SUFFIX)
+}
+
+#[cfg(unix)]
+fn become_program(command: &mut Command) -> Result<ExitCode> {
+    use std::os::unix::process::CommandExt as _;
+    Err(command.exec()).with_context(|| format!("cannot start {}", command.get_program().display()))
+}
+
+/// Without `exec` the simulator is a child; its exit status becomes ours.
+#[cfg(not(unix))]
+fn become_program(command: &mut Command) -> Result<ExitCode> {
+    let status =
+        command.status().with_context(|| format!("cannot start {}", command.get_program().display()))?;
     Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from))
 }
 

@@ -9,7 +9,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 use crate::command::{cargo, output, root, run};
-use crate::native;
+use crate::setup::system::{self, Package, is_installed, runs};
 
 /// The target of both images: Cortex-M4 with its FPU.
 pub(crate) const TRIPLE: &str = "thumbv7em-none-eabihf";
@@ -18,7 +18,7 @@ pub(crate) const TRIPLE: &str = "thumbv7em-none-eabihf";
 /// up. A stable compiler knows the flag with `RUSTC_BOOTSTRAP` only.
 const STACK_SIZES: &str = "target.thumbv7em-none-eabihf.rustflags = ['-Zemit-stack-sizes']";
 
-const DEBIAN_PACKAGES: [&str; 5] = ["rustc-web", "rust-web-src", "cargo-web", "rust-web-clippy", "lld-22"];
+const DEBIAN: [Package; 3] = [Package::DebianRust, Package::DebianRustSource, Package::DebianCargo];
 
 /// A toolchain that can build for [`TRIPLE`].
 pub(crate) enum Toolchain {
@@ -37,8 +37,9 @@ impl Toolchain {
         if has_target() {
             return Ok(Toolchain::Installed);
         }
-        if std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0") {
-            return debian();
+        if is_closed() {
+            system::install(&missing())?;
+            return Ok(Toolchain::Debian { linker: linker()? });
         }
         eprintln!("adding the Rust target {TRIPLE}");
         run(Command::new("rustup").args(["target", "add", TRIPLE]).current_dir(root())).with_context(
@@ -78,12 +79,27 @@ fn has_target() -> bool {
     entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore"))
 }
 
-fn debian() -> Result<Toolchain> {
-    native::ensure_packages(
-        &native::missing_packages(&DEBIAN_PACKAGES),
-        &format!("they build for {TRIPLE}, because RUSTUP_AUTO_INSTALL=0 keeps rustup from adding it"),
-    )?;
-    Ok(Toolchain::Debian { linker: linker()? })
+/// What only the package manager can bring for the target.
+pub(crate) fn missing() -> Vec<Package> {
+    if has_target() {
+        return Vec::new();
+    }
+    if is_closed() && runs("apt-get") {
+        let linker = linker().is_err().then_some(Package::DebianLinker);
+        return DEBIAN.into_iter().filter(|package| !is_installed(*package)).chain(linker).collect();
+    }
+    if is_closed() || !runs("rustup") { vec![Package::RustTarget] } else { Vec::new() }
+}
+
+/// The same for clippy, which comes with the compiler unless Debian builds for the target.
+pub(crate) fn missing_lints() -> Vec<Package> {
+    let is_debian = !has_target() && is_closed() && runs("apt-get");
+    if is_debian && !is_installed(Package::DebianClippy) { vec![Package::DebianClippy] } else { Vec::new() }
+}
+
+/// Whether rustup must not download.
+pub(crate) fn is_closed() -> bool {
+    std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0")
 }
 
 /// rustup's own lld, else the one that Debian's package links to.

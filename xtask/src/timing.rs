@@ -2,13 +2,15 @@
 
 use anyhow::Result;
 
-use crate::command::{cargo, run};
+use crate::command::run;
 use crate::images;
+use crate::own_tool::Tools;
+use crate::setup::emulator;
 
 /// Prints the table of the test that measures it.
 pub(crate) fn print() -> Result<()> {
-    images::build()?;
-    run(cargo()
+    images::build(Tools::ByCargo)?;
+    run(emulator::cargo_with_emulator()?
         .args([
             "test",
             "--quiet",

@@ -1,0 +1,80 @@
+//! What comes before the tests: formatting, lints, documentation, and everything that is compiled.
+
+use anyhow::{Result, ensure};
+
+use super::host;
+use super::report::Step;
+use crate::command::{cargo, run};
+use crate::setup::{self, Need, python};
+use crate::target::Toolchain;
+use crate::{bench, images, progress};
+
+/// The chips whose images are built beside those of the default one.
+const OTHER_CHIPS: [&str; 2] = ["stm32f405", "stm32f407"];
+
+/// For this machine.
+pub(super) fn lane_of_host() -> Vec<Step> {
+    vec![
+        Step::new("format", || run(cargo().args(["fmt", "--all", "--check"]))),
+        Step::new("build host", || progress::build("host", &mut host::build()?)),
+        Step::new("lint host", lint_host),
+        Step::new("documentation", document_host),
+        Step::new("python", || python::clients().map(|_| ())),
+    ]
+}
+
+/// For the Cortex-M4.
+pub(super) fn lane_of_images() -> Vec<Step> {
+    vec![
+        Step::new("embedded target", || setup::install(&[Need::Target, Need::TargetLints])),
+        Step::new("build images", || images::compile_all(&Toolchain::ensure()?)),
+        Step::new("build bench images", || bench::build(&bench::Options::default()).map(|_| ())),
+        Step::new("no panic", no_panic),
+        Step::new("lint images", lint_images),
+        Step::new("other chips", other_chips),
+    ]
+}
+
+fn lint_host() -> Result<()> {
+    progress::build("lint host", host::cargo("clippy")?.args(["--all-targets", "--", "-D", "warnings"]))
+}
+
+/// With the examples: cargo then takes the features that the tests have, and compiles no crate a second time.
+fn document_host() -> Result<()> {
+    let mut command = host::cargo("doc")?;
+    command.args(["--no-deps", "--lib", "--bins", "--examples"]).env("RUSTDOCFLAGS", "-D warnings");
+    progress::build("documentation", &mut command)
+}
+
+fn lint_images() -> Result<()> {
+    let toolchain = Toolchain::ensure()?;
+    let packages = host::IMAGES.iter().chain(&["bsp"]).flat_map(|package| ["-p", package]);
+    let packages: Vec<&str> = std::iter::once("--release").chain(packages).collect();
+    let mut clippy = toolchain.cargo("clippy", &packages);
+    progress::build("lint images", clippy.args(["--", "-D", "warnings"]))?;
+    let mut doc = toolchain.cargo("doc", &packages);
+    progress::build("lint images", doc.arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+fn other_chips() -> Result<()> {
+    let toolchain = Toolchain::ensure()?;
+    for chip in OTHER_CHIPS {
+        let features = ["--release", "--no-default-features", "--features", chip];
+        for package in ["firmware", "bootloader"] {
+            progress::build(chip, toolchain.cargo("check", &features).args(["-p", package]))?;
+        }
+    }
+    Ok(())
+}
+
+/// Links everything that comes from the bus with a panic handler that cannot link; and shows that it would not link.
+fn no_panic() -> Result<()> {
+    let toolchain = Toolchain::ensure()?;
+    let package = ["--release", "-p", "panic-free"];
+    progress::build("no panic", &mut toolchain.cargo("build", &package))?;
+    let control = toolchain.cargo("build", &package).args(["--features", "with-a-panic"]).output()?;
+    let says = String::from_utf8_lossy(&control.stderr);
+    let is_refused = !control.status.success() && says.contains("a_panic_path_is_left");
+    ensure!(is_refused, "an image with a panic path has linked:\n{says}");
+    Ok(())
+}

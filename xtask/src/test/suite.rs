@@ -1,0 +1,105 @@
+//! The tests: those of every crate, the examples of the documentation, the Python clients, the checks of the images.
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, ensure};
+
+use super::host::{self, TestProgram};
+use super::report::{Step, last_times};
+use crate::command::{root, run, target_dir};
+use crate::own_tool::Tools;
+use crate::setup::{self, Need, python};
+use crate::{bench, callgraph, images};
+
+/// The tests that run on the emulated board are the longest: they begin first when nothing is known of a last run.
+const LONG: &str = "/board";
+
+/// All tests whose name contains `only`, the longest first. With `thorough`, those that sample take all.
+pub(super) fn collect(thorough: bool, only: Option<&str>) -> Result<Vec<Step>> {
+    let programs = host::test_programs()?;
+    images::build(Tools::Built)?;
+    let mut steps = of_images();
+    for program in programs {
+        steps.extend(of_program(&program, thorough)?);
+    }
+    steps.push(Step::new("documentation examples", doc_tests));
+    steps.extend(of_python(thorough)?);
+    steps.retain(|step| only.is_none_or(|only| step.name().contains(only)));
+    let times = last_times();
+    let unknown = |name: &str| if name.contains(LONG) { 5.0 } else { 0.5 };
+    steps.sort_by(|a, b| {
+        let time = |step: &Step| times.get(step.name()).copied().unwrap_or_else(|| unknown(step.name()));
+        time(b).total_cmp(&time(a))
+    });
+    Ok(steps)
+}
+
+/// The tests of a program, each run by itself: a test that changes something for another one, or ends the process, is seen.
+fn of_program(program: &TestProgram, thorough: bool) -> Result<Vec<Step>> {
+    let list = Command::new(&program.path).args(["--list", "--format", "terse"]).output();
+    let list = list.with_context(|| format!("cannot start {}", program.path.display()))?;
+    ensure!(list.status.success(), "{} does not list its tests", program.path.display());
+    let list = String::from_utf8_lossy(&list.stdout).into_owned();
+    let names = list.lines().filter_map(|line| line.strip_suffix(": test"));
+    let (path, directory) = (Arc::new(program.path.clone()), Arc::new(program.directory.clone()));
+    let step = |name: &str| {
+        let (path, directory, test) = (Arc::clone(&path), Arc::clone(&directory), name.to_owned());
+        Step::new(format!("{}: {name}", program.label), move || one(&path, &directory, &test, thorough))
+    };
+    Ok(names.map(step).collect())
+}
+
+fn one(program: &Path, directory: &Path, test: &str, thorough: bool) -> Result<()> {
+    let mut command = Command::new(program);
+    command
+        .args(["--exact", test, "--nocapture"])
+        .current_dir(directory)
+        .env("CARGO_MANIFEST_DIR", directory);
+    run(with_images(&mut command, thorough))
+}
+
+fn of_images() -> Vec<Step> {
+    vec![
+        Step::new("no panic in the images", callgraph::check_panics),
+        Step::new("stack", || callgraph::stack(false, Tools::Built)),
+        Step::new("performance", bench::check),
+    ]
+}
+
+fn doc_tests() -> Result<()> {
+    run(host::cargo("test")?.args(["--quiet", "--doc"]))
+}
+
+/// The files of Python tests, each a step.
+fn of_python(thorough: bool) -> Result<Vec<Step>> {
+    let folder = root().join("host-tests/python");
+    let mut files: Vec<_> = folder.read_dir()?.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("test_")));
+    let step = |file: std::path::PathBuf| {
+        let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Step::new(format!("python: {name}"), move || python(&file, thorough))
+    };
+    Ok(files.into_iter().map(step).collect())
+}
+
+fn python(file: &Path, thorough: bool) -> Result<()> {
+    setup::install(&[Need::Tshark])?;
+    let mut command = Command::new(python::clients()?);
+    command.args(["-m", "pytest", "-q", "--durations=3"]).arg(file).current_dir(root());
+    for (variable, tool) in [("SIM_COMMAND", "sim"), ("NODECTL_COMMAND", "nodectl"), ("SIGN_COMMAND", "sign")]
+    {
+        let name = format!("{tool}{}", std::env::consts::EXE_SUFFIX);
+        command.env(variable, target_dir().join("sim").join(name));
+    }
+    run(with_images(&mut command, thorough))
+}
+
+/// Tells tests where the ELF files are, and whether to take all where they otherwise sample.
+fn with_images(command: &mut Command, thorough: bool) -> &mut Command {
+    if thorough {
+        command.env("THOROUGH", "1");
+    }
+    command.env("NODE_IMAGES", images::dir()).env("MECHANICS_IMAGES", images::dir())
+}
