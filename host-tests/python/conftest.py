@@ -2,10 +2,16 @@ import pytest
 from simulator import Master, Simulator
 
 
+def pytest_sessionfinish():
+    for simulator in Simulator.started:
+        simulator.process.kill()
+
+
 @pytest.fixture(scope="module")
 def simulator():
     """One simulator for all tests of a file."""
     simulator = Simulator("--bitrate", "1000", "--pressure", "const:250000")
+    Master(simulator).ready().close()
     yield simulator
     simulator.process.kill()
 

@@ -49,9 +49,7 @@ def simulator(tmp_path_factory):
     simulator = Simulator("--bitrate", "1000", "--pressure", "const:250000", "--candump", str(log), speed="real")
     simulator.log = log
     # It has booted once before anybody resets it, or that boot-up would be taken for the one of the reset.
-    first = Master(simulator)
-    first.listen(0x701).next()
-    first.close()
+    Master(simulator).ready().close()
     yield simulator
     simulator.process.kill()
 
@@ -126,7 +124,7 @@ def test_four_kib_go_both_ways(master: NodeWithEds, block: bool):
 def test_a_pdo_is_remapped_saved_and_found_after_a_power_cycle(tmp_path):
     flash = ("--bitrate", "500", "--flash", str(tmp_path), "--pressure", "const:250000")
     simulator = Simulator(*flash, speed="real")
-    master = NodeWithEds(simulator)
+    master = NodeWithEds(simulator).ready()
     tpdo = master.node.tpdo[3]
     tpdo.read()
     tpdo.clear()
@@ -142,7 +140,7 @@ def test_a_pdo_is_remapped_saved_and_found_after_a_power_cycle(tmp_path):
     simulator.quit()
 
     simulator = Simulator(*flash, speed="real")
-    master = NodeWithEds(simulator)
+    master = NodeWithEds(simulator).ready()
     assert master.node.sdo[0x1017].raw == 750
     tpdo = master.node.tpdo[3]
     tpdo.read()
@@ -159,7 +157,7 @@ def test_a_pdo_is_remapped_saved_and_found_after_a_power_cycle(tmp_path):
     master.close()
     simulator.quit()
     simulator = Simulator(*flash, speed="real")
-    master = NodeWithEds(simulator)
+    master = NodeWithEds(simulator).ready()
     assert master.node.sdo[0x1017].raw == 1000
     master.close()
     simulator.quit()
@@ -167,11 +165,13 @@ def test_a_pdo_is_remapped_saved_and_found_after_a_power_cycle(tmp_path):
 
 def scan(lss) -> list[int]:
     """One more identity. The client tells a bit by an answer that does not come for a while of the host's time, so on a busy
-    machine a scan may have to be repeated; a wrong identity cannot come of it, for its end is answered or is none."""
-    for _ in range(5):
+    machine a scan may have to be repeated, with twice the time; a wrong identity cannot come of it, for its end is answered
+    or is none."""
+    while lss.RESPONSE_TIMEOUT < PATIENCE / 10:
         is_found, identity = lss.fast_scan()
         if is_found:
             return identity
+        lss.RESPONSE_TIMEOUT *= 2
     raise AssertionError("no node is found")
 
 

@@ -67,10 +67,8 @@ def test_a_master_reads_what_the_node_sends():
     simulator = Simulator("--node", f"{NODE_ID}:lift", "--bitrate", "1000", speed="real")
     master = Master(simulator)
     try:
-        # A heartbeat or the boot-up message: it listens.
-        master.listen(0x700 + NODE_ID).next()
-        node = master.network.add_node(NODE_ID, str(EDS))
-        node.sdo.RESPONSE_TIMEOUT = PATIENCE
+        node = master.node = master.network.add_node(NODE_ID, str(EDS))
+        master.ready()
         assert node.sdo[0x1000].raw == 0x000001A1
         for number in (258, 263):
             node.tpdo[number].read()
@@ -82,11 +80,8 @@ def test_a_master_reads_what_the_node_sends():
         assert position.map[0].raw == 0
         # Half a revolution of a wheel of 200 mm.
         simulator.command(f"shaft {NODE_ID}=ramp:0,0.5,0.2")
-        for _ in range(200):
-            if position.map[0].raw == 100:
-                break
-            position.wait_for_reception(0.1)
-        assert position.map[0].raw == 100
+        while position.map[0].raw != 100:
+            assert position.wait_for_reception(PATIENCE) is not None
     finally:
         master.close()
         simulator.process.kill()

@@ -5,7 +5,7 @@ import struct
 
 import canopen
 import pytest
-from simulator import BOOT_UP, Master, Simulator
+from simulator import BOOT_UP, PATIENCE, Master, Simulator
 
 STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
 
@@ -55,8 +55,8 @@ def test_tpdo1_follows_a_constant_pressure(master: Master, pressure: int):
     master.simulator.command(f"pressure 1=const:{pressure}")
     master.node.nmt.send_command(0x01)
     tpdo = master.listen(0x181)
-    # The first may have been measured before the change.
-    tpdo.next()
+    # The terminal and the bus are two ways to the simulator: some TPDOs may have been measured before the change.
+    tpdo.until(lambda data: math.isclose(pascal(data), pressure, abs_tol=ADC_STEP))
     assert pascal(tpdo.next()[1]) == pytest.approx(pressure, abs=ADC_STEP)
 
 
@@ -92,7 +92,7 @@ def test_a_remapped_tpdo_answers_sync(master: Master):
 
 
 def next_frame(bus, cob_id: int):
-    while (message := bus.recv(20)) is not None:
+    while (message := bus.recv(PATIENCE)) is not None:
         if message.arbitration_id == cob_id:
             return message
     raise AssertionError(f"no frame {cob_id:03X}")
@@ -100,11 +100,11 @@ def next_frame(bus, cob_id: int):
 
 def test_slcan_clients_are_on_the_same_bus(master: Master):
     bus = master.simulator.slcan_bus(bitrate=1_000_000)
-    assert bus.get_version(20) == (1, 1)
+    assert bus.get_version(PATIENCE) == (1, 1)
     network = canopen.Network(bus)
     network.connect()
     node = network.add_node(1, canopen.ObjectDictionary())
-    node.sdo.RESPONSE_TIMEOUT = 20
+    node.sdo.RESPONSE_TIMEOUT = PATIENCE
     assert node.sdo.upload(0x1000, 0) == struct.pack("<I", 0x0002_0194)
     # It closes the bus as well.
     network.disconnect()
@@ -115,8 +115,7 @@ def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
     simulator = Simulator("--bitrate", "1000", "--pressure", "ramp:100000,200000,4")
     master = Master(simulator)
     tpdo = master.listen(0x181)
-    # A heartbeat or the boot-up message: it listens.
-    master.listen(0x701).next()
+    master.ready()
     master.write(0x1800, 5, 100, 2)
     master.node.nmt.send_command(0x01)
     for _ in range(10):

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::command::{run, target_dir};
+use crate::command::{root, run, target_dir};
 use crate::own_tool::Tools;
 use crate::progress;
 use crate::target::{TRIPLE, Toolchain};
@@ -23,6 +23,23 @@ pub(crate) fn compile_node(toolchain: &Toolchain) -> Result<()> {
 /// Compiles everything that the tests run on the emulated core.
 pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "images", &["firmware", "bootloader", "mechanics-images"])
+}
+
+/// Compiles the bootloader as its owner does, with a key that only the tests know, and puts the file beside the one of a
+/// development board.
+pub(crate) fn compile_production(toolchain: &Toolchain) -> Result<()> {
+    let key = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-key.hex"))?;
+    let package = ["--release", "-p", "bootloader", "--features", "production"];
+    let mut command = toolchain.cargo("build", &package);
+    progress::build("production bootloader", command.env("UPDATE_PUBLIC_KEY", key.trim()))?;
+    std::fs::copy(dir().join("bootloader"), dir().join("bootloader-production"))?;
+    let refused = toolchain.cargo("build", &package).env_remove("UPDATE_PUBLIC_KEY").output()?;
+    let says = String::from_utf8_lossy(&refused.stderr);
+    ensure!(
+        !refused.status.success() && says.contains("needs a key of its own"),
+        "a production bootloader was built with the development key:\n{says}"
+    );
+    Ok(())
 }
 
 fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {

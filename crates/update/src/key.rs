@@ -1,6 +1,7 @@
-//! The key that images are signed with: its public half, in this one place.
+//! The key that images are signed with: its public half, as the build of the bootloader was given it.
 //!
-//! `cargo xtask sign key` makes a pair and prints the constant to put here; docs/update.md says how to keep the other half.
+//! `cargo xtask sign key` makes a pair and prints the variable to build the bootloader with; docs/update.md says how to keep the
+//! secret half.
 
 /// Bytes of an Ed25519 public key.
 pub const KEY_LEN: usize = 32;
@@ -12,15 +13,38 @@ pub const DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY: [u8; KEY_LEN] = [
     0x53, 0x25, 0xCA, 0x80, 0xD8, 0x06, 0x8B, 0xDA, 0x9B, 0x5F, 0x44, 0xA3, 0x9F, 0xE4, 0x66,
 ];
 
-/// The key that this bootloader trusts. To be replaced before anything is sold: the feature `production` does not
-/// compile with the development key.
-pub const PUBLIC_KEY: [u8; KEY_LEN] = DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY;
+/// The key that this bootloader trusts: 64 hexadecimal digits in the variable `UPDATE_PUBLIC_KEY` when the bootloader is built,
+/// else the development key. The feature `production` does not compile with the development key.
+pub const PUBLIC_KEY: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY") {
+    Some(digits) => key(digits.as_bytes()),
+    None => DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY,
+};
 
 #[cfg(feature = "production")]
 const _: () = assert!(
     !is_same(&PUBLIC_KEY, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY),
-    "a production build needs a key of its own in crates/update/src/key.rs (docs/update.md)"
+    "a production build needs a key of its own in UPDATE_PUBLIC_KEY (docs/update.md)"
 );
+
+/// The key of these digits, for the compiler: anything else than 64 hexadecimal digits ends the build.
+const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
+    assert!(digits.len() == 2 * KEY_LEN, "UPDATE_PUBLIC_KEY is not 64 hexadecimal digits");
+    let (mut key, mut at) = ([0; KEY_LEN], 0);
+    while at < KEY_LEN {
+        key[at] = nibble(digits[2 * at]) << 4 | nibble(digits[2 * at + 1]);
+        at += 1;
+    }
+    key
+}
+
+const fn nibble(digit: u8) -> u8 {
+    match digit {
+        b'0'..=b'9' => digit - b'0',
+        b'a'..=b'f' => digit - b'a' + 10,
+        b'A'..=b'F' => digit - b'A' + 10,
+        _ => panic!("UPDATE_PUBLIC_KEY is not 64 hexadecimal digits"),
+    }
+}
 
 /// `==` of arrays, for the compiler.
 #[cfg(any(feature = "production", test))]
@@ -37,6 +61,13 @@ const fn is_same(mut a: &[u8], mut b: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_key_is_read_from_its_digits() {
+        const DIGITS: &[u8; 64] = b"FB874bc8d19eeb05b1016f27c27ccd9e985325ca80d8068bda9b5f44a39fe466";
+        const KEY: [u8; KEY_LEN] = key(DIGITS);
+        assert_eq!(KEY, DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
+    }
 
     #[test]
     fn keys_are_told_apart() {

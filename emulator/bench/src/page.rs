@@ -25,9 +25,11 @@ pub(crate) fn check(path: &Path, report: &Report) -> Result<()> {
     let text = read(path)?;
     let stated = &text[place(&text, report.optimisation.name())?];
     let is_same = stated.contains(&format!("{} with", report.compiler));
-    let worse = worse(stated, report, if is_same { TOLERANCE } else { OTHER_COMPILER })?;
+    let tolerance = if is_same { TOLERANCE } else { OTHER_COMPILER };
+    println!("{}; {tolerance} per cent more than stated are allowed", report.compiler);
+    let worse = worse(stated, report, tolerance)?;
     if !worse.is_empty() {
-        bail!("worse than {} states:\n{}", path.display(), worse.join("\n"));
+        bail!("worse than {} states, with {}:\n{}", path.display(), report.compiler, worse.join("\n"));
     }
     Ok(())
 }

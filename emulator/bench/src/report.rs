@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use object::{Object, ObjectSection};
+use budget::Compiler;
 
 use crate::operations::{OPERATIONS, operational};
 use crate::program::Program;
@@ -67,7 +67,7 @@ impl Report {
         let ours = images.join("ours");
         Ok(Report {
             optimisation,
-            compiler: compiler(&ours)?,
+            compiler: format!("rustc {}", Compiler::of(&ours)?.version()),
             operations: operations(&ours, &images.join("zencan"), optimisation)?,
             sizes: sizes(images, optimisation)?,
         })
@@ -110,17 +110,6 @@ fn sizes(images: &Path, optimisation: Optimisation) -> Result<Vec<Row>> {
         row("flash in all", Sizes::flash, Some(PUBLISHED_FLASH)),
         row("RAM without the stack", Sizes::ram, Some(PUBLISHED_RAM)),
     ])
-}
-
-/// The compiler leaves its name and version in every image.
-fn compiler(image: &Path) -> Result<String> {
-    let file = std::fs::read(image).with_context(|| image.display().to_string())?;
-    let elf = object::File::parse(file.as_slice())?;
-    let comment = elf.section_by_name(".comment").context("the image does not name its compiler")?;
-    let text = String::from_utf8_lossy(comment.data()?).into_owned();
-    let version = text.split('\0').find_map(|part| part.strip_prefix("rustc version "));
-    let version = version.and_then(|version| version.split_whitespace().next());
-    Ok(format!("rustc {}", version.context("the image was not made by rustc")?))
 }
 
 impl fmt::Display for Report {

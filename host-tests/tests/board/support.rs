@@ -43,8 +43,13 @@ pub(crate) fn firmware() -> Vec<u8> {
 
 /// A world as `cargo sim` with these flags has it, without its sockets.
 pub(crate) fn world(flags: &str) -> World {
+    world_of("bootloader", flags)
+}
+
+/// The same with another bootloader than the one of a development board.
+pub(crate) fn world_of(bootloader: &str, flags: &str) -> World {
     let dir = images();
-    let (bootloader, firmware) = (dir.join("bootloader"), dir.join("firmware"));
+    let (bootloader, firmware) = (dir.join(bootloader), dir.join("firmware"));
     let images =
         ["sim", "--bootloader", bootloader.to_str().unwrap(), "--firmware", firmware.to_str().unwrap()];
     let options = Options::try_parse_from(images.into_iter().chain(flags.split_whitespace())).unwrap();

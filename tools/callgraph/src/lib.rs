@@ -16,6 +16,7 @@ mod tasks;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use budget::Compiler;
 
 pub use stack::{Bound, Level};
 
@@ -35,7 +36,7 @@ pub fn check_panics(images: &Path, forget: Option<&str>) -> Result<()> {
         let bytes = image::read(&path)?;
         let image = image::Image::parse(&bytes)?;
         let graph = graph::Graph::of(&image).with_context(|| name)?;
-        panics::compare(name, &panics::sites(&path, &image, &graph)?, &known)?;
+        panics::compare(name, &panics::sites(&path, &image, &graph)?, &known, &Compiler::of(&path)?)?;
     }
     Ok(())
 }

@@ -1,6 +1,5 @@
 //! Secret keys: PKCS#8 in PEM, as OpenSSL writes them (`openssl genpkey -algorithm ed25519`).
 
-use std::fmt::Write as _;
 use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -77,15 +76,9 @@ pub fn write(key: &SigningKey, path: &Path) -> Result<()> {
     file.write_all(pem(key)?.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// The public half as the constant of `crates/update/src/key.rs`.
+/// The public half as the variable that a bootloader is built with: `UPDATE_PUBLIC_KEY` and 64 hexadecimal digits.
 #[must_use]
-pub fn constant(key: &SigningKey) -> String {
-    let bytes = key.verifying_key().to_bytes();
-    let mut text = String::from("pub const PUBLIC_KEY: [u8; KEY_LEN] = [\n");
-    for line in bytes.chunks(16) {
-        let line: Vec<_> = line.iter().map(|byte| format!("0x{byte:02X}")).collect();
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "    {},", line.join(", "));
-    }
-    text + "];"
+pub fn variable(key: &SigningKey) -> String {
+    let digits: Vec<_> = key.verifying_key().to_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("UPDATE_PUBLIC_KEY={}", digits.concat())
 }

@@ -19,7 +19,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Make a key pair: the secret half goes to a new file, the public half is printed for crates/update/src/key.rs
+    /// Make a key pair: the secret half goes to a new file, the public half is printed as the variable that the bootloader is built with
     Key {
         /// The new file
         file: PathBuf,
@@ -88,7 +88,7 @@ fn read(path: &Path) -> Result<Vec<u8>> {
 fn make_key(path: &Path) -> Result<()> {
     let key = key::random()?;
     key::write(&key, path)?;
-    println!("{}", key::constant(&key));
+    println!("{}", key::variable(&key));
     Ok(())
 }
 
@@ -130,7 +130,7 @@ fn show_file(file: &Path, key: Option<&Path>) -> Result<()> {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Key { file } => make_key(&file),
-        Command::Public { file } => key::read(&file).map(|key| println!("{}", key::constant(&key))),
+        Command::Public { file } => key::read(&file).map(|key| println!("{}", key::variable(&key))),
         Command::Image(args) => make_image(&args),
         Command::Show { file, key } => show_file(&file, key.as_deref()),
     };

@@ -63,7 +63,7 @@ fn the_development_key_is_the_one_in_the_file_and_in_the_bootloader() {
     let key = key::development();
     assert_eq!(std::fs::read_to_string(key::development_path()).unwrap(), key::pem(&key).unwrap());
     assert_eq!(key::read(&key::development_path()).unwrap(), key);
-    assert_eq!(key.verifying_key().to_bytes(), DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, "{}", key::constant(&key));
+    assert_eq!(key.verifying_key().to_bytes(), DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, "{}", key::variable(&key));
     assert!(key::is_development(&key));
     assert!(!key::is_development(&key::random().unwrap()));
     assert_eq!(PUBLIC_KEY, DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);

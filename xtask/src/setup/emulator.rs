@@ -34,7 +34,7 @@ pub(crate) fn environment() -> Result<&'static [(OsString, OsString)]> {
 /// What only the package manager can bring.
 pub(super) fn missing() -> Vec<Package> {
     let mut packages = Vec::new();
-    if !runs("cc") {
+    if !runs("cc") || !runs("make") {
         packages.push(Package::Compiler);
     }
     if find().is_none() && !python::makes_environments() {
@@ -62,28 +62,25 @@ fn make() -> Result<Vec<(OsString, OsString)>> {
 /// The system's tools where they work, else those that came from PyPI earlier.
 fn find() -> Option<Vec<(OsString, OsString)>> {
     let tools = from_pypi();
-    let (path, generator) = cmake(&tools)?;
+    let path = cmake(&tools)?;
     let libclang = libclang::variables(None)
         .or_else(|| libclang::variables(Some(&packages_in(&tools)?.join("clang/native"))))?;
     let libclang = libclang.into_iter().map(|(name, value)| (name.into(), value.into()));
-    Some(path.into_iter().chain(generator).chain(libclang).collect())
+    Some(path.into_iter().chain(libclang).collect())
 }
 
-type Variable = Option<(OsString, OsString)>;
-
-/// The search path for cmake and what it builds with: make, or ninja where there is no make.
-fn cmake(tools: &Path) -> Option<(Variable, Variable)> {
-    if runs("cmake") && runs("make") {
-        return Some((None, None));
+/// The search path on which cmake is found; `None` in it where the user's own path leads there.
+fn cmake(tools: &Path) -> Option<Option<(OsString, OsString)>> {
+    if runs("cmake") {
+        return Some(None);
     }
     let programs = tools.join("bin");
     if !runs(&programs.join("cmake").to_string_lossy()) {
         return None;
     }
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let path = std::iter::once(programs.clone()).chain(std::env::split_paths(&path));
-    let generator = (!runs("make")).then(|| ("CMAKE_GENERATOR".into(), "Ninja".into()));
-    Some((Some(("PATH".into(), std::env::join_paths(path).ok()?)), generator))
+    let path = std::iter::once(programs).chain(std::env::split_paths(&path));
+    Some(Some(("PATH".into(), std::env::join_paths(path).ok()?)))
 }
 
 fn from_package_manager() -> Vec<Package> {

@@ -27,6 +27,7 @@ pub(super) fn lane_of_host() -> Vec<Step> {
 pub(super) fn lane_of_images() -> Vec<Step> {
     vec![
         Step::new("embedded target", || setup::install(&[Need::Target, Need::TargetLints])),
+        Step::new("production bootloader", || images::compile_production(&Toolchain::ensure()?)),
         Step::new("build images", || images::compile_all(&Toolchain::ensure()?)),
         Step::new("build bench images", || bench::build(&bench::Options::default()).map(|_| ())),
         Step::new("no panic", no_panic),

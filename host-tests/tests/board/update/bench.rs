@@ -43,7 +43,11 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn new(flags: &str, bit_rate: u32, node: u8) -> Bench {
-        let mut world = world(flags);
+        Bench::with(world(flags), bit_rate, node)
+    }
+
+    /// A master on the bus of a world that is there already.
+    pub(super) fn with(mut world: World, bit_rate: u32, node: u8) -> Bench {
         let master = Master::join_at(&mut world, bit_rate);
         Bench { world, master, node, slowest: Time::ZERO, sent: Time::ZERO }
     }

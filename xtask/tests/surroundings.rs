@@ -1,0 +1,172 @@
+//! What `cargo xtask` says and does on machines that nobody prepared. The machines are faked: programs are scripts on a search
+//! path of their own, and what they are called with is written down.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+const NOTHING: &str = "nothing is missing";
+/// A program that is there and works.
+const WORKS: &str = "exit 0";
+/// A name that leads to no working program, as `python3 -c "import venv, ensurepip"` on a Debian without python3-venv.
+const FAILS: &str = "exit 1";
+
+/// A machine with some programs.
+struct Machine {
+    root: PathBuf,
+    is_closed: bool,
+}
+
+impl Machine {
+    /// A machine with a C compiler, make and rustup, on which the user is not root.
+    fn new(name: &str) -> Machine {
+        let root = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+        // What an earlier run left.
+        let _ = fs::remove_dir_all(&root);
+        fs::create_dir_all(root.join("bin")).unwrap();
+        fs::create_dir_all(root.join("libclang")).unwrap();
+        let linker = root.join("sysroot/lib/rustlib").join(env!("XTASK_HOST")).join("bin");
+        fs::create_dir_all(&linker).unwrap();
+        fs::write(linker.join("rust-lld"), "").unwrap();
+        let sysroot = format!("echo {}/sysroot", root.display());
+        let machine = Machine { root, is_closed: false };
+        let machine =
+            machine.with("cc", WORKS).with("make", WORKS).with("rustup", WORKS).with("cargo", WORKS);
+        machine.with("rustc", &sysroot).with("id", "echo 1000").with("dpkg-query", FAILS)
+    }
+
+    /// Debian as it comes from the shop: no cmake, a libclang-cpp that is no libclang, no python3-venv.
+    fn debian(name: &str) -> Machine {
+        let machine = Machine::new(name).with("apt-get", WORKS).with("python3", FAILS);
+        fs::write(machine.root.join("libclang/libclang-cpp.so.14"), "").unwrap();
+        machine
+    }
+
+    /// Puts a program there that notes each call.
+    fn with(self, program: &str, does: &str) -> Machine {
+        let path = self.root.join("bin").join(program);
+        let calls = self.root.join("calls");
+        let text = format!(
+            "#!/bin/sh\n[ \"$1\" = --version ] || echo \"{program} $*\" >> {}\n{does}\n",
+            calls.display()
+        );
+        fs::write(&path, text).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        self
+    }
+
+    fn closed(mut self) -> Machine {
+        self.is_closed = true;
+        self
+    }
+
+    fn xtask(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_xtask"));
+        command.args(arguments).env_clear();
+        command.env("PATH", self.root.join("bin")).env("CARGO_TARGET_DIR", self.root.join("target"));
+        command.env("LIBCLANG_PATH", self.root.join("libclang"));
+        if self.is_closed {
+            command.env("RUSTUP_AUTO_INSTALL", "0");
+        }
+        command.output().unwrap()
+    }
+
+    /// What `cargo xtask setup --dry-run` says.
+    fn says(&self) -> String {
+        let output = self.xtask(&["setup", "--dry-run"]);
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap().trim().to_owned()
+    }
+
+    /// The last line that it says: the command to type.
+    fn command(&self) -> String {
+        self.says().lines().last().unwrap_or_default().trim().to_owned()
+    }
+
+    /// The calls of a program so far.
+    fn calls(&self, program: &str) -> Vec<String> {
+        let calls = fs::read_to_string(self.root.join("calls")).unwrap_or_default();
+        calls.lines().filter(|call| call.split(' ').next() == Some(program)).map(str::to_owned).collect()
+    }
+}
+
+#[test]
+fn whoever_is_not_root_on_debian_is_told_one_command_and_nothing_is_built() {
+    let machine = Machine::debian("debian").closed();
+    let command =
+        "sudo apt-get install -y rustc-web rust-web-src cargo-web rust-web-clippy python3-venv tshark";
+    assert_eq!(machine.command(), command);
+    for arguments in [&["test"][..], &["sim", "--for", "5"], &["setup"]] {
+        let output = machine.xtask(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let says = String::from_utf8(output.stderr).unwrap();
+        assert!(says.contains("sudo apt-get install -y rustc-web"), "{says}");
+        assert!(!says.contains("libclang-dev"), "a libclang comes from PyPI: {says}");
+    }
+    assert_eq!(machine.calls("cargo"), [""; 0], "nothing is built before everything is there");
+    assert_eq!(machine.calls("apt-get"), [""; 0]);
+}
+
+#[test]
+fn a_program_that_does_not_work_is_no_program() {
+    let machine = Machine::debian("stub").with("tshark", FAILS).with("cc", FAILS);
+    assert_eq!(machine.command(), "sudo apt-get install -y build-essential python3-venv tshark");
+}
+
+#[test]
+fn root_on_debian_types_nothing() {
+    let machine = Machine::debian("root").closed().with("id", "echo 0");
+    let output = machine.xtask(&["setup"]);
+    let says = String::from_utf8_lossy(&output.stderr).into_owned();
+    let installs = machine.calls("apt-get");
+    assert!(
+        installs.iter().any(|call| call.contains("install") && call.contains("rustc-web")),
+        "{installs:?} {says}"
+    );
+    assert!(!says.contains("sudo"), "{says}");
+}
+
+#[test]
+fn with_a_python_that_makes_environments_the_emulator_s_tools_need_no_package() {
+    let machine = Machine::debian("python").with("python3", WORKS).with("tshark", WORKS);
+    assert_eq!(machine.says(), NOTHING, "rustup adds the target, and PyPI has cmake and libclang");
+}
+
+#[test]
+fn other_systems_are_told_in_their_words() {
+    for (manager, command) in [
+        ("dnf", "sudo dnf install -y python3 wireshark-cli"),
+        ("pacman", "sudo pacman -S --needed --noconfirm python wireshark-cli"),
+        ("brew", "brew install python wireshark"),
+    ] {
+        let machine = Machine::new(manager).with(manager, WORKS);
+        assert_eq!(machine.command(), command);
+    }
+}
+
+#[test]
+fn a_rustup_that_must_not_download_is_named_where_debian_cannot_help() {
+    let machine =
+        Machine::new("closed").closed().with("dnf", WORKS).with("python3", WORKS).with("tshark", WORKS);
+    assert_eq!(machine.command(), "env -u RUSTUP_AUTO_INSTALL rustup target add thumbv7em-none-eabihf");
+}
+
+#[test]
+fn without_a_package_manager_the_packages_are_named() {
+    let says = Machine::new("bare").says();
+    assert!(says.contains("tshark") && says.contains("package manager"), "{says}");
+}
+
+#[test]
+fn without_an_argument_the_commands_are_listed_a_line_each() {
+    let output = Machine::new("list").xtask(&[]);
+    let says = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success());
+    for command in ["sim", "test", "setup", "eds", "bench"] {
+        let lines = says.lines().filter(|line| line.split_whitespace().nth(2) == Some(command));
+        assert_eq!(lines.count(), 1, "{command}: {says}");
+    }
+    assert!(says.lines().all(|line| line.starts_with("cargo xtask ") && line.len() < 130), "{says}");
+}
