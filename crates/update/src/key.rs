@@ -27,6 +27,7 @@ const _: () = assert!(
 );
 
 /// The key of these digits, for the compiler: anything else than 64 hexadecimal digits ends the build.
+#[allow(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "evaluated by the compiler")]
 const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
     assert!(digits.len() == 2 * KEY_LEN, "UPDATE_PUBLIC_KEY is not 64 hexadecimal digits");
     let (mut key, mut at) = ([0; KEY_LEN], 0);
@@ -37,6 +38,7 @@ const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
     key
 }
 
+#[allow(clippy::arithmetic_side_effects, reason = "evaluated by the compiler")]
 const fn nibble(digit: u8) -> u8 {
     match digit {
         b'0'..=b'9' => digit - b'0',
