@@ -35,7 +35,7 @@ const PARTS: &[&[Object]] = &[
     &pdos::ROWS,
     communication::START_UP,
     &[personality(Personality::Lift)],
-    &sensors::OBJECTS,
+    sensors::OBJECTS,
     CALIBRATION,
     manufacturer::OBJECTS,
     &[TRANSFER_BUFFER],
