@@ -39,7 +39,7 @@ fn start(flags: &str) -> (World, Master) {
 }
 
 fn stimulate(world: &mut World, kind: &str, spec: &str) {
-    world.apply(&Stimulus::parse(kind, spec).unwrap());
+    world.apply(&Stimulus::parse(kind, spec).unwrap()).unwrap();
 }
 
 fn wait(world: &mut World, millis: u64) {
