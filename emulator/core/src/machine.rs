@@ -79,6 +79,19 @@ impl<P: Peripherals + 'static> Machine<P> {
         Ok(image)
     }
 
+    /// Reads an ELF file for this chip without writing it: what [`Machine::load_elf`] would write.
+    ///
+    /// # Errors
+    /// [`Error::Elf`] for anything but a program for this chip.
+    pub fn parse_elf(&self, file: &[u8]) -> Result<Image, Error> {
+        loader::parse(file, &self.model)
+    }
+
+    /// How often the flash array has changed: a program's stores, erasures, and what was loaded.
+    pub fn flash_changes(&self) -> u64 {
+        self.cpu.get_data().flash_changes
+    }
+
     /// The flash array.
     pub fn flash(&self) -> Vec<u8> {
         self.cpu.mem_read_as_vec(self.model.flash.start.into(), self.model.flash.len()).unwrap_or_default()

@@ -39,7 +39,7 @@ pub(crate) fn start(flags: &str) -> (World, Master) {
 }
 
 pub(crate) fn stimulate(world: &mut World, kind: &str, spec: &str) {
-    world.apply(&Stimulus::parse(kind, spec).unwrap());
+    world.apply(&Stimulus::parse(kind, spec).unwrap()).unwrap();
 }
 
 pub(crate) fn wait(world: &mut World, millis: u64) {
