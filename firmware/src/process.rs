@@ -1,20 +1,43 @@
-//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO, the lamps.
+//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO, the lamps. And the one who notices
+//! that there are no more snapshots.
 
-use bsp::{Alarm, Clock, Frames, Lamps, Received};
-use canopen::{Instant, Next};
+use bsp::losses::{Event, Losses};
+use bsp::{Alarm, Clock, Frames, Lamps, Received, Ring};
+use canopen::{Duration, Instant, Next};
 use node::Snapshot;
 
-use crate::SERVICES;
 use crate::shared::Shared;
+use crate::{SAMPLING, SERVICES};
 
 /// What the task owns.
 pub(crate) struct Process {
-    pub(crate) frames: Frames,
-    pub(crate) alarm: Alarm,
-    pub(crate) lamps: Lamps,
+    frames: Frames,
+    alarm: Alarm,
+    lamps: Lamps,
+    /// When the last snapshot came, or one was last asked for.
+    sampled: Instant,
+    lost: &'static Losses,
 }
 
+/// Snapshots come every millisecond. After so long without one the sampling task has to see what is wrong.
+const OVERDUE: Duration = Duration::from_millis(2);
+
 impl Process {
+    pub(crate) fn new(frames: Frames, alarm: Alarm, lamps: Lamps, lost: &'static Losses) -> Process {
+        Process { frames, alarm, lamps, sampled: Clock::now(), lost }
+    }
+
+    /// Hands on the alarm of the services, which this task's interrupt brings. It comes by every millisecond, so an alarm whose
+    /// interrupt was lost is not much later.
+    pub(crate) fn wake_services(&mut self, ring: Ring) {
+        if ring == Ring::Missed {
+            self.lost.count(Event::Alarm);
+        }
+        if ring != Ring::No {
+            rtic::pend(SERVICES);
+        }
+    }
+
     /// Does everything that is due and sets the alarm for what comes next.
     pub(crate) fn run(&mut self, snapshot: Option<Snapshot>, node: &mut impl Shared) {
         while let Some(Received { frame, at }) = self.frames.dequeue() {
@@ -22,6 +45,7 @@ impl Process {
             self.follow(next, at);
         }
         let now = Clock::now();
+        self.watch(snapshot.is_some(), now);
         let (next, lit) = node.call(|protocol, out| {
             let next = match snapshot {
                 Some(snapshot) => protocol.publish(&snapshot, now, out),
@@ -35,9 +59,19 @@ impl Process {
 
     /// Sets the alarm, and wakes the services where they are due: NMT may have asked for something.
     fn follow(&mut self, next: Next, now: Instant) {
-        self.alarm.set(next.process);
+        self.alarm.set(next.process.min(self.sampled + OVERDUE));
         if next.services <= now {
             rtic::pend(SERVICES);
+        }
+    }
+
+    fn watch(&mut self, has_sampled: bool, now: Instant) {
+        let is_overdue = now >= self.sampled + OVERDUE;
+        if is_overdue && !has_sampled {
+            rtic::pend(SAMPLING);
+        }
+        if is_overdue || has_sampled {
+            self.sampled = now;
         }
     }
 }

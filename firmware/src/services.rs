@@ -6,7 +6,7 @@ use bsp::can::Controller;
 use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::led::Led;
-use bsp::losses::Losses;
+use bsp::losses::{EVENTS, Event, Losses};
 use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
@@ -29,6 +29,8 @@ pub(crate) struct Services {
     rate: Rate,
     frames: Frames,
     lost: &'static Losses,
+    /// What of `lost` has been reported.
+    told: [u32; EVENTS],
     alarm: Alarm,
     led: Led,
     watch: BusWatch,
@@ -66,6 +68,7 @@ impl Services {
             rate,
             frames,
             lost,
+            told: [0; EVENTS],
             alarm,
             led,
             watch: BusWatch::default(),
@@ -80,7 +83,7 @@ impl Services {
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
         if !core::mem::replace(&mut self.has_joined, true) {
             let next = self.join(node);
-            self.settle(next, node);
+            let _ = self.settle(next, node);
         }
         if self.rate.is_searched() {
             self.search(node);
@@ -88,6 +91,7 @@ impl Services {
             self.report_bus(node);
             self.receive(node);
         }
+        self.report_losses(node);
         let now = Clock::now();
         let next = self.call(node, |protocol, out| protocol.poll_services(now, out));
         let next = self.settle(next, node);
@@ -96,6 +100,8 @@ impl Services {
         }
         self.led.set(blink(now));
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
+        // It tells the watchdog that it is there, whether there is something to store or not.
+        rtic::pend(KEEPER);
     }
 
     /// The parameters that have changed, once.
@@ -134,7 +140,7 @@ impl Services {
         if self.rate.go_on(&mut self.can, has_frame, Clock::now()) {
             while self.frames.dequeue().is_some() {}
             let next = self.join(node);
-            self.settle(next, node);
+            let _ = self.settle(next, node);
         }
     }
 
@@ -142,17 +148,12 @@ impl Services {
         while let Some(received) = self.frames.dequeue() {
             let next =
                 self.call(node, |protocol, out| protocol.on_service_frame(&received.frame, received.at, out));
-            self.settle(next, node);
+            let _ = self.settle(next, node);
         }
     }
 
     fn report_bus(&mut self, node: &mut impl Shared) {
         let now = Clock::now();
-        let lost = self.lost.take();
-        if lost > 0 {
-            defmt::warn!("{=u32} received frames lost", lost);
-            self.report(BusEvent::Overrun, now, node);
-        }
         let state = self.can.state();
         if state == BusState::Off {
             self.back_off.bus_off(now);
@@ -163,6 +164,23 @@ impl Services {
         let change = self.watch.change(state);
         if let Some(event) = change.and_then(|(before, after)| event_of(before, after)) {
             self.report(event, now, node);
+        }
+    }
+
+    /// Counts of the hardware to where they can be seen. A lost frame has an emergency of its own.
+    fn report_losses(&mut self, node: &mut impl Shared) {
+        let all = self.lost.all();
+        let told = core::mem::replace(&mut self.told, all);
+        if all == told {
+            return;
+        }
+        for (kind, count) in (1_u8..).zip(&all).filter(|(_, count)| **count > 0) {
+            defmt::warn!("lost events of kind {=u8}: {=u32}", kind, count);
+        }
+        let has_lost_frame = all.get(Event::Frame as usize) != told.get(Event::Frame as usize);
+        let _ = node.call(|protocol, _| protocol.show_lost_events(&all));
+        if has_lost_frame {
+            self.report(BusEvent::Overrun, Clock::now(), node);
         }
     }
 

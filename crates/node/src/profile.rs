@@ -3,6 +3,7 @@
 use crate::configured::Configured;
 use crate::dictionaries::TABLES;
 use crate::flags::Flags;
+use crate::lost_events::LOST_EVENTS;
 use crate::manufacturer::PERSONALITY;
 use crate::personality::Definition;
 use crate::stored::Stored;
@@ -48,6 +49,8 @@ pub(crate) struct Profile {
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
     pub(crate) buffer: TransferBuffer,
+    /// As counted by the firmware (2001h).
+    pub(crate) lost_events: [u32; LOST_EVENTS],
     lamps: [Lamp; LAMPS],
 }
 
@@ -60,6 +63,7 @@ impl Profile {
             flags: Flags::default(),
             stored: Stored::NOTHING,
             buffer: TransferBuffer::EMPTY,
+            lost_events: [0; LOST_EVENTS],
             lamps: [Lamp::default(); LAMPS],
         }
     }
@@ -106,7 +110,7 @@ impl Profile {
         self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
     }
 
-    fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
+    pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
         if let Ok(entry) = self.definition().dictionary.find(index, sub) {
             entry.field().set(image, bytes);
         }
@@ -135,6 +139,7 @@ impl Application for Profile {
         }
         self.show_personality(image);
         self.show_flags(image);
+        self.show_lost_events(image);
         self.show_values(image);
     }
 

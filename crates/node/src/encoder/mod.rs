@@ -16,7 +16,7 @@ pub(crate) use values::{Fields, device_type};
 
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
-use crate::{Personality, communication, dictionaries};
+use crate::{Personality, communication, dictionaries, lost_events};
 use canopen::dictionary::{self, Object};
 
 /// The table: everything there is to say about every object, sorted.
@@ -39,6 +39,7 @@ const PARTS: &[&[Object]] = &[
     communication::tpdo_mappings(&pdos::TPDOS).as_flattened(),
     communication::START_UP,
     &[personality(Personality::Encoder)],
+    lost_events::OBJECTS,
     SENSORS,
     &[TRANSFER_BUFFER],
     &PROFILE,

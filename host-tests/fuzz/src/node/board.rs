@@ -169,7 +169,9 @@ impl Board {
             Step::Sample { pressure, supply, temperature, vrefint, encoder, buttons } => {
                 self.sample(&raw(pressure, supply, temperature, vrefint), encoder, buttons);
             }
-            Step::Bus(report) => drop(self.protocol.bus_event(report.into(), self.now)),
+            Step::Bus(report) => {
+                let _ = self.protocol.bus_event(report.into(), self.now);
+            }
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
             Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
