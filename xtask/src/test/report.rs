@@ -94,10 +94,12 @@ impl<'a> Report<'a> {
         let workers = thread::available_parallelism().map_or(2, usize::from);
         let queue = Mutex::new(VecDeque::from(tests));
         let (finished, told) = (AtomicUsize::new(0), Mutex::new(Instant::now()));
+        // The queue is free again before the test runs.
+        let next = || lock(&queue).pop_front();
         thread::scope(|scope| {
             for _ in 0..workers {
                 scope.spawn(|| {
-                    while let Some(test) = lock(&queue).pop_front() {
+                    while let Some(test) = next() {
                         self.run(test, true);
                         let number = finished.fetch_add(1, Ordering::Relaxed) + 1;
                         let mut told = lock(&told);
