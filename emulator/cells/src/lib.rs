@@ -132,8 +132,13 @@ impl Cells {
     /// [`PowerCut`] when the power is off.
     pub fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), PowerCut> {
         self.check_power()?;
-        for (at, byte) in (offset..).zip(bytes) {
-            *byte = self.words[at / self.word].value().to_le_bytes()[at % self.word];
+        let (mut rest, mut at) = (bytes, offset);
+        while !rest.is_empty() {
+            let word = self.words[at / self.word].value().to_le_bytes();
+            let from_here = &word[at % self.word..self.word];
+            let (chunk, next) = rest.split_at_mut(from_here.len().min(rest.len()));
+            chunk.copy_from_slice(&from_here[..chunk.len()]);
+            (rest, at) = (next, at + chunk.len());
         }
         Ok(())
     }
