@@ -1,105 +1,54 @@
-//! The application of the CANopen device: what the personality adds to it.
+//! The application of the CANopen device: what the node adds to CiA 301, and its profile.
 
+use canopen::dictionary::{Entry, Group};
+use canopen::nmt::State;
+use canopen::sdo::{Abort, Multiplexer};
+use canopen::{Application, Condition, Part};
+use profiles::communication::PERSONALITY;
+use profiles::fault::Flags;
+use profiles::{AnyProfile, Snapshot};
+
+use crate::Setup;
 use crate::configured::Configured;
-use crate::dictionaries::TABLES;
-use crate::flags::Flags;
-use crate::manufacturer::PERSONALITY;
-use crate::personality::Definition;
+use crate::fault::{CONDITIONS, flag_of};
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
-use crate::{REVISION, Setup, Snapshot, VENDOR_ID, combined, encoder, lift, pressure};
-use canopen::dictionary::{Entry, Group, packed_size};
-use canopen::emcy::Fault;
-use canopen::sdo::Abort;
-use canopen::{Application, Part};
-use profiles::lift::panel::{LAMPS, Lamp};
 
-/// Large enough for the values of every personality.
-pub(crate) const IMAGE_SIZE: usize =
-    largest([pressure::IMAGE_SIZE, encoder::IMAGE_SIZE, combined::IMAGE_SIZE, lift::IMAGE_SIZE]);
-
-/// The same for the parameters as they are stored.
-pub(crate) const COMMUNICATION_SIZE: usize = largest_packed(Group::Communication);
-pub(crate) const APPLICATION_SIZE: usize = largest_packed(Group::Application);
-pub(crate) const CALIBRATION_SIZE: usize = largest_packed(Group::Calibration);
-const _: () = assert!(COMMUNICATION_SIZE <= storage::MAX_VALUE && APPLICATION_SIZE <= storage::MAX_VALUE);
-const _: () = assert!(CALIBRATION_SIZE <= storage::MAX_VALUE);
-
-const fn largest_packed(group: Group) -> usize {
-    let [a, b, c, d] = TABLES;
-    largest([packed_size(a, group), packed_size(b, group), packed_size(c, group), packed_size(d, group)])
-}
-
-const fn largest(sizes: [usize; TABLES.len()]) -> usize {
-    let (mut largest, mut i) = (0, 0);
-    while i < sizes.len() {
-        largest = if sizes[i] > largest { sizes[i] } else { largest };
-        i += 1;
-    }
-    largest
-}
-
-/// The personality at work.
+/// The application at work.
 #[derive(Debug)]
-pub(crate) struct Profile {
+pub(crate) struct NodeApplication {
     pub(crate) setup: Setup,
     pub(crate) configured: Configured,
+    pub(crate) profile: AnyProfile,
     /// As last published: a reset of the dictionary does not reset what is measured.
     pub(crate) snapshot: Snapshot,
+    /// The flags of active faults. A reset of the dictionary does not end a fault.
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
-    pub(crate) buffer: TransferBuffer,
-    lamps: [Lamp; LAMPS],
+    buffer: TransferBuffer,
 }
 
-impl Profile {
-    pub(crate) fn new(setup: &Setup) -> Profile {
-        Profile {
+impl NodeApplication {
+    pub(crate) fn new(setup: &Setup) -> NodeApplication {
+        NodeApplication {
             setup: *setup,
             configured: Configured::of(setup),
+            profile: AnyProfile::new(setup.personality),
             snapshot: Snapshot::default(),
             flags: Flags::default(),
             stored: Stored::NOTHING,
             buffer: TransferBuffer::EMPTY,
-            lamps: [Lamp::default(); LAMPS],
         }
-    }
-
-    pub(crate) fn definition(&self) -> &'static Definition {
-        self.setup.personality.definition()
     }
 
     /// Shows what was measured.
     pub(crate) fn show_values(&self, image: &mut [u8]) {
-        let (definition, snapshot) = (self.definition(), &self.snapshot);
-        if let (Some(fields), Some(snapshot)) = (definition.pressure, &snapshot.pressure) {
-            fields.publish(snapshot, image);
-        }
-        if let (Some(fields), Some(snapshot)) = (definition.encoder, &snapshot.encoder) {
-            fields.publish(snapshot, image);
-        }
-        if let (Some(fields), Some(snapshot)) = (definition.lift, &snapshot.lift) {
-            fields.publish(snapshot, image);
-        }
+        self.profile.publish(&self.snapshot, image);
     }
 
-    /// Lets the lamps follow the virtual output, where there are any.
-    pub(crate) fn follow_output(&mut self, image: &mut [u8]) {
-        if let Some(fields) = self.definition().lift {
-            fields.follow_output(&mut self.lamps, image);
-        }
-    }
-
-    /// Which lamps are lit.
-    pub(crate) fn lit(&self, image: &[u8]) -> [bool; LAMPS] {
-        self.definition().lift.map_or([false; LAMPS], |fields| fields.lit(image))
-    }
-
-    /// Shows the flags, where the personality has them.
+    /// Shows the flags, in a profile that has objects for them.
     pub(crate) fn show_flags(&self, image: &mut [u8]) {
-        if let Some(fields) = self.definition().flags {
-            self.flags.store(fields, image);
-        }
+        self.profile.show_flags(self.flags, image);
     }
 
     /// Shows the personality after the next reset.
@@ -108,67 +57,66 @@ impl Profile {
     }
 
     fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
-        if let Ok(entry) = self.definition().dictionary.find(index, sub) {
+        if let Ok(entry) = self.setup.personality.dictionary().find(index, sub) {
             entry.field().set(image, bytes);
         }
     }
 }
 
-impl Application for Profile {
+impl Application for NodeApplication {
+    const CONDITIONS: &'static [Condition] = &CONDITIONS;
+
     fn initialise(&mut self, image: &mut [u8]) {
         let setup = &self.setup;
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
         show(0x1009, 0, setup.hardware_version.as_bytes());
         show(0x100A, 0, setup.software_version.as_bytes());
-        show(0x1018, 1, &VENDOR_ID.to_le_bytes());
+        show(0x1018, 1, &product::VENDOR_ID.to_le_bytes());
         show(0x1018, 2, &setup.personality.product_code().to_le_bytes());
-        show(0x1018, 3, &REVISION.to_le_bytes());
+        show(0x1018, 3, &product::REVISION.to_le_bytes());
         show(0x1018, 4, &setup.serial_number.to_le_bytes());
         show(0x1F56, 1, &setup.program_id.to_le_bytes());
         show(0x1F57, 1, &self.stored.flash_status().to_le_bytes());
-        if let Some(fields) = self.definition().encoder {
-            fields.initialise(setup.serial_number, image);
-        }
-        if let Some(fields) = self.definition().lift {
-            fields.initialise(image);
-        }
+        self.profile.initialise(image);
         self.show_personality(image);
         self.show_flags(image);
         self.show_values(image);
     }
 
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        self.profile.write(entry, bytes, image)
+    }
+
+    fn written(&mut self, _: &Entry, image: &mut [u8]) {
+        self.profile.received(image);
+    }
+
+    fn received(&mut self, _: u16, image: &mut [u8]) {
+        self.profile.received(image);
+    }
+
+    fn state(&mut self, state: State, image: &mut [u8]) {
+        self.profile.state(state, image);
+    }
+
     fn stored(&self, group: Group) -> canopen::Stored<'_> {
-        // It is that of the pressure channel: what does not have one lets it be.
-        let has_it = group != Group::Calibration || self.definition().is_calibrated();
-        self.stored.get(if has_it { group } else { Group::Volatile })
+        // The calibration is that of the device: a dictionary without it leaves it alone.
+        if self.setup.personality.has_group(group) {
+            self.stored.get(group)
+        } else {
+            canopen::Stored { packed: &[], is_sound: true }
+        }
     }
 
     fn loaded(&mut self, group: Group, good: bool) {
-        let fault = match group {
-            Group::Communication => Fault::CommunicationData,
-            Group::Application => Fault::ApplicationData,
-            Group::Calibration => Fault::CalibrationData,
-            Group::Volatile => return,
-        };
-        self.flags.set(fault, !good);
+        self.flags.set(flag_of(group), !good);
     }
 
-    fn read_domain(&self, _number: u8) -> Result<&[u8], Abort> {
+    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
         self.buffer.read()
     }
 
-    fn write_domain(&mut self, _number: u8, part: Part<'_>) -> Result<(), Abort> {
+    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         self.buffer.write(part)
-    }
-
-    fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        match self.definition() {
-            Definition { lift: Some(fields), .. } => fields.write(number, entry, bytes, image),
-            Definition { encoder: Some(fields), .. } if number >= encoder::FIRST_RULE => {
-                fields.write(number, entry, bytes, image)
-            }
-            Definition { pressure: Some(fields), .. } => fields.write(number, entry, bytes, image),
-            _ => Ok(()),
-        }
     }
 }

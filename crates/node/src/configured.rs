@@ -1,8 +1,9 @@
 //! What the parameter store has of the device itself: what it is to be after the next reset.
 
-use crate::{Personality, Setup};
+use crate::Setup;
 use canopen::lss::Configuration;
 use canopen::{Job, NodeId};
+use profiles::Personality;
 use storage::DeviceRecord;
 
 /// The content of the device record.
@@ -23,11 +24,11 @@ impl Configured {
     pub(crate) fn after(self, job: Job) -> Configured {
         match job {
             Job::Configure(lss) => Configured { lss, ..self },
-            Job::Set(number) => {
+            Job::Setting(number) => {
                 let personality = Personality::numbered(number).unwrap_or(self.personality);
                 Configured { personality, ..self }
             }
-            Job::Save(_) | Job::Restore(_) => self,
+            Job::Store(_) | Job::Restore(_) => self,
         }
     }
 

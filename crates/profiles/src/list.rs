@@ -39,7 +39,7 @@ macro_rules! personalities {
             /// Its table, sorted: everything there is to say about every object. For the host; the node has
             /// [`dictionary`](Personality::dictionary).
             #[must_use]
-            pub fn rows(self) -> &'static [canopen::dictionary::Object] {
+            pub const fn rows(self) -> &'static [canopen::dictionary::Object] {
                 match self {
                     $(Personality::$Name => &tables::$module::ROWS,)+
                 }

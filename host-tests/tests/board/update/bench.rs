@@ -8,7 +8,8 @@ use host_tests::sdo::{Channel, Client, Failure};
 use sign::image::Image;
 use sign::product;
 use sim::world::World;
-use update::{Description, Layout, Status, Version};
+use bsp::update_layout::LAYOUT;
+use update::{Description, Status, Version};
 
 use crate::support::{Master, SECOND, firmware, world};
 
@@ -114,7 +115,7 @@ impl Bench {
 
     /// What lies in the application area, header and all.
     pub(super) fn application(&self) -> Vec<u8> {
-        let area = Layout::STM32F4.application();
+        let area = LAYOUT.application();
         self.world.boards()[0].flash()[area.start() as usize..area.end() as usize].to_vec()
     }
 
