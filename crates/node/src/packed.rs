@@ -39,7 +39,9 @@ impl PackedGroups {
     }
 
     pub(crate) fn clear(&mut self) {
-        Group::ALL.into_iter().for_each(|group| self.get_mut(group).clear());
+        for group in Group::ALL {
+            self.get_mut(group).clear();
+        }
     }
 
     /// Hands out all the room of a group; `fill` says how many bytes of it count.

@@ -74,8 +74,11 @@ impl StoreJob {
     }
 
     fn device_record(&self) -> Changes<'_> {
-        let change =
-            Change::Set { group: storage::Group::Device, version: DeviceRecord::VERSION, value: &self.device };
+        let change = Change::Set {
+            group: storage::Group::Device,
+            version: DeviceRecord::VERSION,
+            value: &self.device,
+        };
         Vec::from_array([change])
     }
 }

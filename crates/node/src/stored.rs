@@ -64,12 +64,7 @@ impl Stored {
 }
 
 /// Bytes that are stored of the group; `None` for what is damaged. Nothing stored is good, too.
-fn read<F: ReadNorFlash>(
-    group: Group,
-    layout: u16,
-    view: &mut View<F>,
-    bytes: &mut [u8],
-) -> Option<usize> {
+fn read<F: ReadNorFlash>(group: Group, layout: u16, view: &mut View<F>, bytes: &mut [u8]) -> Option<usize> {
     match view.load(record_of(group), bytes) {
         Ok(Some(loaded)) if loaded.version == layout => Some(loaded.len).filter(|len| *len > 0),
         // What another personality has stored is nothing to this one.

@@ -7,15 +7,13 @@ mod pdos;
 mod start_up;
 
 pub use node::PERSONALITY;
-pub(crate) use node::{TRANSFER_BUFFER, personality};
-pub(crate) use objects::{
-    ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, device_name, device_type, error_behaviour,
-};
-pub(crate) use pdos::{
+pub use node::{TRANSFER_BUFFER, personality};
+pub use objects::{ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, device_name, device_type, error_behaviour};
+pub use pdos::{
     RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, sync_start, tpdo_mappings, tpdos,
     transmission_type,
 };
-pub(crate) use start_up::START_UP;
+pub use start_up::START_UP;
 
 use canopen::dictionary::Object;
 

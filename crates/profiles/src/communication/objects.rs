@@ -32,15 +32,16 @@ const fn watch(sub: u8) -> Object {
 }
 
 /// 1000h.
-pub(crate) const fn device_type(code: i64) -> Object {
+#[must_use]
+pub const fn device_type(code: i64) -> Object {
     fixed(0x1000, 0, "Device type", Type::Unsigned32).value(code)
 }
 
 /// 1001h.
-pub(crate) const ERROR_REGISTER: Object = fixed(0x1001, 0, "Error register", Type::Unsigned8);
+pub const ERROR_REGISTER: Object = fixed(0x1001, 0, "Error register", Type::Unsigned8);
 
 /// 1003h to 1007h.
-pub(crate) const ERRORS_AND_SYNC: &[Object] = &[
+pub const ERRORS_AND_SYNC: &[Object] = &[
     Object::new(0x1003, 0, "Pre-defined error field", Type::Unsigned8, Access::ReadWrite),
     error(1),
     error(2),
@@ -58,12 +59,13 @@ pub(crate) const ERRORS_AND_SYNC: &[Object] = &[
 ];
 
 /// 1008h, at most 32 characters.
-pub(crate) const fn device_name(name: &'static str) -> Object {
+#[must_use]
+pub const fn device_name(name: &'static str) -> Object {
     text(0x1008, "Manufacturer device name", 32).default(DefaultValue::Text(name))
 }
 
 /// 1009h to 1019h.
-pub(crate) const SERVICES: &[Object] = &[
+pub const SERVICES: &[Object] = &[
     text(0x1009, "Manufacturer hardware version", 32),
     text(0x100A, "Manufacturer software version", 50),
     constant(0x1010, "Store parameters", 3),
@@ -91,7 +93,8 @@ pub(crate) const SERVICES: &[Object] = &[
 ];
 
 /// 1029h, with what a fault of the device does by default: 0 pre-operational, 1 nothing.
-pub(crate) const fn error_behaviour(device_error: i64) -> [Object; 3] {
+#[must_use]
+pub const fn error_behaviour(device_error: i64) -> [Object; 3] {
     [
         Object::highest(0x1029, 2, "Error behaviour"),
         // 255 is refused, 3 to 254 are kept and change nothing.

@@ -4,28 +4,30 @@
 use canopen::dictionary::{self, Access, DefaultValue, Group, Object, Type};
 
 /// What a TPDO is by default.
-pub(crate) struct Tpdo {
+pub struct Tpdo {
     /// Which one it is, from 0.
-    pub(crate) number: u16,
+    pub number: u16,
     /// COB-ID.
-    pub(crate) cob_id: DefaultValue,
+    pub cob_id: DefaultValue,
     /// Transmission type.
-    pub(crate) transmission: i64,
+    pub transmission: i64,
     /// Event timer in ms.
-    pub(crate) event_timer: i64,
+    pub event_timer: i64,
     /// What is mapped.
-    pub(crate) mapped: &'static [i64],
+    pub mapped: &'static [i64],
 }
 
 impl Tpdo {
     /// One that waits for a use, by its number from 0.
-    pub(crate) const fn spare(number: u16) -> Tpdo {
+    #[must_use]
+    pub const fn spare(number: u16) -> Tpdo {
         Tpdo { number, cob_id: off(0x180, number), transmission: 255, event_timer: 0, mapped: &[] }
     }
 }
 
 /// The default COB-ID of a PDO that is switched off: the first four have a place in the pre-defined connection set.
-pub(crate) const fn off(base: u32, number: u16) -> DefaultValue {
+#[must_use]
+pub const fn off(base: u32, number: u16) -> DefaultValue {
     match number {
         0..=3 => DefaultValue::NodeId((1 << 31) + base + 0x100 * number as u32),
         _ => DefaultValue::Integer(1 << 31),
@@ -36,33 +38,46 @@ const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Objec
     Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Communication)
 }
 
-pub(crate) const fn cob_id(index: u16, default: DefaultValue) -> Object {
+/// COB-ID of a PDO, sub-index 1.
+#[must_use]
+pub const fn cob_id(index: u16, default: DefaultValue) -> Object {
     parameter(index, 1, "COB-ID", Type::Unsigned32).default(default)
 }
 
-pub(crate) const fn transmission_type(index: u16, default: i64) -> Object {
+/// Transmission type of a PDO, sub-index 2.
+#[must_use]
+pub const fn transmission_type(index: u16, default: i64) -> Object {
     parameter(index, 2, "Transmission type", Type::Unsigned8).value(default)
 }
 
-pub(crate) const fn inhibit_time(index: u16) -> Object {
+/// Inhibit time of a TPDO in 100 us, sub-index 3.
+#[must_use]
+pub const fn inhibit_time(index: u16) -> Object {
     parameter(index, 3, "Inhibit time", Type::Unsigned16).unit("100 us")
 }
 
-pub(crate) const fn event_timer(index: u16, milliseconds: i64) -> Object {
+/// Event timer of a PDO in ms, sub-index 5.
+#[must_use]
+pub const fn event_timer(index: u16, milliseconds: i64) -> Object {
     parameter(index, 5, "Event timer", Type::Unsigned16).value(milliseconds).unit("ms")
 }
 
-pub(crate) const fn sync_start(index: u16) -> Object {
+/// SYNC start value of a TPDO, sub-index 6.
+#[must_use]
+pub const fn sync_start(index: u16) -> Object {
     parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240)
 }
 
 /// The number of mapped objects. No limit in the table: 254 and 255 make it a multiplexed PDO, and the rule knows how
 /// many slots there are.
-pub(crate) const fn count(index: u16, name: &'static str, used: i64) -> Object {
+#[must_use]
+pub const fn count(index: u16, name: &'static str, used: i64) -> Object {
     parameter(index, 0, name, Type::Unsigned8).value(used)
 }
 
-pub(crate) const fn slot(index: u16, sub: u8, mapped: i64) -> Object {
+/// A mapped object of a PDO: index, sub-index and length in bits.
+#[must_use]
+pub const fn slot(index: u16, sub: u8, mapped: i64) -> Object {
     parameter(index, sub, "Mapped object", Type::Unsigned32).value(mapped)
 }
 
@@ -141,10 +156,11 @@ const fn rpdo_mappings() -> [[Object; 9]; 8] {
 const RPDO_PARTS: &[&[Object]] = &[rpdos().as_flattened(), rpdo_mappings().as_flattened()];
 
 /// 1400h to 1607h: eight RPDOs.
-pub(crate) static RPDOS: [Object; dictionary::count(RPDO_PARTS)] = dictionary::gather(RPDO_PARTS);
+pub static RPDOS: [Object; dictionary::count(RPDO_PARTS)] = dictionary::gather(RPDO_PARTS);
 
 /// The communication parameters of these TPDOs.
-pub(crate) const fn tpdos<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 6]; N] {
+#[must_use]
+pub const fn tpdos<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 6]; N] {
     let mut rows = [tpdo(0x1800, &defaults[0], ""); N];
     let mut i = 0;
     while i < N {
@@ -156,7 +172,8 @@ pub(crate) const fn tpdos<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 6];
 }
 
 /// Their mapping parameters.
-pub(crate) const fn tpdo_mappings<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 9]; N] {
+#[must_use]
+pub const fn tpdo_mappings<const N: usize>(defaults: &[Tpdo; N]) -> [[Object; 9]; N] {
     let mut rows = [mapping(0x1A00, &[], ""); N];
     let mut i = 0;
     while i < N {

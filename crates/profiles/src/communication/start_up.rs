@@ -11,7 +11,7 @@ const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Objec
 }
 
 /// 1F51h to 1FD0h.
-pub(crate) const START_UP: &[Object] = &[
+pub const START_UP: &[Object] = &[
     Object::highest(0x1F51, 1, "Program control"),
     Object::new(0x1F51, 1, "Program 1 control", Type::Unsigned8, Access::ReadWrite).value(1),
     Object::highest(0x1F56, 1, "Program identification"),

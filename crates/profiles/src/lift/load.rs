@@ -144,7 +144,7 @@ impl LoadUnit {
                 is_broken,
             };
         }
-        let kelvin = p.transducer.temperature.temperature(raw, &self.chip);
+        let kelvin = p.transducer.temperature.temperature(raw, self.chip);
         let pascal = p.transducer.pressure.pressure(raw.ratio(), kelvin);
         let measured = self.filter.next(pascal) * factor + constant;
         let load = rounded(measured);

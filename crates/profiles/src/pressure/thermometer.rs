@@ -76,7 +76,7 @@ impl TemperatureCalibration {
     /// The temperature in K; `None` when it is not measured: an input at a rail, a broken thermistor, a chip without a
     /// calibration, or no number.
     #[must_use]
-    pub fn temperature(&self, raw: &RawSample, chip: &ChipThermometer) -> Option<f32> {
+    pub fn temperature(&self, raw: &RawSample, chip: ChipThermometer) -> Option<f32> {
         let measured = match self.thermometer {
             Thermometer::Internal => internal(raw, chip),
             Thermometer::Thermistor => self.thermistor.temperature(raw),
@@ -119,7 +119,7 @@ impl Thermistor {
 
 /// Sensor and reference are read against the same supply, so their quotient does not depend on it. Without a reference or a
 /// characteristic the result is no number.
-fn internal(raw: &RawSample, chip: &ChipThermometer) -> Option<f32> {
+fn internal(raw: &RawSample, chip: ChipThermometer) -> Option<f32> {
     if raw.is_rail(raw.temperature) {
         return None;
     }
@@ -150,7 +150,7 @@ mod tests {
 
     fn thermistor(thermistor: u32) -> Option<f32> {
         let own = TemperatureCalibration { thermometer: Thermometer::Thermistor, ..Default::default() };
-        own.temperature(&RawSample { thermistor, ..RAW }, &CHIP)
+        own.temperature(&RawSample { thermistor, ..RAW }, CHIP)
     }
 
     #[test]
@@ -185,18 +185,18 @@ mod tests {
         for sum in [0, 16 * 4095, 16 * 4096, u32::MAX] {
             assert_eq!(thermistor(sum), None);
             let own = TemperatureCalibration::default();
-            assert_eq!(own.temperature(&RawSample { temperature: sum, ..RAW }, &CHIP), None);
+            assert_eq!(own.temperature(&RawSample { temperature: sum, ..RAW }, CHIP), None);
         }
     }
 
     #[test]
     fn without_a_reference_or_a_characteristic_there_is_no_temperature() {
         let own = TemperatureCalibration::default();
-        assert_eq!(own.temperature(&RawSample { reference: 0, ..RAW }, &CHIP), None);
+        assert_eq!(own.temperature(&RawSample { reference: 0, ..RAW }, CHIP), None);
         for (offset, slope) in
             [(f32::NAN, f32::NAN), (f32::NEG_INFINITY, f32::INFINITY), (0.0, f32::INFINITY)]
         {
-            assert_eq!(own.temperature(&RAW, &ChipThermometer { offset, slope }), None);
+            assert_eq!(own.temperature(&RAW, ChipThermometer { offset, slope }), None);
         }
     }
 
@@ -225,15 +225,15 @@ mod tests {
         let wide = Thermistor { break_low: 0.0, break_high: 1.0, ..Thermistor::default() };
         let own = TemperatureCalibration { thermometer, thermistor: wide, ..Default::default() };
         for sum in [1, 16 * 4095 - 1] {
-            assert!(own.temperature(&RawSample { thermistor: sum, ..RAW }, &CHIP).is_some());
+            assert!(own.temperature(&RawSample { thermistor: sum, ..RAW }, CHIP).is_some());
         }
     }
 
     #[test]
     fn the_trim_comes_last() {
         let own = TemperatureCalibration { factor: 1.01, offset: -2.0, ..Default::default() };
-        let plain = TemperatureCalibration::default().temperature(&RAW, &CHIP).unwrap();
-        assert!((own.temperature(&RAW, &CHIP).unwrap() - (plain * 1.01 - 2.0)).abs() < 1e-3);
+        let plain = TemperatureCalibration::default().temperature(&RAW, CHIP).unwrap();
+        assert!((own.temperature(&RAW, CHIP).unwrap() - (plain * 1.01 - 2.0)).abs() < 1e-3);
         assert!((plain - (303.15 + 60.0 * 80.0 / 270.0)).abs() < 1e-3);
     }
 

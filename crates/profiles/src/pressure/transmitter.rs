@@ -105,7 +105,7 @@ impl Transmitter {
     fn measure(&mut self, raw: &RawSample, snapshot: &mut Snapshot) {
         let ratio = raw.ratio();
         self.check_break(ratio);
-        let kelvin = self.calibration.temperature.temperature(raw, &self.chip);
+        let kelvin = self.calibration.temperature.temperature(raw, self.chip);
         let conditions = Conditions {
             sensor_break: self.sensor_break,
             pressure_rail: raw.is_rail(raw.pressure),

@@ -1,7 +1,7 @@
 use crate::board::{RawEncoder, SsiFrame};
 use crate::encoder::{ALARM_POSITION, Encoder, Parameters, SENSOR_NO_SIGNAL};
 use crate::profile::Chain;
-use canopen::dictionary::{Access, Group, Rule};
+use canopen::dictionary::{Access, Group};
 use canopen::sdo::Abort;
 
 use super::*;
@@ -9,7 +9,6 @@ use crate::{IMAGE_SIZE, Personality};
 
 const DICTIONARY: &Dictionary = Personality::Encoder.dictionary();
 static FIELDS: Fields = fields(DICTIONARY);
-
 
 /// A dictionary with an encoder behind it.
 struct Node {
