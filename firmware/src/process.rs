@@ -1,19 +1,43 @@
-//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO, the lamps.
+//! Process data: frames of FIFO 0, the snapshot of each millisecond, the timers of SYNC and PDO, the lamps. And the one who notices
+//! that there are no more snapshots.
 
-use bsp::{Alarm, Clock, Frames, Lamps, Received};
+use bsp::losses::{Event, Losses};
+use bsp::{Alarm, Clock, Frames, Lamps, Received, Ring};
+use canopen::{Duration, Instant};
 use node::Snapshot;
 
-use crate::SERVICES;
 use crate::shared::Shared;
+use crate::{SAMPLING, SERVICES};
 
 /// What the task owns.
 pub(crate) struct Process {
-    pub(crate) frames: Frames,
-    pub(crate) alarm: Alarm,
-    pub(crate) lamps: Lamps,
+    frames: Frames,
+    alarm: Alarm,
+    lamps: Lamps,
+    /// When the last snapshot came, or one was last asked for.
+    sampled: Instant,
+    lost: &'static Losses,
 }
 
+/// Snapshots come every millisecond. After so long without one the sampling task has to see what is wrong.
+const OVERDUE: Duration = Duration::from_millis(2);
+
 impl Process {
+    pub(crate) fn new(frames: Frames, alarm: Alarm, lamps: Lamps, lost: &'static Losses) -> Process {
+        Process { frames, alarm, lamps, sampled: Clock::now(), lost }
+    }
+
+    /// Hands on the alarm of the services, which this task's interrupt brings. It comes by every millisecond, so an alarm whose
+    /// interrupt was lost is not much later.
+    pub(crate) fn wake_services(&mut self, ring: Ring) {
+        if ring == Ring::Missed {
+            self.lost.count(Event::Alarm);
+        }
+        if ring != Ring::No {
+            rtic::pend(SERVICES);
+        }
+    }
+
     /// Does everything that is due and sets the alarm for what comes next.
     pub(crate) fn run(&mut self, snapshot: Option<Snapshot>, node: &mut impl Shared) {
         while let Some(Received { frame, at }) = self.frames.dequeue() {
@@ -22,13 +46,24 @@ impl Process {
             rtic::pend(SERVICES);
         }
         let now = Clock::now();
+        self.watch(snapshot.is_some(), now);
         let (next, lit) = node.call(|protocol, out| {
             if let Some(snapshot) = snapshot {
                 protocol.publish(&snapshot, now, out);
             }
             (protocol.poll_process(now, out), protocol.lamps())
         });
-        self.alarm.set(next);
+        self.alarm.set(next.min(self.sampled + OVERDUE));
         self.lamps.set(lit);
+    }
+
+    fn watch(&mut self, has_sampled: bool, now: Instant) {
+        let is_overdue = now >= self.sampled + OVERDUE;
+        if is_overdue && !has_sampled {
+            rtic::pend(SAMPLING);
+        }
+        if is_overdue || has_sampled {
+            self.sampled = now;
+        }
     }
 }

@@ -6,7 +6,7 @@ use bsp::can::Controller;
 use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::led::Led;
-use bsp::losses::Losses;
+use bsp::losses::{EVENTS, Event, Losses};
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
 use node::{BusEvent, Fault, NodeId, Request};
@@ -28,6 +28,8 @@ pub(crate) struct Services {
     rate: Rate,
     frames: Frames,
     lost: &'static Losses,
+    /// What of `lost` has been reported.
+    told: [u32; EVENTS],
     alarm: Alarm,
     led: Led,
     watch: BusWatch,
@@ -60,7 +62,19 @@ impl Services {
     ) -> Services {
         let request = Some(Request::ResetCommunication);
         let (watch, back_off) = (BusWatch::default(), BackOff::default());
-        Services { can, rate, frames, lost, alarm, led, watch, back_off, request, findings }
+        Services {
+            can,
+            rate,
+            frames,
+            lost,
+            told: [0; EVENTS],
+            alarm,
+            led,
+            watch,
+            back_off,
+            request,
+            findings,
+        }
     }
 
     /// Does everything that is due and sets the alarm for what comes next.
@@ -72,6 +86,7 @@ impl Services {
             self.report_bus(node);
             self.receive(node);
         }
+        self.report_losses(node);
         let now = Clock::now();
         let next = node.call(|protocol, out| protocol.poll_services(now, out));
         self.fulfil(node);
@@ -80,6 +95,8 @@ impl Services {
         }
         self.led.set(blink(now));
         self.alarm.set(next.min(now + PERIOD).min(self.back_off.due()));
+        // It tells the watchdog that it is there, whether there is something to store or not.
+        rtic::pend(KEEPER);
     }
 
     /// Listens for the bit rate; goes on the bus when it is found.
@@ -102,11 +119,6 @@ impl Services {
 
     fn report_bus(&mut self, node: &mut impl Shared) {
         let now = Clock::now();
-        let lost = self.lost.take();
-        if lost > 0 {
-            defmt::warn!("{=u32} received frames lost", lost);
-            node.call(|protocol, out| protocol.bus_event(BusEvent::Overrun, now, out));
-        }
         let state = self.can.state();
         if state == BusState::Off {
             self.back_off.bus_off(now);
@@ -118,6 +130,25 @@ impl Services {
         if let Some(event) = change.and_then(|(before, after)| event_of(before, after)) {
             node.call(|protocol, out| protocol.bus_event(event, now, out));
         }
+    }
+
+    /// Counts of the hardware to where they can be seen. A lost frame has an emergency of its own.
+    fn report_losses(&mut self, node: &mut impl Shared) {
+        let all = self.lost.all();
+        let told = core::mem::replace(&mut self.told, all);
+        if all == told {
+            return;
+        }
+        for (kind, count) in (1_u8..).zip(&all).filter(|(_, count)| **count > 0) {
+            defmt::warn!("lost events of kind {=u8}: {=u32}", kind, count);
+        }
+        let has_lost_frame = all.get(Event::Frame as usize) != told.get(Event::Frame as usize);
+        node.call(|protocol, out| {
+            protocol.show_lost_events(&all);
+            if has_lost_frame {
+                protocol.bus_event(BusEvent::Overrun, Clock::now(), out);
+            }
+        });
     }
 
     /// Does what the protocol asks for, until it asks for nothing.

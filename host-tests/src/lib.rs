@@ -8,3 +8,4 @@ pub mod network;
 pub mod sdo;
 pub mod station;
 pub mod tables;
+pub mod thorough;

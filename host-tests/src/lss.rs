@@ -1,14 +1,16 @@
-//! An LSS master for tests (CiA 305): finds devices without a node-ID and gives them one.
+//! The LSS master of crate `canopen` on a bus of a test: finds devices without a node-ID and gives them one.
 
-use canopen::lss::{Identity, Part, Request, Response};
-use canopen::{Duration, Frame, NodeId};
+use canopen::client::lss::{self, Fastscan, Options};
+use canopen::client::{Service, Step};
+use canopen::lss::Identity;
+use canopen::{Duration, Instant, NodeId};
 
 use crate::network::{Network, Unit};
 
-const REQUEST: u16 = 0x7E5;
 const RESPONSE: u16 = 0x7E4;
-/// How long nobody answers before nobody is taken to be there: a frame at 1 Mbit/s and as much again.
-const TIME_OUT: Duration = Duration(300);
+/// How long nobody answers before nobody is taken to be there: the frames of question and answer at 1 Mbit/s, and as
+/// much again. Once is enough.
+const OPTIONS: Options = Options { timeout: Duration(600), retries: 0 };
 
 /// The master of one network.
 #[derive(Debug)]
@@ -22,48 +24,36 @@ impl<'a, U: Unit> Master<'a, U> {
         Master { network }
     }
 
-    fn tell(&mut self, request: Request) {
+    fn now(&self) -> Instant {
+        Instant(self.network.now().as_micros())
+    }
+
+    fn run<S: Service>(&mut self, mut service: S) -> S::Output {
         while self.network.hear_id(RESPONSE).is_some() {}
-        self.network.transmit(&Frame::new(REQUEST, &request.encode()).expect("a frame"));
-    }
-
-    /// Asks and waits for the first answer, or for all of the time-out.
-    fn ask(&mut self, request: Request) -> Option<Response> {
-        self.tell(request);
-        let frame = self.network.await_id(RESPONSE, TIME_OUT)?;
-        Response::parse(frame.data().try_into().ok()?)
-    }
-
-    fn matches(&mut self, value: u32, bit: u8, part: u8, next: u8) -> bool {
-        self.ask(Request::Fastscan { value, bit, part, next }) == Some(Response::Identified)
+        loop {
+            match service.next(self.now()) {
+                Step::Send(frame) => self.network.transmit(&frame),
+                Step::Wait(until) => {
+                    let left = Duration(until.0.saturating_sub(self.now().0));
+                    if let Some(frame) = self.network.await_id(RESPONSE, left) {
+                        service.on_frame(&frame, self.now());
+                    }
+                }
+                Step::Done(output) => return output,
+            }
+        }
     }
 
     /// Finds one device and leaves it in the state configuration.
     pub fn fastscan(&mut self) -> Option<Identity> {
-        if !self.matches(0, Request::CONFIRM, 0, 0) {
-            return None;
-        }
-        let mut found = [0; Part::ALL.len()];
-        for (part, value) in (0..).zip(&mut found) {
-            for bit in (0..32).rev() {
-                if !self.matches(*value, bit, part, part) {
-                    *value |= 1 << bit;
-                }
-            }
-            let next = (part + 1) % 4;
-            if !self.matches(*value, 0, part, next) {
-                return None;
-            }
-        }
-        let [vendor, product, revision, serial] = found;
-        Some(Identity { vendor, product, revision, serial })
+        self.run(Fastscan::new(OPTIONS)).ok().flatten()
     }
 
     /// Gives the device in the state configuration a node-ID, stores it and lets it boot. `false` when it refuses.
     pub fn configure(&mut self, node_id: NodeId) -> bool {
-        let is_set = self.ask(Request::NodeId(node_id.get())) == Some(Response::NodeId(0));
-        let is_stored = self.ask(Request::Store) == Some(Response::Stored(0));
-        self.tell(Request::SwitchGlobal { configuration: false });
+        let is_set = self.run(lss::set_node_id(Some(node_id), OPTIONS)).is_ok();
+        let is_stored = self.run(lss::store(OPTIONS)).is_ok();
+        self.network.transmit(&lss::switch_global(false));
         is_set && is_stored
     }
 }

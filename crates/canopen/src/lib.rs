@@ -13,6 +13,7 @@
 #![warn(clippy::pedantic)]
 
 mod can_id;
+pub mod client;
 mod copy;
 mod device;
 pub mod dictionary;

@@ -11,6 +11,7 @@ use profiles::{AnyProfile, Snapshot};
 use crate::Setup;
 use crate::configured::Configured;
 use crate::fault::{CONDITIONS, flag_of};
+use crate::lost_events::LOST_EVENTS;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
 
@@ -25,6 +26,8 @@ pub(crate) struct NodeApplication {
     /// The flags of active faults. A reset of the dictionary does not end a fault.
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
+    /// As counted by the firmware (2001h).
+    pub(crate) lost_events: [u32; LOST_EVENTS],
     buffer: TransferBuffer,
 }
 
@@ -37,6 +40,7 @@ impl NodeApplication {
             snapshot: Snapshot::default(),
             flags: Flags::default(),
             stored: Stored::NOTHING,
+            lost_events: [0; LOST_EVENTS],
             buffer: TransferBuffer::EMPTY,
         }
     }
@@ -56,7 +60,7 @@ impl NodeApplication {
         self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
     }
 
-    fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
+    pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
         if let Ok(entry) = self.setup.personality.dictionary().find(index, sub) {
             entry.field().set(image, bytes);
         }
@@ -80,6 +84,7 @@ impl Application for NodeApplication {
         self.profile.initialise(image);
         self.show_personality(image);
         self.show_flags(image);
+        self.show_lost_events(image);
         self.show_values(image);
     }
 

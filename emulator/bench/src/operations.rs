@@ -48,8 +48,7 @@ pub(crate) const OPERATIONS: [Operation; 13] = [
     }),
     operation("SDO download INTEGER32", [807, 771], |client| client.write(PARAMETER, &[1, 2, 3, 4])),
     operation("segmented upload, 32 bytes", [4321, 4076], |client| {
-        ensure!(client.read_segmented(TEXT)? == b"thirty-two characters, no more..", "a wrong text");
-        Ok(())
+        reads(client, TEXT, Ok(b"thirty-two characters, no more..".to_vec()))
     }),
     Operation {
         prepare: |client| set_synchronous(client, 1),

@@ -100,7 +100,7 @@ impl Boards {
             virtual_devices(&world).into_iter().map(|device| Seat::new(device, &mut boards)).collect();
         seats.iter_mut().for_each(|seat| seat.start(&mut boards));
         let mut lift = Boards { boards, master, seats, world, log: vec![] };
-        lift.boards.apply(&parse("shaft", &format!("{POSITION}=const:{}", 3_000.0 / TAPE)));
+        lift.boards.apply(&parse("shaft", &format!("{POSITION}=const:{}", 3_000.0 / TAPE))).unwrap();
         lift.load(0.0);
         lift.run(1000);
         lift
@@ -141,13 +141,13 @@ impl Boards {
 
     pub(crate) fn load(&mut self, kilograms: f64) {
         let pascal = 2.0e5 + kilograms * 500.0;
-        self.boards.apply(&parse("pressure", &format!("{LOAD}=const:{pascal}")));
+        self.boards.apply(&parse("pressure", &format!("{LOAD}=const:{pascal}"))).unwrap();
     }
 
     /// Button 1 is pressed for a moment.
     pub(crate) fn press_button(&mut self) {
         for what in ["down", "up"] {
-            self.boards.apply(&parse("button", &format!("{LOAD}=1:{what}")));
+            self.boards.apply(&parse("button", &format!("{LOAD}=1:{what}"))).unwrap();
             self.run(50);
         }
     }

@@ -2,12 +2,16 @@
 
 use std::collections::VecDeque;
 
+use canopen::client::{Service, Step, Taken};
 use canopen::{Duration, Frame, Instant};
 
 use crate::bus::{Bus, BusError, Received};
 
 /// Frames that are kept for later; the oldest go first.
 const KEPT: usize = 4096;
+
+/// Frames that a service is handed between two of its steps. A bus that is flooded must not hold up its deadline.
+const AT_ONCE: usize = 256;
 
 /// A bus that can be opened again when it is lost.
 pub struct Network {
@@ -91,16 +95,68 @@ impl Network {
             if let Some(picked) = pick(&received.frame) {
                 return Ok(Some(picked));
             }
-            if self.kept.len() == KEPT {
-                self.kept.pop_front();
-            }
-            self.kept.push_back(received);
+            self.keep(received);
             // A busy bus must not hold up the deadline.
             if self.now() >= until {
                 break;
             }
         }
         Ok(None)
+    }
+
+    /// Runs a service of crate `canopen` to its end. Frames that it has no use for are kept.
+    ///
+    /// # Errors
+    /// The bus is lost.
+    pub fn run<S: Service>(&mut self, service: &mut S) -> Result<S::Output, BusError> {
+        self.run_with(service, |_| ())
+    }
+
+    /// The same; `progress` looks at the service whenever something has come of it.
+    ///
+    /// # Errors
+    /// The bus is lost.
+    pub fn run_with<S: Service>(
+        &mut self,
+        service: &mut S,
+        mut progress: impl FnMut(&S),
+    ) -> Result<S::Output, BusError> {
+        loop {
+            self.hand_over(service)?;
+            let step = service.next(self.now());
+            progress(service);
+            match step {
+                Step::Send(frame) => self.send(&frame)?,
+                Step::Wait(until) => {
+                    if let Some(received) = self.fetch(until)? {
+                        self.offer(service, received);
+                    }
+                }
+                Step::Done(output) => return Ok(output),
+            }
+        }
+    }
+
+    /// Hands over what has arrived.
+    fn hand_over(&mut self, service: &mut impl Service) -> Result<(), BusError> {
+        for _ in 0..AT_ONCE {
+            let Some(received) = self.fetch(self.now())? else { break };
+            self.offer(service, received);
+        }
+        Ok(())
+    }
+
+    fn offer(&mut self, service: &mut impl Service, received: Received) {
+        if service.on_frame(&received.frame, self.now()) == Taken::Ignored {
+            self.keep(received);
+        }
+    }
+
+    fn keep(&mut self, received: Received) {
+        if self.kept.len() == KEPT {
+            self.kept.pop_front();
+        }
+        self.kept.push_back(received);
     }
 
     /// Lets time pass; what arrives is kept.

@@ -1,34 +1,30 @@
-//! The NMT master (CiA 301, 7.2.8).
+//! The NMT master on an open bus (CiA 301, 7.3.2.2).
 
+use canopen::client::nmt::{Change, command};
 use canopen::nmt::{Command, State};
-use canopen::{Duration, Frame, NodeId};
+use canopen::{Duration, NodeId};
 
 use crate::Network;
 use crate::bus::BusError;
-use crate::heartbeat::Heartbeat;
 
 /// Sends a command to one node, or to all. No node acknowledges it.
 ///
 /// # Errors
 /// The bus is lost.
-pub fn send(network: &mut Network, command: Command, node: Option<NodeId>) -> Result<(), BusError> {
-    match Frame::new(0x000, &command.encode(node)) {
-        Some(frame) => network.send(&frame),
-        None => Ok(()),
-    }
+pub fn send(network: &mut Network, specifier: Command, node: Option<NodeId>) -> Result<(), BusError> {
+    network.send(&command(specifier, node))
 }
 
-/// Restarts a node, or its communication; whether it has booted up in this time.
+/// Sends a command to one node and waits for the heartbeat or boot-up message that shows its effect: the state, or
+/// `None` when nothing showed it in this time.
 ///
 /// # Errors
 /// The bus is lost.
-pub fn reset(
+pub fn change(
     network: &mut Network,
-    command: Command,
+    specifier: Command,
     node: NodeId,
     time: Duration,
-) -> Result<bool, BusError> {
-    send(network, command, Some(node))?;
-    let booted = Heartbeat::wait(network, node, time, |state| state == State::Initialising)?;
-    Ok(booted.is_some())
+) -> Result<Option<State>, BusError> {
+    network.run(&mut Change::new(specifier, node, time))
 }

@@ -7,7 +7,7 @@
 //! squares of polynomials over GF(2) have no mixed terms. The remainder is the low part of q·(x^12 + x^5 + 1).
 
 /// The CRC of some data, given that of what came before it; 0 before the first.
-pub(super) fn extend(crc: u16, bytes: &[u8]) -> u16 {
+pub(crate) fn extend(crc: u16, bytes: &[u8]) -> u16 {
     let (words, rest) = bytes.as_chunks();
     let crc = words.iter().fold(crc, |crc, word| remainder(u32::from_be_bytes(*word) ^ u32::from(crc) << 16));
     rest.iter().fold(crc, |crc, &byte| remainder(u32::from(byte) ^ u32::from(crc >> 8)) ^ crc << 8)

@@ -8,7 +8,7 @@ mod block;
 mod block_download;
 mod block_upload;
 mod bytes;
-mod crc;
+pub(crate) mod crc;
 mod objects;
 mod request;
 mod response;

@@ -30,7 +30,8 @@ pub trait Bus {
     /// [`BusError::Lost`].
     fn send(&mut self, frame: &Frame) -> Result<(), BusError>;
 
-    /// The next frame of somebody else; `None` when there was none until then.
+    /// The next frame of somebody else; `None` when there was none until then. With an instant that has passed, it looks
+    /// whether there is one and does not wait.
     ///
     /// # Errors
     /// [`BusError::Lost`].

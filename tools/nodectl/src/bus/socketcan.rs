@@ -10,7 +10,7 @@ use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Id, Socket, StandardId};
 use super::stream::is_time_out;
 use super::{Bus, BusError, Received, clock};
 
-/// The shortest time that a read waits; 0 would be for ever.
+/// The shortest time that a read with a limit waits; 0 would be for ever.
 const SHORTEST: Duration = Duration::from_millis(1);
 /// The queue of the interface is full (`ENOBUFS`); it holds ten frames by default. Tried again after this time.
 const FULL: Duration = Duration::from_millis(1);
@@ -25,6 +25,18 @@ pub(super) struct SocketCan {
 impl SocketCan {
     pub(super) fn open(interface: &str) -> io::Result<SocketCan> {
         Ok(SocketCan { socket: CanSocket::open(interface)? })
+    }
+
+    /// A frame within this time; with no time at all, one that is there.
+    fn read_within(&mut self, time: Duration) -> io::Result<CanFrame> {
+        if !time.is_zero() {
+            self.socket.set_read_timeout(time.max(SHORTEST))?;
+            return self.socket.read_frame();
+        }
+        self.socket.set_nonblocking(true)?;
+        let result = self.socket.read_frame();
+        self.socket.set_nonblocking(false)?;
+        result
     }
 }
 
@@ -46,8 +58,7 @@ impl Bus for SocketCan {
 
     fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
         loop {
-            let limit = clock::left(until).max(SHORTEST);
-            match self.socket.set_read_timeout(limit).and_then(|()| self.socket.read_frame()) {
+            match self.read_within(clock::left(until)) {
                 Ok(frame) => {
                     if let Some(frame) = from_host(&frame) {
                         return Ok(Some(Received { frame, at: self.now() }));

@@ -12,23 +12,35 @@ use super::clock;
 
 /// How long a host may take to accept a connection.
 const CONNECT: Duration = Duration::from_secs(3);
-/// The shortest time that a read waits; 0 would be for ever.
+/// The shortest time that a read with a limit waits; 0 would be for ever.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 /// Something to read from with a limit.
 trait Port: Read + Write {
-    fn limit(&mut self, time: Duration) -> io::Result<()>;
+    /// Some bytes within this time. With no time at all, those that are there.
+    fn read_within(&mut self, time: Duration, buffer: &mut [u8]) -> io::Result<usize>;
 }
 
 impl Port for TcpStream {
-    fn limit(&mut self, time: Duration) -> io::Result<()> {
-        self.set_read_timeout(Some(time))
+    fn read_within(&mut self, time: Duration, buffer: &mut [u8]) -> io::Result<usize> {
+        if !time.is_zero() {
+            self.set_read_timeout(Some(time.max(SHORTEST)))?;
+            return self.read(buffer);
+        }
+        self.set_nonblocking(true)?;
+        let result = self.read(buffer);
+        self.set_nonblocking(false)?;
+        result
     }
 }
 
 impl Port for Box<dyn SerialPort> {
-    fn limit(&mut self, time: Duration) -> io::Result<()> {
-        Ok(self.set_timeout(time)?)
+    fn read_within(&mut self, time: Duration, buffer: &mut [u8]) -> io::Result<usize> {
+        if time.is_zero() && self.bytes_to_read()? == 0 {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        self.set_timeout(time.max(SHORTEST))?;
+        self.read(buffer)
     }
 }
 
@@ -64,11 +76,10 @@ impl Stream {
         self.port.write_all(text.as_bytes()).and_then(|()| self.port.flush()).map_err(BusError::Lost)
     }
 
-    /// Some bytes; none at the deadline.
+    /// Some bytes; none at the deadline. It does not wait for one that has passed.
     pub(super) fn read(&mut self, until: Instant) -> Result<Vec<u8>, BusError> {
         let mut buffer = [0; 4096];
-        let limit = clock::left(until).max(SHORTEST);
-        match self.port.limit(limit).and_then(|()| self.port.read(&mut buffer)) {
+        match self.port.read_within(clock::left(until), &mut buffer) {
             Ok(0) => Err(BusError::Lost(ErrorKind::UnexpectedEof.into())),
             Ok(count) => Ok(buffer[..count].to_vec()),
             Err(error) if is_time_out(&error) => Ok(Vec::new()),

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use canopen::client::lss::Error as Service;
+use canopen::client::sdo as transfer;
 use thiserror::Error;
 
 use crate::acquisition::Interruption;
@@ -78,8 +80,8 @@ impl Failure {
         match self {
             Failure::Usage(_) => 2,
             Failure::Sdo(error) => sdo_code(error),
-            Failure::Lss(lss::Error::Refused { .. }) => 1,
-            Failure::Lss(lss::Error::NoAnswer { .. }) | Failure::Silence(_) => 3,
+            Failure::Lss(lss::Error::Service(Service::Refused(..))) => 1,
+            Failure::Lss(lss::Error::Service(Service::NoAnswer(_))) | Failure::Silence(_) => 3,
             Failure::Bus(_) | Failure::Lss(lss::Error::Bus(_)) => 4,
             Failure::Update(error) => update_code(error),
             Failure::Nodes { exit_code, .. } => *exit_code,
@@ -90,8 +92,8 @@ impl Failure {
 
 fn sdo_code(error: &sdo::Error) -> u8 {
     match error.cause {
-        Cause::Abort(_) => 1,
-        Cause::NoAnswer | Cause::Unexpected | Cause::Crc => 3,
+        Cause::Transfer(transfer::Error::Abort(_)) => 1,
+        Cause::Transfer(_) => 3,
         Cause::Bus(_) => 4,
     }
 }

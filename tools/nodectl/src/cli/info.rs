@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::output::hex;
 use super::{Failure, Session};
-use crate::heartbeat::{self, Heartbeat};
+use crate::heartbeat;
 use crate::object::at;
 use crate::update::{Program, Status};
 use crate::value;
@@ -82,7 +82,7 @@ fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
 fn state(session: &mut Session, node: NodeId, period: Option<u32>) -> Result<Option<&'static str>, Failure> {
     let Some(period) = period.filter(|&period| period > 0) else { return Ok(None) };
     let time = Duration(MARGIN.0 + Duration::from_millis(period.into()).0);
-    Ok(Heartbeat::wait(&mut session.network, node, time, |_| true)?.map(heartbeat::words))
+    Ok(heartbeat::wait(&mut session.network, node, time)?.map(heartbeat::words))
 }
 
 fn errors(session: &mut Session, node: NodeId) -> Result<Vec<u32>, Failure> {

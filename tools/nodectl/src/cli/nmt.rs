@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::node_set::NodeSet;
 use super::{Failure, Session};
-use crate::heartbeat::{self, Heartbeat};
-use crate::nmt::{reset, send};
+use crate::heartbeat;
+use crate::nmt::{self as master, send};
 
 /// How long a node may take to boot.
 const BOOT: Duration = Duration::from_millis(10_000);
@@ -56,7 +56,7 @@ impl Nmt {
             match wanted {
                 _ if self.no_wait => send(&mut session.network, command, Some(node))?,
                 None => restart(session, command, node)?,
-                Some(wanted) => change(session, command, node, wanted)?,
+                Some(_) => change(session, command, node)?,
             }
         }
         Ok(())
@@ -64,17 +64,16 @@ impl Nmt {
 }
 
 fn restart(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
-    if !reset(&mut session.network, command, node, BOOT)? {
+    if master::change(&mut session.network, command, node, BOOT)?.is_none() {
         return Err(Failure::Silence(format!("node {}: no boot-up message", node.get())));
     }
     session.print(&Done { node: node.get(), state: Some("booted") })
 }
 
 /// A node that sends no heartbeat cannot tell.
-fn change(session: &mut Session, command: nmt::Command, node: NodeId, wanted: State) -> Result<(), Failure> {
-    send(&mut session.network, command, Some(node))?;
+fn change(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
     let time = session.options.timeout().max(Duration::from_millis(1500));
-    let state = Heartbeat::wait(&mut session.network, node, time, |state| state == wanted)?;
+    let state = master::change(&mut session.network, command, node, time)?;
     session.print(&Done { node: node.get(), state: state.map(heartbeat::words) })
 }
 

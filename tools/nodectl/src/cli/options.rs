@@ -44,7 +44,7 @@ pub struct Options {
 impl Options {
     /// For transfers.
     pub(super) fn sdo(&self) -> sdo::Options {
-        sdo::Options { timeout: self.timeout(), retries: self.retries }
+        sdo::Options { timeout: self.timeout(), retries: self.retries, ..sdo::Options::default() }
     }
 
     /// How long to wait for an answer.

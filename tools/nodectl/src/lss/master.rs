@@ -1,14 +1,12 @@
 //! The services of the master.
 
-use canopen::lss::{BitRate, Identity, Part, Request, Response};
-use canopen::{Duration, Frame, NodeId};
+use canopen::client::Service;
+use canopen::client::lss::{self, Fastscan, Options};
+use canopen::lss::{BitRate, Identity, Part};
+use canopen::{Duration, NodeId};
 
-use super::{Error, fastscan};
+use super::Error;
 use crate::Network;
-
-/// CAN-IDs (CiA 305, 5.1).
-const REQUEST: u16 = 0x7E5;
-const RESPONSE: u16 = 0x7E4;
 
 /// The slaves that the services are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,13 +20,13 @@ pub enum Selection {
 /// The LSS master.
 pub struct Master<'n> {
     network: &'n mut Network,
-    timeout: Duration,
+    options: Options,
 }
 
 impl<'n> Master<'n> {
-    /// A master that waits this long for answers.
+    /// A master that waits this long for answers, and asks again as often as is usual.
     pub fn new(network: &'n mut Network, timeout: Duration) -> Master<'n> {
-        Master { network, timeout }
+        Master { network, options: Options { timeout, ..Options::default() } }
     }
 
     /// Brings slaves into the state configuration.
@@ -38,18 +36,9 @@ impl<'n> Master<'n> {
     pub fn select(&mut self, selection: Selection) -> Result<(), Error> {
         self.release()?;
         match selection {
-            Selection::All => self.send(Request::SwitchGlobal { configuration: true }),
-            Selection::One(identity) => self.select_one(&identity),
+            Selection::All => Ok(self.network.send(&lss::switch_global(true))?),
+            Selection::One(identity) => self.run(lss::select(&identity, self.options)),
         }
-    }
-
-    fn select_one(&mut self, identity: &Identity) -> Result<(), Error> {
-        let [vendor, product, revision, serial] =
-            Part::ALL.map(|part| Request::Select(part, identity.part(part)));
-        for request in [vendor, product, revision] {
-            self.send(request)?;
-        }
-        self.ask("select", serial, |response| (response == Response::Selected).then_some(()))
     }
 
     /// Brings all slaves back into the state waiting. Those that have got a node-ID boot with it.
@@ -57,7 +46,7 @@ impl<'n> Master<'n> {
     /// # Errors
     /// The bus is lost.
     pub fn release(&mut self) -> Result<(), Error> {
-        self.send(Request::SwitchGlobal { configuration: false })
+        Ok(self.network.send(&lss::switch_global(false))?)
     }
 
     /// The identity of the selected slave.
@@ -67,10 +56,7 @@ impl<'n> Master<'n> {
     pub fn identity(&mut self) -> Result<Identity, Error> {
         let mut words = [0; 4];
         for (word, asked) in words.iter_mut().zip(Part::ALL) {
-            *word = self.ask("inquire", Request::Inquire(asked), |response| match response {
-                Response::Identity(part, value) if part == asked => Some(value),
-                _ => None,
-            })?;
+            *word = self.run(lss::inquire(asked, self.options))?;
         }
         let [vendor, product, revision, serial] = words;
         Ok(Identity { vendor, product, revision, serial })
@@ -81,10 +67,7 @@ impl<'n> Master<'n> {
     /// # Errors
     /// No answer, or the bus is lost.
     pub fn node_id(&mut self) -> Result<Option<NodeId>, Error> {
-        self.ask("inquire", Request::InquireNodeId, |response| match response {
-            Response::NodeIdIs(id) => Some(NodeId::new(id)),
-            _ => None,
-        })
+        self.run(lss::inquire_node_id(self.options))
     }
 
     /// Gives the selected slave a node-ID, or takes it away.
@@ -92,11 +75,7 @@ impl<'n> Master<'n> {
     /// # Errors
     /// It is refused, no answer, or the bus is lost.
     pub fn set_node_id(&mut self, node_id: Option<NodeId>) -> Result<(), Error> {
-        let request = Request::NodeId(node_id.map_or(u8::MAX, NodeId::get));
-        self.command("node-ID", request, |response| match response {
-            Response::NodeId(code) => Some(code),
-            _ => None,
-        })
+        self.run(lss::set_node_id(node_id, self.options))
     }
 
     /// Gives the selected slave a bit rate, for [`activate`](Master::activate) or its next start.
@@ -104,11 +83,7 @@ impl<'n> Master<'n> {
     /// # Errors
     /// It is refused, no answer, or the bus is lost.
     pub fn set_bit_rate(&mut self, bit_rate: BitRate) -> Result<(), Error> {
-        let request = Request::BitTiming { table: 0, index: bit_rate.index() };
-        self.command("bit rate", request, |response| match response {
-            Response::BitTiming(code) => Some(code),
-            _ => None,
-        })
+        self.run(lss::set_bit_rate(bit_rate, self.options))
     }
 
     /// Makes the selected slave keep its configuration.
@@ -116,10 +91,7 @@ impl<'n> Master<'n> {
     /// # Errors
     /// It is refused, no answer, or the bus is lost.
     pub fn store(&mut self) -> Result<(), Error> {
-        self.command("store", Request::Store, |response| match response {
-            Response::Stored(code) => Some(code),
-            _ => None,
-        })
+        self.run(lss::store(self.options))
     }
 
     /// Makes the selected slaves change to their new bit rate, `delay` ms from now; they are silent for twice that time.
@@ -128,61 +100,19 @@ impl<'n> Master<'n> {
     /// # Errors
     /// The bus is lost.
     pub fn activate(&mut self, delay: u16) -> Result<(), Error> {
-        self.send(Request::Activate { delay })
+        Ok(self.network.send(&lss::activate_bit_rate(delay))?)
     }
 
-    /// Finds a slave without a node-ID, and selects it; `None` when there is none. It takes 133 times the time-out.
+    /// Finds a slave without a node-ID, and selects it; `None` when there is none. It takes up to 133 times the time-out.
     ///
     /// # Errors
     /// The bus is lost, or a slave that answered before does no more.
     pub fn fastscan(&mut self) -> Result<Option<Identity>, Error> {
-        fastscan::scan(|request| self.is_answered(request))
+        self.run(Fastscan::new(self.options))
     }
 
-    /// Whether some slave matches. It takes the whole time, answered or not: all that match answer, one after the other,
-    /// and a late answer would count for the next step.
-    fn is_answered(&mut self, request: Request) -> Result<bool, Error> {
-        self.send(request)?;
-        let until = self.network.now() + self.timeout;
-        let mut is_answered = false;
-        self.network.wait(until, |frame| {
-            is_answered |= response(frame) == Some(Response::Identified);
-            None::<()>
-        })?;
-        Ok(is_answered)
+    /// Runs a service that has an answer.
+    fn run<T>(&mut self, mut service: impl Service<Output = Result<T, lss::Error>>) -> Result<T, Error> {
+        Ok(self.network.run(&mut service)??)
     }
-
-    fn command(
-        &mut self,
-        service: &'static str,
-        request: Request,
-        code: impl FnMut(Response) -> Option<u8>,
-    ) -> Result<(), Error> {
-        match self.ask(service, request, code)? {
-            0 => Ok(()),
-            code => Err(Error::Refused { service, code }),
-        }
-    }
-
-    fn ask<T>(
-        &mut self,
-        service: &'static str,
-        request: Request,
-        mut fits: impl FnMut(Response) -> Option<T>,
-    ) -> Result<T, Error> {
-        self.send(request)?;
-        let until = self.network.now() + self.timeout;
-        let answer = self.network.wait(until, |frame| response(frame).and_then(&mut fits))?;
-        answer.ok_or(Error::NoAnswer { service })
-    }
-
-    fn send(&mut self, request: Request) -> Result<(), Error> {
-        let Some(frame) = Frame::new(REQUEST, &request.encode()) else { return Ok(()) };
-        Ok(self.network.send(&frame)?)
-    }
-}
-
-fn response(frame: &Frame) -> Option<Response> {
-    let data = frame.data().try_into().ok().filter(|_| frame.id() == RESPONSE)?;
-    Response::parse(data)
 }

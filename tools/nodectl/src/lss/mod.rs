@@ -1,8 +1,8 @@
-//! The LSS master (CiA 305), with the messages of crate `canopen`.
+//! The LSS master of crate `canopen` on an open bus (CiA 305).
 
 mod error;
-mod fastscan;
 mod master;
 
+pub use canopen::client::lss::Options;
 pub use error::Error;
 pub use master::{Master, Selection};

@@ -1,27 +1,16 @@
 //! The client of one node.
 
+use canopen::client::Service;
+use canopen::client::sdo::{self, BlockDownload, BlockUpload, Download, Upload};
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
 
-use super::channel::Channel;
-use super::{Cause, Error, block_download, block_upload, segmented};
+use super::memory::Memory;
+use super::{Cause, Error, Options};
 use crate::network::Network;
 
-/// How patient a client is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// How long the server may take to answer a request.
-    pub timeout: Duration,
-    /// How often a transfer that got no answer, or one that does not fit, is begun anew.
-    pub retries: u8,
-}
-
-impl Default for Options {
-    /// A second, and one retry.
-    fn default() -> Options {
-        Options { timeout: Duration::from_millis(1000), retries: 1 }
-    }
-}
+/// A segment and its answer at 10 kbit/s.
+const SEGMENT: Duration = Duration::from_millis(30);
 
 /// The SDO client of one node.
 pub struct Client<'n> {
@@ -41,7 +30,9 @@ impl<'n> Client<'n> {
     /// # Errors
     /// The node, the object and the reason.
     pub fn upload(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
-        self.transfer(at, |channel| segmented::upload(channel, at))
+        let mut upload = Upload::new(self.node, at, Memory::default(), self.options);
+        self.run(at, &mut upload, |_| ())?;
+        Ok(upload.into_sink().0)
     }
 
     /// Writes an object: up to four bytes expedited, else segmented. `progress` is told the bytes that have arrived.
@@ -52,9 +43,11 @@ impl<'n> Client<'n> {
         &mut self,
         at: Multiplexer,
         value: &[u8],
-        mut progress: impl FnMut(usize),
+        progress: impl FnMut(usize),
     ) -> Result<(), Error> {
-        self.transfer(at, |channel| segmented::download(channel, at, value, &mut progress))
+        let mut progress = news(progress);
+        let mut download = Download::new(self.node, at, value, self.patience(value));
+        self.run(at, &mut download, |download| progress(download.transferred()))
     }
 
     /// Reads an object in blocks.
@@ -62,12 +55,14 @@ impl<'n> Client<'n> {
     /// # Errors
     /// The node, the object and the reason.
     pub fn block_upload(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
-        self.transfer(at, |channel| block_upload::upload(channel, at))
+        let mut upload = BlockUpload::new(self.node, at, Memory::default(), self.options);
+        self.run(at, &mut upload, |_| ())?;
+        Ok(upload.into_sink().0)
     }
 
     /// Writes an object in blocks. `progress` is told the bytes that have arrived.
     ///
-    /// No bytes at all go out segmented: a block has at least one.
+    /// No bytes at all go out segmented: not every server takes a block without data.
     ///
     /// # Errors
     /// The node, the object and the reason.
@@ -75,36 +70,39 @@ impl<'n> Client<'n> {
         &mut self,
         at: Multiplexer,
         value: &[u8],
-        mut progress: impl FnMut(usize),
+        progress: impl FnMut(usize),
     ) -> Result<(), Error> {
         if value.is_empty() {
             return self.download(at, value, progress);
         }
-        self.transfer(at, |channel| block_download::download(channel, at, value, &mut progress))
+        let mut progress = news(progress);
+        let mut download = BlockDownload::new(self.node, at, value, self.patience(value));
+        self.run(at, &mut download, |download| progress(download.transferred()))
     }
 
-    /// Does a transfer, again when there was no answer, and gives it up in good form when it fails.
-    fn transfer<T>(
-        &mut self,
-        at: Multiplexer,
-        mut attempt: impl FnMut(&mut Channel) -> Result<T, Cause>,
-    ) -> Result<T, Error> {
-        let mut channel = Channel::new(self.network, self.node, self.options.timeout);
-        let mut retries = self.options.retries;
-        loop {
-            let cause = match attempt(&mut channel) {
-                Ok(value) => return Ok(value),
-                Err(cause) => cause,
-            };
-            if let Some(abort) = cause.abort() {
-                channel.give_up(at, abort);
-            }
-            // A server that was left in the middle of a block takes the next request for a segment of it. It has been
-            // told now.
-            if retries == 0 || !matches!(cause, Cause::NoAnswer | Cause::Unexpected) {
-                return Err(Error { node: self.node, at, name: None, cause });
-            }
-            retries -= 1;
+    /// What takes long to write may take long: a segment in a frame of its own, and its answer, on the slowest bus.
+    fn patience(&self, value: &[u8]) -> Options {
+        let segments = u64::try_from(value.len() / 7).unwrap_or(u64::MAX);
+        let limit = Duration(self.options.limit.0.saturating_add(segments.saturating_mul(SEGMENT.0)));
+        Options { limit, ..self.options }
+    }
+
+    fn run<S>(&mut self, at: Multiplexer, service: &mut S, progress: impl FnMut(&S)) -> Result<(), Error>
+    where
+        S: Service<Output = Result<(), sdo::Error>>,
+    {
+        let result = self.network.run_with(service, progress);
+        let result = result.map_err(Cause::from).and_then(|result| result.map_err(Cause::from));
+        result.map_err(|cause| Error { node: self.node, at, name: None, cause })
+    }
+}
+
+/// Tells only what is new.
+fn news(mut tell: impl FnMut(usize)) -> impl FnMut(usize) {
+    let mut told = 0;
+    move |done| {
+        if std::mem::replace(&mut told, done) != done {
+            tell(done);
         }
     }
 }

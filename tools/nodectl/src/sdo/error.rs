@@ -3,7 +3,8 @@
 use std::fmt;
 
 use canopen::NodeId;
-use canopen::sdo::{Abort, Multiplexer};
+use canopen::client::sdo;
+use canopen::sdo::Multiplexer;
 use thiserror::Error;
 
 use super::AbortCode;
@@ -27,33 +28,12 @@ pub struct Error {
 /// Why a transfer failed.
 #[derive(Debug, Error)]
 pub enum Cause {
-    /// The server refused or gave up.
-    #[error("{0}")]
-    Abort(AbortCode),
-    /// The server said nothing in time.
-    #[error("no answer")]
-    NoAnswer,
-    /// The server said what the protocol does not allow here.
-    #[error("the node answers against the protocol")]
-    Unexpected,
-    /// A block upload arrived with another CRC.
-    #[error("the data arrived with a CRC error")]
-    Crc,
+    /// The transfer itself.
+    #[error(transparent)]
+    Transfer(#[from] sdo::Error),
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-}
-
-impl Cause {
-    /// What the client tells the server when it gives up; `None` where the server knows or nobody hears it.
-    pub(super) fn abort(&self) -> Option<Abort> {
-        match self {
-            Cause::Abort(_) | Cause::Bus(_) => None,
-            Cause::NoAnswer => Some(Abort::TimeOut),
-            Cause::Unexpected => Some(Abort::Command),
-            Cause::Crc => Some(Abort::Crc),
-        }
-    }
 }
 
 impl Error {
@@ -61,7 +41,7 @@ impl Error {
     #[must_use]
     pub fn abort(&self) -> Option<AbortCode> {
         match self.cause {
-            Cause::Abort(code) => Some(code),
+            Cause::Transfer(sdo::Error::Abort(code)) => Some(code),
             _ => None,
         }
     }
@@ -75,7 +55,7 @@ impl Error {
     /// Whether the node or the bus was not there: later it may work.
     #[must_use]
     pub fn is_silence(&self) -> bool {
-        matches!(self.cause, Cause::NoAnswer | Cause::Bus(BusError::Lost(_)))
+        matches!(self.cause, Cause::Transfer(sdo::Error::NoAnswer) | Cause::Bus(BusError::Lost(_)))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The objects of the program (CiA 302-3): 1F50h, 1F51h, 1F56h, 1F57h, each at sub-index 1.
 
 use canopen::NodeId;
+use canopen::client::sdo;
 use canopen::sdo::Multiplexer;
 
 use super::Status;
@@ -85,7 +86,7 @@ impl<'n> Program<'n> {
     pub fn restart(&mut self, command: Command) -> Result<(), Error> {
         let once = Options { retries: 0, ..self.options };
         match self.client(once).download(CONTROL, &[command as u8], |_| ()) {
-            Err(Error { cause: Cause::NoAnswer, .. }) => Ok(()),
+            Err(Error { cause: Cause::Transfer(sdo::Error::NoAnswer), .. }) => Ok(()),
             result => result.map_err(named),
         }
     }

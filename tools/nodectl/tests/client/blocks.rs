@@ -1,5 +1,6 @@
 //! Block transfers of a large domain, on good and bad lines.
 
+use canopen::client::sdo;
 use canopen::{Duration, Frame};
 use nodectl::object::at;
 use nodectl::sdo::{Cause, Client};
@@ -117,7 +118,7 @@ fn an_upload_that_was_changed_on_the_way_is_a_crc_error() {
         _ => Fate::Arrives,
     });
     let error = client(&mut network, 3).block_upload(object).unwrap_err();
-    assert!(matches!(error.cause, Cause::Crc), "{error}");
+    assert!(matches!(error.cause, Cause::Transfer(sdo::Error::Crc)), "{error}");
     wire.disturb(|_| Fate::Arrives);
     assert_eq!(client(&mut network, 3).block_upload(object).unwrap(), value(100));
 }

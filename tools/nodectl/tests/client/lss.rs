@@ -1,5 +1,6 @@
 //! The LSS master with real nodes.
 
+use canopen::client::lss as service;
 use canopen::lss::{BitRate, Identity};
 use canopen::{Duration, NodeId};
 use nodectl::lss::{Error, Master, Selection};
@@ -67,5 +68,5 @@ fn what_is_not_selected_does_not_answer() {
     let mut network = Wire::new(Pressure::new(5)).network();
     let mut master = master(&mut network);
     master.release().unwrap();
-    assert!(matches!(master.node_id(), Err(Error::NoAnswer { .. })));
+    assert!(matches!(master.node_id(), Err(Error::Service(service::Error::NoAnswer(_)))));
 }

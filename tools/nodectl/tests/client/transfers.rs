@@ -1,6 +1,7 @@
 //! Expedited and segmented transfers with the real node, on good and bad lines.
 
 use canopen::Duration;
+use canopen::client::sdo;
 use nodectl::object::at;
 use nodectl::sdo::{AbortCode, Cause};
 
@@ -46,7 +47,7 @@ fn nobody_answers() {
     let mut network = Wire::new(Pressure::new(5)).network();
     let start = network.now();
     let error = client(&mut network, 6).upload(at(0x1000, 0)).unwrap_err();
-    assert!(matches!(error.cause, Cause::NoAnswer) && error.is_silence());
+    assert!(matches!(error.cause, Cause::Transfer(sdo::Error::NoAnswer)) && error.is_silence());
     assert_eq!(error.to_string(), "node 6, 1000h:0: no answer");
     // Two attempts of half a second each.
     let waited = network.now().0 - start.0;

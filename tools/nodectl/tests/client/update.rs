@@ -52,7 +52,7 @@ const OLD: Version = Version { major: 1, minor: 0, patch: 0 };
 const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
 
 fn options() -> Options {
-    let sdo = sdo::Options { timeout: Duration::from_millis(500), retries: 1 };
+    let sdo = sdo::Options { timeout: Duration::from_millis(500), ..sdo::Options::default() };
     Options { sdo, patience: Duration::from_millis(20_000), force: false }
 }
 

@@ -107,8 +107,9 @@ impl<S: Station> Bus for Wire<S> {
     }
 }
 
-/// A client with the usual patience.
+/// A client with the usual patience for an answer, and with time for many of them.
 pub(crate) fn client(network: &mut Network, node: u8) -> Client<'_> {
-    let options = Options { timeout: Duration::from_millis(500), retries: 1 };
+    let (timeout, limit) = (Duration::from_millis(500), Duration::from_millis(60_000));
+    let options = Options { timeout, limit, ..Options::default() };
     Client::new(network, NodeId::new(node).expect("a node-ID"), options)
 }

@@ -1,0 +1,176 @@
+//! Heartbeats and boot-up messages of other nodes (CiA 301, 7.2.8.2.2 and 7.2.8.3.2).
+
+use super::service::later;
+use crate::nmt::State;
+use crate::{Duration, Frame, Instant, NodeId};
+
+/// A heartbeat. A boot-up message has the state [`State::Initialising`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heartbeat {
+    /// The node that sent it.
+    pub node: NodeId,
+    /// The state of the node.
+    pub state: State,
+}
+
+impl Heartbeat {
+    /// `None` for any other frame. A toggle bit, which node guarding has and heartbeats do not, makes it another.
+    #[must_use]
+    pub fn parse(frame: &Frame) -> Option<Heartbeat> {
+        let &[code] = frame.data() else { return None };
+        let node = u8::try_from(frame.id().checked_sub(0x700)?).ok().and_then(NodeId::new)?;
+        let states = [State::Initialising, State::Stopped, State::Operational, State::PreOperational];
+        let state = states.into_iter().find(|state| state.code() == code)?;
+        Some(Heartbeat { node, state })
+    }
+}
+
+/// What the supervision of a node has found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// The node has booted up.
+    BootUp(NodeId),
+    /// The node is in another state than before, or is heard of for the first time.
+    State(NodeId, State),
+    /// The heartbeat of the node has not come in time.
+    Lost(NodeId),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Watched {
+    node: NodeId,
+    /// In which a heartbeat has to come.
+    time: Duration,
+    /// `NEVER` before the first heartbeat and after a missing one.
+    due: Instant,
+    /// The newest state; `None` before the first heartbeat and after a missing one.
+    state: Option<State>,
+}
+
+/// Supervises the heartbeats of up to `N` nodes. Each is supervised from its first heartbeat on.
+///
+/// ```
+/// use canopen::client::heartbeat::{Event, Supervisor};
+/// use canopen::nmt::State;
+/// use canopen::{Duration, Frame, Instant, NodeId};
+///
+/// let node = NodeId::new(5).ok_or("a node-ID")?;
+/// let mut supervisor = Supervisor::<4>::new();
+/// assert!(supervisor.watch(node, Duration::from_millis(1500)));
+/// let heartbeat = Frame::new(0x705, &[0x05]).ok_or("a frame")?;
+/// let event = supervisor.on_frame(&heartbeat, Instant(0));
+/// assert_eq!(event, Some(Event::State(node, State::Operational)));
+/// assert_eq!(supervisor.due(), Instant(1_500_000));
+/// assert_eq!(supervisor.expire(Instant(1_500_000)), Some(Event::Lost(node)));
+/// assert_eq!(supervisor.state(node), None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Supervisor<const N: usize> {
+    nodes: [Option<Watched>; N],
+}
+
+impl<const N: usize> Default for Supervisor<N> {
+    fn default() -> Supervisor<N> {
+        Supervisor::new()
+    }
+}
+
+impl<const N: usize> Supervisor<N> {
+    /// Supervises nothing yet.
+    #[must_use]
+    pub const fn new() -> Supervisor<N> {
+        Supervisor { nodes: [None; N] }
+    }
+
+    /// Supervises a node from now on: a heartbeat has to come within this time after the one before, which is to be
+    /// longer than the period of the producer (1017h). `false` when `N` others are supervised already.
+    pub fn watch(&mut self, node: NodeId, time: Duration) -> bool {
+        self.forget(node);
+        let Some(free) = self.nodes.iter_mut().find(|entry| entry.is_none()) else { return false };
+        *free = Some(Watched { node, time, due: Instant::NEVER, state: None });
+        true
+    }
+
+    /// Supervises a node no longer.
+    pub fn forget(&mut self, node: NodeId) {
+        for entry in &mut self.nodes {
+            if entry.is_some_and(|watched| watched.node == node) {
+                *entry = None;
+            }
+        }
+    }
+
+    /// The newest state of a node; `None` for one that is not supervised or not alive.
+    #[must_use]
+    pub fn state(&self, node: NodeId) -> Option<State> {
+        self.nodes.iter().flatten().find(|watched| watched.node == node)?.state
+    }
+
+    /// Takes a frame from the bus. A heartbeat that brings nothing new is no event.
+    pub fn on_frame(&mut self, frame: &Frame, now: Instant) -> Option<Event> {
+        let heard = Heartbeat::parse(frame)?;
+        let watched = self.nodes.iter_mut().flatten().find(|watched| watched.node == heard.node)?;
+        watched.due = later(now, watched.time);
+        let before = watched.state.replace(heard.state);
+        match heard.state {
+            State::Initialising => Some(Event::BootUp(heard.node)),
+            state => (before != Some(state)).then_some(Event::State(heard.node, state)),
+        }
+    }
+
+    /// The next instant at which a heartbeat is missing.
+    #[must_use]
+    pub fn due(&self) -> Instant {
+        self.nodes.iter().flatten().fold(Instant::NEVER, |due, watched| due.min(watched.due))
+    }
+
+    /// A node whose heartbeat is missing. To be asked until there is none.
+    pub fn expire(&mut self, now: Instant) -> Option<Event> {
+        let is_late = |watched: &&mut Watched| watched.due != Instant::NEVER && now >= watched.due;
+        let watched = self.nodes.iter_mut().flatten().find(is_late)?;
+        (watched.due, watched.state) = (Instant::NEVER, None);
+        Some(Event::Lost(watched.node))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heartbeat_is_one_byte_that_names_a_state() {
+        let parse = |id, data: &[u8]| Heartbeat::parse(&Frame::new(id, data).unwrap());
+        let node = NodeId::new(5).unwrap();
+        assert_eq!(parse(0x705, &[5]), Some(Heartbeat { node, state: State::Operational }));
+        assert_eq!(parse(0x705, &[0]), Some(Heartbeat { node, state: State::Initialising }));
+        for (id, data) in
+            [(0x700, &[5][..]), (0x705, &[9]), (0x705, &[]), (0x705, &[5, 5]), (0x785, &[5]), (0x585, &[5])]
+        {
+            assert_eq!(parse(id, data), None, "{id:X} {data:?}");
+        }
+    }
+
+    #[test]
+    fn a_supervisor_tells_what_is_new_and_what_is_missing() {
+        let [a, b, c] = [5, 6, 7].map(|id| NodeId::new(id).unwrap());
+        let mut supervisor = Supervisor::<2>::new();
+        assert!(supervisor.watch(a, Duration(100)) && supervisor.watch(b, Duration(200)));
+        assert!(!supervisor.watch(c, Duration(100)));
+        let mut heard = |node: NodeId, code, now| {
+            let frame = Frame::new(0x700 + u16::from(node.get()), &[code]).unwrap();
+            supervisor.on_frame(&frame, Instant(now))
+        };
+        assert_eq!(heard(a, 0, 0), Some(Event::BootUp(a)));
+        assert_eq!(heard(a, 0x7F, 10), Some(Event::State(a, State::PreOperational)));
+        assert_eq!(heard(a, 0x7F, 20), None);
+        assert_eq!(heard(b, 5, 20), Some(Event::State(b, State::Operational)));
+        assert_eq!(heard(c, 5, 20), None);
+        assert_eq!((supervisor.due(), supervisor.expire(Instant(119))), (Instant(120), None));
+        assert_eq!(supervisor.expire(Instant(250)), Some(Event::Lost(a)));
+        assert_eq!(supervisor.expire(Instant(250)), Some(Event::Lost(b)));
+        assert_eq!((supervisor.expire(Instant(250)), supervisor.due()), (None, Instant::NEVER));
+        supervisor.forget(a);
+        assert!(supervisor.watch(c, Duration(100)));
+    }
+}

@@ -1,0 +1,144 @@
+//! Fastscan (CiA 305, 6.6): the identity of a slave without a node-ID, bit by bit.
+
+use super::{Error, Name, Options, frame, response, switch_global};
+use crate::client::service::later;
+use crate::client::{Service, Step, Taken};
+use crate::lss::{Identity, Request, Response};
+use crate::{Duration, Frame, Instant};
+
+/// Finds one slave that has no node-ID and leaves it in the state configuration. The output is `None` when there is none.
+///
+/// All slaves that match a question answer it with the same frame, so any number of them may be there. Silence means a
+/// bit of 1. A question takes the whole time-out, or a quarter of it after the last answer: other slaves may answer a
+/// little later. A lost answer makes the identity wrong, which the question after each part of it finds out: the search then
+/// begins anew, as often as the options say.
+#[derive(Clone, Copy, Debug)]
+pub struct Fastscan {
+    options: Options,
+    question: Question,
+    /// The parts of the identity as far as they are known.
+    found: [u32; 4],
+    /// When the question is over; `None` before it is sent.
+    until: Option<Instant>,
+    /// When the question is over however many answers still come.
+    latest: Instant,
+    is_answered: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Question {
+    /// All slaves back to the state waiting, before another attempt. It has no answer.
+    Release,
+    /// Is there anybody?
+    Anybody,
+    /// Is this bit of this part 0?
+    Bit(u8, u8),
+    /// Is this part right?
+    Part(u8),
+    Over(Result<Option<Identity>, Error>),
+}
+
+impl Fastscan {
+    /// Questions of a search that finds a slave: whether there is any, and for each part its bits and whether it is right.
+    pub const QUESTIONS: u8 = 1 + 4 * 33;
+
+    /// A search with these time-outs.
+    #[must_use]
+    pub const fn new(options: Options) -> Fastscan {
+        let question = Question::Anybody;
+        Fastscan { options, question, found: [0; 4], until: None, latest: Instant::NEVER, is_answered: false }
+    }
+
+    /// How many questions have been asked, of [`QUESTIONS`](Fastscan::QUESTIONS).
+    #[must_use]
+    pub const fn asked(&self) -> u8 {
+        match self.question {
+            Question::Release | Question::Anybody => 0,
+            Question::Bit(part, bit) => 1 + (part & 3) * 33 + (31 - (bit & 31)),
+            Question::Part(part) => 1 + (part & 3) * 33 + 32,
+            Question::Over(_) => Fastscan::QUESTIONS,
+        }
+    }
+
+    fn part(&self, part: u8) -> u32 {
+        self.found.get(usize::from(part)).copied().unwrap_or(0)
+    }
+
+    /// The frame of the question; `None` at the end.
+    fn request(&self) -> Option<Frame> {
+        let fastscan = |value, bit, part, next| Some(frame(Request::Fastscan { value, bit, part, next }));
+        match self.question {
+            Question::Release => Some(switch_global(false)),
+            Question::Anybody => fastscan(0, Request::CONFIRM, 0, 0),
+            Question::Bit(part, bit) => fastscan(self.part(part), bit, part, part),
+            // The slave goes on to the next part, and after the last it is selected.
+            Question::Part(part) => fastscan(self.part(part), 0, part, (part + 1) % 4),
+            Question::Over(_) => None,
+        }
+    }
+
+    /// What follows from the answer, or from the silence.
+    fn following(&mut self) -> Question {
+        match (self.question, self.is_answered) {
+            (Question::Release, _) => Question::Anybody,
+            (Question::Anybody, true) => {
+                self.found = [0; 4];
+                Question::Bit(0, 31)
+            }
+            (Question::Anybody, false) => self.again(Question::Anybody, Ok(None)),
+            (Question::Bit(part, bit), is_zero) => self.learn(part, bit, is_zero),
+            (Question::Part(3), true) => Question::Over(Ok(Some(self.identity()))),
+            (Question::Part(part), true) => Question::Bit(part + 1, 31),
+            (Question::Part(_), false) => self.again(Question::Release, Err(Error::NoAnswer(Name::Fastscan))),
+            (over, _) => over,
+        }
+    }
+
+    fn learn(&mut self, part: u8, bit: u8, is_zero: bool) -> Question {
+        if let Some(found) = self.found.get_mut(usize::from(part)).filter(|_| !is_zero) {
+            *found |= 1 << (bit & 31);
+        }
+        bit.checked_sub(1).map_or(Question::Part(part), |next| Question::Bit(part, next))
+    }
+
+    fn again(&mut self, question: Question, otherwise: Result<Option<Identity>, Error>) -> Question {
+        let Some(retries) = self.options.retries.checked_sub(1) else { return Question::Over(otherwise) };
+        self.options.retries = retries;
+        question
+    }
+
+    fn identity(&self) -> Identity {
+        let [vendor, product, revision, serial] = self.found;
+        Identity { vendor, product, revision, serial }
+    }
+}
+
+impl Service for Fastscan {
+    type Output = Result<Option<Identity>, Error>;
+
+    fn next(&mut self, now: Instant) -> Step<Result<Option<Identity>, Error>> {
+        match self.until {
+            Some(until) if now < until => return Step::Wait(until),
+            Some(_) => self.question = self.following(),
+            None => (),
+        }
+        if let Question::Over(result) = self.question {
+            self.until = None;
+            return Step::Done(result);
+        }
+        let Some(request) = self.request() else { return Step::Wait(now) };
+        self.is_answered = false;
+        let until = later(now, self.options.timeout);
+        (self.until, self.latest) = (Some(until), later(until, self.options.timeout));
+        Step::Send(request)
+    }
+
+    fn on_frame(&mut self, frame: &Frame, now: Instant) -> Taken {
+        if self.until.is_none() || response(frame) != Some(Response::Identified) {
+            return Taken::Ignored;
+        }
+        self.is_answered = true;
+        self.until = Some(self.latest.min(later(now, Duration(self.options.timeout.0 / 4))));
+        Taken::Used
+    }
+}

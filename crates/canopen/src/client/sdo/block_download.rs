@@ -1,0 +1,116 @@
+//! Block download (CiA 301, 7.2.4.3.9 to 11): up to 127 segments before the server answers.
+
+use super::link::Link;
+use super::transfer::{self, Progress, Transfer};
+use super::{BlockDownload, Error, Options};
+use crate::sdo::{BlockEnd, BlockSegment, BlockSize, Bytes, Multiplexer, Request, Response, crc};
+use crate::{Instant, NodeId};
+
+/// So many blocks in a row of which nothing arrives, and the transfer has failed.
+const FUTILE: u8 = 3;
+
+/// A block download under way.
+#[derive(Debug)]
+pub struct Protocol<'a> {
+    data: &'a [u8],
+    /// Bytes that the server has acknowledged: where the block begins.
+    done: usize,
+    phase: Phase,
+    /// Blocks in a row of which nothing has arrived.
+    futile: u8,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    /// The server has not said how long a block may be.
+    Begin,
+    Block {
+        size: BlockSize,
+        /// Segments of this block that have been handed over.
+        sent: u8,
+    },
+    /// All has arrived; the server has not said that it is good.
+    End,
+}
+
+impl<'a> BlockDownload<'a> {
+    /// Writes an object of a node. No data at all is one segment that has none.
+    #[must_use]
+    pub fn new(node: NodeId, at: Multiplexer, data: &'a [u8], options: Options) -> BlockDownload<'a> {
+        Transfer::with(Protocol { data, done: 0, phase: Phase::Begin, futile: 0 }, node, at, options)
+    }
+}
+
+impl Protocol<'_> {
+    /// What comes after so many segments of the block.
+    fn rest(&self, sent: u8) -> &[u8] {
+        let offset = self.done.saturating_add(7 * usize::from(sent));
+        self.data.get(offset..).unwrap_or(&[])
+    }
+
+    /// How many segments the block has: as many as there are, up to the size that the server wants.
+    fn len(&self, size: BlockSize) -> u8 {
+        let segments = self.rest(0).len().div_ceil(7).max(1);
+        u8::try_from(segments).map_or(size.get(), |segments| segments.min(size.get()))
+    }
+
+    /// The server has the block up to this segment. What it does not have goes out again, in the next block.
+    fn acknowledge(&mut self, sequence: u8, next: BlockSize, link: &mut Link) -> Result<Progress, Error> {
+        let is_all = 7 * usize::from(sequence) >= self.rest(0).len() && sequence > 0;
+        self.done = self.done.saturating_add(7 * usize::from(sequence)).min(self.data.len());
+        self.futile = if sequence == 0 { self.futile.saturating_add(1) } else { 0 };
+        if self.futile == FUTILE {
+            return Err(Error::Unexpected);
+        }
+        if is_all {
+            let end = BlockEnd::of(self.data.len(), crc::extend(0, self.data));
+            self.phase = Phase::End;
+            link.ask(Request::BlockDownloadEnd(end));
+        } else {
+            self.phase = Phase::Block { size: next, sent: 0 };
+        }
+        Ok(Progress::Goes)
+    }
+}
+
+impl transfer::Protocol for Protocol<'_> {
+    fn begin(&mut self, link: &mut Link) {
+        (self.done, self.phase, self.futile) = (0, Phase::Begin, 0);
+        let size = u32::try_from(self.data.len()).ok();
+        link.begin(Request::BlockDownload { at: link.at, crc: true, size });
+    }
+
+    fn segment(&mut self, link: &mut Link) -> Option<[u8; 8]> {
+        let Phase::Block { size, sent } = self.phase else { return None };
+        let sequence = BlockSize::new(sent.saturating_add(1)).filter(|next| next.get() <= self.len(size))?;
+        let rest = self.rest(sent);
+        let segment =
+            BlockSegment { last: rest.len() <= 7, sequence, data: Bytes::from_slice(rest).padded() };
+        self.phase = Phase::Block { size, sent: sequence.get() };
+        if sequence.get() == self.len(size) {
+            // Two blocks of the same size have the same acknowledgement.
+            link.expect_equal();
+        }
+        Some(segment.encode())
+    }
+
+    fn on_response(&mut self, data: [u8; 8], link: &mut Link, _: Instant) -> Result<Progress, Error> {
+        match (self.phase, Response::parse(data)) {
+            (Phase::Begin, Some(Response::BlockDownload(of, size))) if of == link.at => {
+                self.phase = Phase::Block { size, sent: 0 };
+                Ok(Progress::Goes)
+            }
+            (Phase::Block { size, sent }, Some(Response::BlockAcknowledge(sequence, next)))
+                if sent == self.len(size) && sequence <= sent =>
+            {
+                self.acknowledge(sequence, next, link)
+            }
+            (Phase::End, Some(Response::BlockDownloaded)) => Ok(Progress::Complete),
+            _ => Ok(Progress::Unfit),
+        }
+    }
+
+    fn transferred(&self) -> usize {
+        self.done
+    }
+}

@@ -1,0 +1,130 @@
+//! What all transfers share: the way to the server, what is to be sent, and until when an answer has to come.
+
+use super::{AbortCode, Error, Options};
+use crate::client::service::later;
+use crate::sdo::{Multiplexer, Request, Response};
+use crate::{Duration, Frame, Instant, NodeId};
+
+/// CAN-IDs of the default SDO channel without the node-ID (CiA 301, 7.3.5).
+const TO_SERVER: u16 = 0x600;
+const FROM_SERVER: u16 = 0x580;
+
+/// The way to a server.
+#[derive(Debug)]
+pub struct Link {
+    node: NodeId,
+    /// The object of the transfer.
+    pub(super) at: Multiplexer,
+    pub(super) options: Options,
+    /// What is to be sent next.
+    outgoing: Option<[u8; 8]>,
+    /// The answer that is waited for is the first one of a transfer, and names its object.
+    is_first: bool,
+    /// How long the next answer may take.
+    patience: Duration,
+    answer_by: Instant,
+    /// Something has come since the last request that did not fit.
+    has_unfit: bool,
+    /// The newest frame of the server. One that comes twice in a row counts once.
+    newest: Option<[u8; 8]>,
+}
+
+impl Link {
+    pub(super) fn new(node: NodeId, at: Multiplexer, options: Options) -> Link {
+        Link {
+            node,
+            at,
+            options,
+            outgoing: None,
+            is_first: false,
+            patience: options.timeout,
+            answer_by: Instant::NEVER,
+            has_unfit: false,
+            newest: None,
+        }
+    }
+
+    /// Sends the first request of a transfer.
+    pub(super) fn begin(&mut self, request: Request) {
+        self.newest = None;
+        self.ask(request);
+        self.is_first = true;
+    }
+
+    /// Sends a request. The answer may take the usual time.
+    pub(super) fn ask(&mut self, request: Request) {
+        self.outgoing = Some(request.encode());
+        self.is_first = false;
+        self.has_unfit = false;
+        self.patience = self.options.timeout;
+    }
+
+    /// Tells the server that the transfer is over. It has no answer.
+    pub(super) fn give_up(&mut self, code: AbortCode) {
+        self.outgoing = Some(Request::Abort(self.at, code.0).encode());
+    }
+
+    /// What is to be sent next.
+    pub(super) fn outgoing(&mut self, now: Instant) -> Option<Frame> {
+        let data = self.outgoing.take()?;
+        self.answer_by = later(now, self.patience);
+        Some(self.frame(data))
+    }
+
+    /// A frame to the server. From now on the answer may take the usual time.
+    pub(super) fn segment(&mut self, data: [u8; 8], now: Instant) -> Frame {
+        self.has_unfit = false;
+        self.answer_by = later(now, self.options.timeout);
+        self.frame(data)
+    }
+
+    fn frame(&self, data: [u8; 8]) -> Frame {
+        Frame::data_frame(self.node.service(TO_SERVER), 8, data)
+    }
+
+    /// The next frame of the server has to come within this time.
+    pub(super) fn wait(&mut self, patience: Duration, now: Instant) {
+        self.answer_by = later(now, patience);
+    }
+
+    /// By when the next frame of the server has to come.
+    pub(super) fn answer_by(&self) -> Instant {
+        self.answer_by
+    }
+
+    /// The data of a frame from the server, if it can be an answer: everything that was to be sent has been.
+    pub(super) fn response(&self, frame: &Frame) -> Option<[u8; 8]> {
+        let is_answer = frame.id() == self.node.service(FROM_SERVER).get() && self.outgoing.is_none();
+        frame.full().copied().filter(|_| is_answer)
+    }
+
+    /// Whether a frame is one more copy of the newest.
+    pub(super) fn is_repeated(&mut self, data: [u8; 8]) -> bool {
+        self.newest.replace(data) == Some(data)
+    }
+
+    /// The next frame of the server may be equal to the newest without being a copy of it.
+    pub(super) fn expect_equal(&mut self) {
+        self.newest = None;
+    }
+
+    /// The code of an abort message that is about this transfer. One for another object comes late; a server that does not
+    /// understand a request at all may leave the object 0. Segments of a block have the same bits in their first byte, but
+    /// no sequence number of 0.
+    pub(super) fn refusal(&self, data: [u8; 8]) -> Option<AbortCode> {
+        let Some(Response::Abort(of, code)) = Response::parse(data).filter(|_| data[0] == 0x80) else {
+            return None;
+        };
+        let is_ours = !self.is_first || of == self.at || of == Multiplexer::default();
+        is_ours.then_some(AbortCode(code))
+    }
+
+    pub(super) fn note_unfit(&mut self) {
+        self.has_unfit = true;
+    }
+
+    /// Why there was no answer.
+    pub(super) fn silence(&self) -> Error {
+        if self.has_unfit { Error::Unexpected } else { Error::NoAnswer }
+    }
+}

@@ -1,0 +1,184 @@
+//! What all transfers have in common: the order of things, the time-outs, the retries, the end.
+
+use super::link::Link;
+use super::{Error, Options};
+use crate::client::service::later;
+use crate::client::{Service, Step, Taken};
+use crate::sdo::Multiplexer;
+use crate::{Frame, Instant, NodeId};
+
+/// One kind of transfer: what it sends, and what it makes of the answers.
+pub trait Protocol {
+    /// Begins, perhaps anew.
+    fn begin(&mut self, link: &mut Link);
+
+    /// Takes a frame of the server that is no abort message.
+    ///
+    /// # Errors
+    /// The transfer has failed.
+    fn on_response(&mut self, data: [u8; 8], link: &mut Link, now: Instant) -> Result<Progress, Error>;
+
+    /// The next segment of a block; `None` where there is none to be sent.
+    fn segment(&mut self, _: &mut Link) -> Option<[u8; 8]> {
+        None
+    }
+
+    /// The frame that is waited for has not come in time.
+    ///
+    /// # Errors
+    /// The transfer has failed.
+    fn on_silence(&mut self, link: &mut Link) -> Result<(), Error> {
+        Err(link.silence())
+    }
+
+    /// Bytes that have arrived at the other side.
+    fn transferred(&self) -> usize;
+}
+
+/// What an answer means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// The transfer goes on.
+    Goes,
+    /// The transfer is complete, but for what is still to be sent.
+    Complete,
+    /// The answer does not fit.
+    Unfit,
+}
+
+/// Where the transfer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Nothing has been sent.
+    New,
+    Running,
+    /// The server is told that this attempt is over; then comes another.
+    Again,
+    Over(Result<(), Error>),
+}
+
+/// A transfer of one object between this client and the server of a node.
+///
+/// The kinds are [`Upload`](super::Upload), [`Download`](super::Download), [`BlockUpload`](super::BlockUpload) and
+/// [`BlockDownload`](super::BlockDownload).
+#[derive(Debug)]
+pub struct Transfer<P> {
+    pub(super) protocol: P,
+    link: Link,
+    phase: Phase,
+    /// By then it is over, one way or the other.
+    end: Instant,
+    retries: u8,
+}
+
+impl<P: Protocol> Transfer<P> {
+    pub(super) fn with(protocol: P, node: NodeId, at: Multiplexer, options: Options) -> Transfer<P> {
+        let retries = options.retries;
+        let link = Link::new(node, at, options);
+        Transfer { protocol, link, phase: Phase::New, end: Instant::NEVER, retries }
+    }
+
+    /// How many bytes have arrived at the other side so far. A transfer that is begun anew counts from 0 again.
+    #[must_use]
+    pub fn transferred(&self) -> usize {
+        self.protocol.transferred()
+    }
+
+    /// Gives the transfer up. The next step tells the server.
+    pub fn abort(&mut self) {
+        if !matches!(self.phase, Phase::Over(_)) {
+            self.fail(Error::Cancelled);
+        }
+    }
+
+    fn begin(&mut self) {
+        self.phase = Phase::Running;
+        self.protocol.begin(&mut self.link);
+    }
+
+    fn fail(&mut self, error: Error) {
+        if let Some(code) = error.abort() {
+            self.link.give_up(code);
+        }
+        self.phase = if error.is_worth_a_retry() && self.retries > 0 {
+            self.retries -= 1;
+            Phase::Again
+        } else {
+            Phase::Over(Err(error))
+        };
+    }
+
+    /// Begins where there is something to begin, and ends what has taken too long.
+    fn advance(&mut self, now: Instant) {
+        if self.phase == Phase::New {
+            self.end = later(now, self.link.options.limit);
+            self.begin();
+        }
+        if now >= self.end && !matches!(self.phase, Phase::Over(_)) {
+            self.retries = 0;
+            self.fail(Error::Late);
+        }
+    }
+
+    /// Nothing has come for too long.
+    fn on_silence(&mut self) {
+        if let Err(error) = self.protocol.on_silence(&mut self.link) {
+            self.fail(error);
+        }
+    }
+}
+
+impl<P: Protocol> Service for Transfer<P> {
+    type Output = Result<(), Error>;
+
+    fn next(&mut self, now: Instant) -> Step<Result<(), Error>> {
+        self.advance(now);
+        // Each pass ends here or has something to send: the second one at the latest.
+        loop {
+            if let Some(frame) = self.link.outgoing(now) {
+                return Step::Send(frame);
+            }
+            match self.phase {
+                Phase::Over(result) => return Step::Done(result),
+                Phase::Again | Phase::New => self.begin(),
+                Phase::Running => {
+                    if let Some(data) = self.protocol.segment(&mut self.link) {
+                        return Step::Send(self.link.segment(data, now));
+                    }
+                    if now < self.link.answer_by() {
+                        return Step::Wait(self.link.answer_by().min(self.end));
+                    }
+                    self.on_silence();
+                }
+            }
+        }
+    }
+
+    fn on_frame(&mut self, frame: &Frame, now: Instant) -> Taken {
+        let Some(data) = self.link.response(frame).filter(|_| self.phase == Phase::Running) else {
+            return Taken::Ignored;
+        };
+        if self.link.is_repeated(data) {
+            return Taken::Ignored;
+        }
+        if let Some(code) = self.link.refusal(data) {
+            self.fail(Error::Abort(code));
+            return Taken::Used;
+        }
+        match self.protocol.on_response(data, &mut self.link, now) {
+            Ok(Progress::Goes) => Taken::Used,
+            Ok(Progress::Complete) => {
+                self.phase = Phase::Over(Ok(()));
+                Taken::Used
+            }
+            Ok(Progress::Unfit) => {
+                self.link.note_unfit();
+                Taken::Unfit
+            }
+            Err(error) => {
+                self.fail(error);
+                Taken::Used
+            }
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The master against slaves made of the messages of the protocol.
+
+use std::ops::Range;
+
+use canopen::client::lss::{self, Error, Fastscan, Name, Options};
+use canopen::client::{Service, Step};
+use canopen::lss::{Identity, Part, Request, Response};
+use canopen::{Duration, Frame, Instant, NodeId};
+
+const OPTIONS: Options = Options { timeout: Duration::from_millis(10), retries: 2 };
+
+/// Slaves without a node-ID, known by their identities; answers with these numbers are lost.
+struct Slaves {
+    waiting: Vec<(Identity, u8)>,
+    selected: Option<Identity>,
+    answers: usize,
+    loses: Range<usize>,
+}
+
+impl Slaves {
+    fn new(serials: &[u32], loses: Range<usize>) -> Slaves {
+        let identity = |serial| Identity { vendor: 0x319, product: 2, revision: 0x1_0000, serial };
+        let waiting = serials.iter().map(|&serial| (identity(serial), 0)).collect();
+        Slaves { waiting, selected: None, answers: 0, loses }
+    }
+
+    fn answer(&mut self, frame: &Frame) -> Option<Response> {
+        let request = Request::parse(frame.data().try_into().ok()?)?;
+        let response = self.respond(request)?;
+        self.answers += 1;
+        (!self.loses.contains(&self.answers)).then_some(response)
+    }
+
+    fn respond(&mut self, request: Request) -> Option<Response> {
+        match request {
+            Request::SwitchGlobal { configuration: false } => {
+                self.waiting.extend(self.selected.take().map(|identity| (identity, 0)));
+                None
+            }
+            Request::Fastscan { bit: Request::CONFIRM, .. } => {
+                self.waiting.iter_mut().for_each(|slave| slave.1 = 0);
+                (!self.waiting.is_empty()).then_some(Response::Identified)
+            }
+            Request::Fastscan { value, bit, part, next } => {
+                let mut matches = false;
+                for (identity, turn) in &mut self.waiting {
+                    let own = identity.part(Part::ALL[usize::from(part)]);
+                    if *turn == part && (own ^ value) >> bit == 0 {
+                        (*turn, matches) = (next, true);
+                        if bit == 0 && part == 3 && next == 0 {
+                            self.selected = Some(*identity);
+                        }
+                    }
+                }
+                self.waiting.retain(|(identity, _)| Some(*identity) != self.selected);
+                matches.then_some(Response::Identified)
+            }
+            Request::Inquire(part) => Some(Response::Identity(part, self.selected?.part(part))),
+            Request::NodeId(id) => self.selected.map(|_| Response::NodeId(u8::from(id > 127))),
+            _ => None,
+        }
+    }
+}
+
+fn run<S: Service>(mut service: S, slaves: &mut Slaves) -> S::Output {
+    let (mut now, mut answer) = (Instant(0), None);
+    loop {
+        match service.next(now) {
+            Step::Send(frame) => {
+                assert_eq!((frame.id(), frame.len()), (0x7E5, 8));
+                answer = slaves.answer(&frame);
+            }
+            Step::Wait(until) => match answer.take() {
+                Some(response) => {
+                    service.on_frame(&Frame::new(0x7E4, &response.encode()).unwrap(), now);
+                }
+                None => now = until,
+            },
+            Step::Done(output) => return output,
+        }
+    }
+}
+
+#[test]
+fn fastscan_finds_the_lowest_identity_and_selects_it() {
+    let mut slaves = Slaves::new(&[0xFFFF_FFFF, 7, 0x8000_0000], 0..0);
+    let found = run(Fastscan::new(OPTIONS), &mut slaves).unwrap().unwrap();
+    assert_eq!((found.serial, slaves.selected), (7, Some(found)));
+    assert_eq!(run(lss::inquire(Part::Vendor, OPTIONS), &mut slaves), Ok(0x319));
+    assert_eq!(run(lss::set_node_id(NodeId::new(9), OPTIONS), &mut slaves), Ok(()));
+    let refusal = run(lss::set_node_id(None, OPTIONS), &mut slaves);
+    assert_eq!(refusal, Err(Error::Refused(Name::NodeId, 1)));
+}
+
+#[test]
+fn fastscan_of_nobody_finds_nobody() {
+    assert_eq!(run(Fastscan::new(OPTIONS), &mut Slaves::new(&[], 0..0)), Ok(None));
+}
+
+/// Whichever answer is lost: the identity is right in the end.
+#[test]
+fn a_lost_answer_costs_time_and_nothing_else() {
+    for lost in 1..90 {
+        let mut slaves = Slaves::new(&[0x1234_5678], lost..lost + 1);
+        let found = run(Fastscan::new(OPTIONS), &mut slaves).unwrap().unwrap();
+        assert_eq!((found.serial, slaves.selected), (0x1234_5678, Some(found)), "{lost}");
+    }
+    let mut slaves = Slaves::new(&[7], 1..3);
+    slaves.selected = slaves.waiting.pop().map(|slave| slave.0);
+    assert_eq!(run(lss::inquire(Part::Serial, OPTIONS), &mut slaves), Ok(7));
+}
+
+#[test]
+fn silence_is_told_after_the_retries() {
+    let mut slaves = Slaves::new(&[], 0..0);
+    let error = run(lss::store(OPTIONS), &mut slaves).unwrap_err();
+    assert_eq!((error, error.to_string().as_str()), (Error::NoAnswer(Name::Store), "LSS store: no answer"));
+}
+
+#[test]
+fn a_scan_tells_how_far_it_has_come() {
+    let mut slaves = Slaves::new(&[5], 0..0);
+    let (mut scan, mut now, mut asked) = (Fastscan::new(OPTIONS), Instant(0), vec![]);
+    loop {
+        match scan.next(now) {
+            Step::Send(frame) => {
+                asked.push(scan.asked());
+                if let Some(response) = slaves.answer(&frame) {
+                    scan.on_frame(&Frame::new(0x7E4, &response.encode()).unwrap(), now);
+                }
+            }
+            Step::Wait(until) => now = until,
+            Step::Done(_) => break,
+        }
+    }
+    assert_eq!(asked, (0..Fastscan::QUESTIONS).collect::<Vec<_>>());
+}

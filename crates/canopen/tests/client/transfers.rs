@@ -1,0 +1,191 @@
+//! All transfers of all lengths, and what becomes of frames that are lost, doubled or wrong.
+
+use canopen::Instant;
+use canopen::client::Service;
+use canopen::client::sdo::{AbortCode, BlockDownload, BlockUpload, Buffer, Download, Error, Options, Upload};
+use canopen::sdo::{Abort, BlockSize, Response};
+
+use crate::server::{Device, NODE, OBJECT, Outcome, Server, once, run};
+
+const LENGTHS: [usize; 14] = [0, 1, 4, 5, 7, 8, 14, 28, 29, 888, 889, 890, 1778, 3000];
+
+fn value(len: usize) -> Vec<u8> {
+    (0..len).map(|byte| (byte * 7 % 251) as u8).collect()
+}
+
+fn upload(server: &mut impl Device, options: Options) -> (Outcome, Vec<u8>, Instant) {
+    let mut memory = vec![0; 4000];
+    let mut upload = Upload::new(NODE, OBJECT, Buffer::new(&mut memory), options);
+    let (outcome, end, _) = run(&mut upload, server);
+    (outcome, upload.into_sink().as_slice().to_vec(), end)
+}
+
+fn block_upload(server: &mut impl Device, options: Options) -> (Outcome, Vec<u8>, Instant) {
+    let mut memory = vec![0; 4000];
+    let mut upload = BlockUpload::new(NODE, OBJECT, Buffer::new(&mut memory), options);
+    let (outcome, end, _) = run(&mut upload, server);
+    (outcome, upload.into_sink().as_slice().to_vec(), end)
+}
+
+#[test]
+fn values_of_any_length_both_ways() {
+    for len in LENGTHS {
+        for is_sizeless in [false, true] {
+            let mut server = Server { is_sizeless, ..Server::new(&value(len)) };
+            assert_eq!(upload(&mut server, once()).1, value(len), "{len}");
+            for block_size in [1, 2, 126, 127] {
+                let options = Options { block_size: BlockSize::new(block_size).unwrap(), ..once() };
+                let (outcome, read, _) = block_upload(&mut server, options);
+                assert_eq!((outcome, read == value(len)), (Ok(()), true), "{len} in {block_size}");
+            }
+        }
+        for block_size in [1, 4, 127] {
+            let mut server = Server { block_size, ..Server::new(&[]) };
+            let data = value(len);
+            let mut download = Download::new(NODE, OBJECT, &data, once());
+            assert_eq!(run(&mut download, &mut server).0, Ok(()), "{len}");
+            assert_eq!((server.value == data, download.transferred()), (true, len));
+            server.value.clear();
+            let mut download = BlockDownload::new(NODE, OBJECT, &data, once());
+            assert_eq!(run(&mut download, &mut server).0, Ok(()), "{len} in {block_size}");
+            assert_eq!((server.value == data, download.transferred()), (true, len));
+        }
+    }
+}
+
+/// Zeros in blocks of one segment: all segments are equal, and none may be taken for a copy of another.
+#[test]
+fn equal_segments_count_each() {
+    let options = Options { block_size: BlockSize::new(1).unwrap(), ..once() };
+    assert_eq!(block_upload(&mut Server::new(&[0; 100]), options).1, [0; 100]);
+}
+
+/// Loses or doubles one answer of a server.
+struct Faulty {
+    server: Server,
+    copies: usize,
+    at: usize,
+    count: usize,
+}
+
+impl Device for Faulty {
+    fn answer(&mut self, request: [u8; 8]) -> Vec<[u8; 8]> {
+        let mut answers = vec![];
+        for answer in self.server.answer(request) {
+            let copies = if self.count == self.at { self.copies } else { 1 };
+            answers.extend(std::iter::repeat_n(answer, copies));
+            self.count += 1;
+        }
+        answers
+    }
+}
+
+#[test]
+fn an_answer_that_is_lost_or_doubled_does_no_harm() {
+    let data = value(100);
+    for copies in [0, 2] {
+        for at in 0..20 {
+            let faulty = || Faulty { server: Server::new(&data), copies, at, count: 0 };
+            let retries = if copies == 0 { 1 } else { 0 };
+            let options = Options { retries, block_size: BlockSize::new(5).unwrap(), ..once() };
+            let context = format!("{copies} copies of {at}");
+            let (outcome, read, _) = upload(&mut faulty(), options);
+            assert_eq!((outcome, read == data), (Ok(()), true), "{context}");
+            let (outcome, read, _) = block_upload(&mut faulty(), options);
+            assert_eq!((outcome, read == data), (Ok(()), true), "{context}");
+            let (mut server, new) = (faulty(), value(99));
+            assert_eq!(
+                run(&mut Download::new(NODE, OBJECT, &new, options), &mut server).0,
+                Ok(()),
+                "{context}"
+            );
+            assert!(server.server.value == new);
+            let (mut server, new) = (faulty(), value(99));
+            let mut download = BlockDownload::new(NODE, OBJECT, &new, options);
+            assert_eq!(run(&mut download, &mut server).0, Ok(()), "{context}");
+            assert!(server.server.value == new);
+        }
+    }
+}
+
+/// Within a block of a download segments are lost: they come again in the next block.
+#[test]
+fn lost_segments_are_sent_again() {
+    for lost in 1..=15 {
+        let (mut server, data, mut segments) = (Server::new(&[]), value(100), 0);
+        let mut lossy = |request: [u8; 8]| {
+            let is_segment = matches!(request[0] & 0x7F, 1..=4);
+            segments += usize::from(is_segment);
+            // The last one of a block must arrive: a server waits for it.
+            let is_end = request[0] & 0x80 != 0 || request[0] & 0x7F == 4;
+            if is_segment && segments == lost && !is_end { vec![] } else { server.answer(request) }
+        };
+        assert_eq!(run(&mut BlockDownload::new(NODE, OBJECT, &data, once()), &mut lossy).0, Ok(()), "{lost}");
+        assert!(server.value == data, "{lost}");
+    }
+}
+
+#[test]
+fn a_refusal_ends_a_transfer_at_once_and_is_not_answered() {
+    let refuse = |_: [u8; 8]| vec![Response::Abort(OBJECT, Abort::NoObject.code()).encode()];
+    let mut memory = [0; 8];
+    let mut transfer = Upload::new(NODE, OBJECT, Buffer::new(&mut memory), Options::default());
+    let (outcome, _, sent) = run(&mut transfer, &mut refuse.clone());
+    assert_eq!(outcome, Err(Error::Abort(AbortCode(0x0602_0000))));
+    assert_eq!(outcome.unwrap_err().to_string(), "0602 0000h, object does not exist");
+    assert_eq!(sent.len(), 1);
+}
+
+/// An abort message for another object is a late one.
+#[test]
+fn a_late_abort_message_is_passed_over() {
+    let mut server = Server::new(&[1, 2]);
+    let mut late = |request: [u8; 8]| {
+        let other = canopen::sdo::Multiplexer { index: 0x2001, sub: 0 };
+        let late = Response::Abort(other, Abort::TimeOut.code()).encode();
+        [vec![late], server.answer(request)].concat()
+    };
+    assert_eq!(upload(&mut late, once()).1, [1, 2]);
+}
+
+#[test]
+fn silence_costs_the_time_outs_and_tells_the_server() {
+    let mut memory = [0; 8];
+    let mut transfer = Upload::new(NODE, OBJECT, Buffer::new(&mut memory), Options::default());
+    let (outcome, end, sent) = run(&mut transfer, &mut |_: [u8; 8]| vec![]);
+    assert_eq!(outcome, Err(Error::NoAnswer));
+    assert!((2_000_000..2_001_000).contains(&end.0), "two attempts of a second: {end:?}");
+    let commands: Vec<u8> = sent.iter().map(|frame| frame.data()[0]).collect();
+    assert_eq!(commands, [0x40, 0x80, 0x40, 0x80]);
+    assert_eq!(sent[1].data()[4..], [0x00, 0x00, 0x04, 0x05]);
+    assert!(matches!(transfer.next(end), canopen::client::Step::Done(Err(Error::NoAnswer))));
+}
+
+#[test]
+fn a_value_that_is_too_long_for_its_place_is_refused() {
+    for is_sizeless in [false, true] {
+        let mut server = Server { is_sizeless, ..Server::new(&value(5000)) };
+        assert_eq!(upload(&mut server, once()).0, Err(Error::TooLong));
+        assert_eq!(block_upload(&mut server, once()).0, Err(Error::TooLong));
+    }
+}
+
+#[test]
+fn data_that_was_changed_on_the_way_is_a_crc_error() {
+    let mut server = Server::new(&value(100));
+    let mut changed = |request: [u8; 8]| {
+        let mut answers = server.answer(request);
+        answers.iter_mut().filter(|answer| answer[0] == 3).for_each(|answer| answer[5] ^= 1);
+        answers
+    };
+    assert_eq!(block_upload(&mut changed, once()).0, Err(Error::Crc));
+}
+
+#[test]
+fn a_transfer_can_be_given_up() {
+    let mut transfer = Download::new(NODE, OBJECT, &[1], once());
+    let _ = transfer.next(Instant(0));
+    transfer.abort();
+    let (outcome, _, sent) = run(&mut transfer, &mut |_: [u8; 8]| vec![]);
+    assert_eq!((outcome, sent.len(), sent[0].data()[0]), (Err(Error::Cancelled), 1, 0x80));
+}

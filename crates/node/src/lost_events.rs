@@ -1,0 +1,25 @@
+//! 2001h: events of the hardware that were lost and made good, counted since the start.
+
+use profiles::communication;
+
+use crate::Protocol;
+use crate::application::NodeApplication;
+
+/// How many kinds of events there are: sub-indexes 1 to this one.
+pub const LOST_EVENTS: usize = communication::LOST_EVENT_KINDS as usize;
+
+impl Protocol {
+    /// Shows how many events have been lost since the start, in the order of the sub-indexes of 2001h.
+    pub fn show_lost_events(&mut self, counts: &[u32; LOST_EVENTS]) {
+        self.device.application_mut().lost_events = *counts;
+        self.device.show(|application, image| application.show_lost_events(image));
+    }
+}
+
+impl NodeApplication {
+    pub(crate) fn show_lost_events(&self, image: &mut [u8]) {
+        for (sub, count) in (1..).zip(&self.lost_events) {
+            self.show(communication::LOST_EVENTS, sub, &count.to_le_bytes(), image);
+        }
+    }
+}
