@@ -1,5 +1,6 @@
 //! A master that follows CiA 302-3, and the images that it has.
 
+use bsp::update_layout::LAYOUT;
 use canbus::{StandardId, Time};
 use canopen::sdo::Multiplexer;
 use chip::Stm32f4;
@@ -8,7 +9,6 @@ use host_tests::sdo::{Channel, Client, Failure};
 use sign::image::Image;
 use sign::product;
 use sim::world::World;
-use bsp::update_layout::LAYOUT;
 use update::{Description, Status, Version};
 
 use crate::support::{Master, SECOND, firmware, world};

@@ -1,10 +1,10 @@
 //! Images that must not run, each downloaded to the bootloader on the board. The table of crate `update` is longer
 //! (`cargo test -p update --test corrupted`); this one shows that what the bus and the flash driver add keeps its promise.
 
+use bsp::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
 use sign::image::Image;
-use bsp::update_layout::LAYOUT;
 use update::{Description, HEADER_LEN, SIGNED_LEN};
 
 use super::bench::{Bench, signed, version_a};
