@@ -72,7 +72,6 @@ mod app {
     use crate::process::Process;
     use crate::services::{Findings, Services};
     use crate::shaft::Shaft;
-    use crate::shared::Shared as _;
     use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, remembering};
 
     #[shared]
