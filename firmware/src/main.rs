@@ -63,7 +63,7 @@ mod app {
         Transmitter, Watchdog,
     };
     use node::{Measurement, Parameters, Protocol, StoreJob};
-    use profiles::board::{Board as Surroundings, Inputs};
+    use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
     use crate::bit_rate::Rate;
     use crate::configuration::Loaded;
@@ -177,7 +177,8 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, shaft, buttons, measurement, backup],
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, shaft, buttons, measurement, backup,
+               retained: [u32; RETAINED_WORDS] = [0; RETAINED_WORDS]],
            shared = [snapshot, parameters, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
@@ -195,8 +196,8 @@ mod app {
             digital: cx.local.buttons.sample(),
         };
         cx.shared.snapshot.lock(|latest| measurement.update(&inputs, latest.renew()));
-        if let Some(words) = measurement.retained() {
-            cx.local.backup.write(&words);
+        if measurement.retain(cx.local.retained) {
+            cx.local.backup.write(cx.local.retained);
         }
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);

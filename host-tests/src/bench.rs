@@ -3,7 +3,7 @@
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
 use node::{BitRate, BusEvent, Fault, Measurement, Personality, Protocol, Setup, StoreJob};
-use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample, Retained};
+use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
 use storage::{DeviceRecord, Memory, Pages, Store, View};
 
@@ -176,7 +176,7 @@ impl Bench {
     /// Switches the power off and on.
     #[must_use]
     pub fn power_cycled(self) -> Bench {
-        let retained = self.measurement.retained().map_or(Retained::Nothing, Retained::Words);
+        let retained = self.measurement.retained();
         Bench::start(self.store.into_flash().0, &self.setup, PowerOn { retained, ..intact() })
     }
 

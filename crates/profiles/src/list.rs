@@ -229,7 +229,9 @@ macro_rules! personalities {
                 snapshot
             }
 
-            /// The same, with the snapshot where it is to be: `snapshot` is the last one.
+            /// The same, with the snapshot where it is to be: `snapshot` is the last one. Not inlined: this crate is
+            /// compiled for speed, its callers for size.
+            #[inline(never)]
             pub fn update(&mut self, inputs: &$crate::board::Inputs, snapshot: &mut Snapshot) {
                 match &mut self.chain {
                     _ if !self.has_parameters => {}
@@ -244,12 +246,22 @@ macro_rules! personalities {
                 }
             }
 
-            /// What is to outlive a loss of power: `None` while there is nothing.
-            #[must_use]
-            pub fn retained(&self) -> Option<[u32; $crate::board::RETAINED_WORDS]> {
+            /// Writes what is to outlive a loss of power; `false` while there is nothing.
+            #[inline(never)]
+            pub fn retain(&self, words: &mut [u32; $crate::board::RETAINED_WORDS]) -> bool {
                 match &self.chain {
-                    _ if !self.has_parameters => None,
-                    $(AnyChain::$Name(chain) => $crate::profile::Chain::retained(chain),)+
+                    _ if !self.has_parameters => false,
+                    $(AnyChain::$Name(chain) => $crate::profile::Chain::retain(chain, words),)+
+                }
+            }
+
+            /// The same as it is found at the next start.
+            #[must_use]
+            pub fn retained(&self) -> $crate::board::Retained {
+                let mut words = [0; $crate::board::RETAINED_WORDS];
+                match self.retain(&mut words) {
+                    true => $crate::board::Retained::Words(words),
+                    false => $crate::board::Retained::Nothing,
                 }
             }
         }

@@ -43,8 +43,8 @@ impl<A: Chain, B: Chain> Chain for ChainPair<A, B> {
     }
 
     /// There is one memory for both: the first that wants it has it.
-    fn retained(&self) -> Option<[u32; RETAINED_WORDS]> {
-        self.0.retained().or_else(|| self.1.retained())
+    fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
+        self.0.retain(words) || self.1.retain(words)
     }
 }
 

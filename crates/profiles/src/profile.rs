@@ -34,9 +34,10 @@ pub trait Chain {
         PositionInputs::default()
     }
 
-    /// What is to outlive a loss of power: [`PowerOn`] has it at the next start. `None` for a profile without such values.
-    fn retained(&self) -> Option<[u32; RETAINED_WORDS]> {
-        None
+    /// Writes what is to outlive a loss of power: [`PowerOn`] has it at the next start. `false` for a profile without such
+    /// values. In the place where they are needed, as this happens once a millisecond.
+    fn retain(&self, _words: &mut [u32; RETAINED_WORDS]) -> bool {
+        false
     }
 }
 

@@ -8,7 +8,7 @@
 use canopen::{Frame, Instant, QueueFull, Transmit};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use node::{BusEvent, Fault, Measurement, Personality, Protocol, Setup, StoreJob};
-use profiles::board::{Inputs, Outputs, PowerOn, Retained};
+use profiles::board::{Inputs, Outputs, PowerOn};
 use storage::{Pages, Store, View};
 
 unsafe extern "C" {
@@ -122,7 +122,7 @@ extern "C" fn measure(
 /// What outlives a loss of power, out and in again.
 #[unsafe(no_mangle)]
 extern "C" fn power_cycle(measurement: &mut Measurement, personality: &Personality, power_on: &PowerOn) {
-    let retained = measurement.retained().map_or(Retained::Nothing, Retained::Words);
+    let retained = measurement.retained();
     *measurement = Measurement::new(*personality, &PowerOn { retained, ..*power_on });
 }
 

@@ -134,8 +134,9 @@ impl Chain for Encoder {
         parameters.inputs()
     }
 
-    fn retained(&self) -> Option<[u32; RETAINED_WORDS]> {
-        Some(self.kept().to_words())
+    fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
+        *words = self.kept().to_words();
+        true
     }
 }
 

@@ -73,8 +73,9 @@ impl Chain for Lift {
         parameters.position.sensors.inputs()
     }
 
-    fn retained(&self) -> Option<[u32; RETAINED_WORDS]> {
-        Some(self.position.kept().to_words())
+    fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
+        *words = self.position.kept().to_words();
+        true
     }
 }
 
@@ -123,7 +124,9 @@ mod tests {
         lift.apply(&Parameters::default());
         sample(&mut lift, 0);
         sample(&mut lift, 4096);
-        let retained = Retained::Words(lift.retained().unwrap());
+        let mut words = [0; RETAINED_WORDS];
+        assert!(lift.retain(&mut words));
+        let retained = Retained::Words(words);
         let mut lift = Lift::new(&PowerOn { retained, ..PowerOn::default() });
         lift.apply(&Parameters::default());
         assert_eq!(sample(&mut lift, 0).position.units[0].position, 200);

@@ -3,7 +3,7 @@
 mod switches;
 
 use canopen::dictionary::Group;
-use profiles::board::{Inputs, PowerOn, RawEncoder, RawSample};
+use profiles::board::{Inputs, PowerOn, RawEncoder, RawSample, Retained};
 use profiles::{encoder, personalities};
 
 personalities! {
@@ -97,6 +97,6 @@ fn another_personality_is_left_alone() {
     let before = node.image;
     node.profile.publish(&Snapshot::Encoder(encoder::Snapshot::default()), &mut node.image);
     assert_eq!(node.image, before);
-    assert_eq!(node.measurement.retained(), None);
+    assert_eq!(node.measurement.retained(), Retained::Nothing);
     assert_eq!(node.profile.parameters(&node.image).position_inputs(), Default::default());
 }

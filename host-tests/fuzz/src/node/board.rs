@@ -119,7 +119,7 @@ impl Board {
     }
 
     fn retained(&self) -> Retained {
-        self.measurement.retained().map_or(Retained::Nothing, Retained::Words)
+        self.measurement.retained()
     }
 
     fn start(&mut self) {
