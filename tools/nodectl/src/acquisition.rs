@@ -179,8 +179,13 @@ impl<'n> Acquisition<'n> {
                 continue;
             }
             let bytes = Client::new(self.network, self.setup.node, self.setup.options).upload(signal.at)?;
-            let at = self.network.bus_time().unwrap_or(self.network.now());
-            self.ready.push_back(Sample { at, signal: number, value: signal.decode(&bytes) });
+            let value = signal.decode(&bytes);
+            // The answer was the newest frame; what came before it goes first, so that times do not go backwards.
+            let at = self.network.newest_stamp().unwrap_or(self.network.now());
+            while let Some(received) = self.network.take_kept() {
+                self.take(&received);
+            }
+            self.ready.push_back(Sample { at, signal: number, value });
         }
         Ok(())
     }

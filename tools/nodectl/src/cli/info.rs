@@ -10,6 +10,7 @@ use super::output::hex;
 use super::{Failure, Session};
 use crate::heartbeat;
 use crate::object::at;
+use crate::text::visible;
 use crate::update::{Program, Status};
 use crate::value;
 
@@ -118,7 +119,7 @@ fn text(session: &mut Session, node: NodeId, index: u16) -> Result<Option<String
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "-".to_owned());
+        let or_dash = |text: &Option<String>| visible(text.as_deref().unwrap_or("-"));
         let is_boot = self.device_type == Some(BOOT);
         write!(f, "node {}: {}", self.node, or_dash(&self.name))?;
         let note = if is_boot { " (bootloader)" } else { "" };

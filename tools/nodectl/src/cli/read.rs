@@ -1,14 +1,14 @@
 //! `nodectl read`
 
 use std::fmt;
-use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use canopen::sdo::Multiplexer;
 use clap::Args;
 use eds::{Class, DataType};
 use serde::{Serialize, Serializer};
 
+use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::object::Place;
 use crate::value::{Value, data_type, guess};
@@ -107,11 +107,11 @@ impl Reading {
     }
 }
 
-fn write_out(session: &mut Session, path: &PathBuf, bytes: &[u8]) -> Result<(), Failure> {
+fn write_out(session: &mut Session, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if path.as_os_str() == "-" {
         return Ok(session.output.write(bytes)?);
     }
-    fs::write(path, bytes).map_err(|error| Failure::file(path, error))
+    Replacement::write(path, bytes)
 }
 
 /// As a person writes it.

@@ -6,6 +6,7 @@ mod loader;
 mod lss;
 mod pressure;
 mod process;
+mod safety;
 mod transfers;
 mod update;
 mod wire;
