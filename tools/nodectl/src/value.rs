@@ -6,8 +6,6 @@ use eds::{Class, DataType};
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
-use crate::text::visible;
-
 const UNICODE_STRING: DataType = DataType(0x0B);
 const VISIBLE_STRING: DataType = DataType(0x09);
 
@@ -208,14 +206,14 @@ pub fn guess(bytes: &[u8]) -> DataType {
     }
 }
 
-/// Numbers in decimal, bytes in hexadecimal, control characters of a text visible.
+/// Numbers in decimal, bytes in hexadecimal, a text as it is: for a terminal, [`visible`](crate::text::visible) makes it fit.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Value::Integer(value) => f.pad(&value.to_string()),
             Value::Real32(value) => f.pad(&value.to_string()),
             Value::Real64(value) => f.pad(&value.to_string()),
-            Value::Text(text) => f.pad(&visible(text)),
+            Value::Text(text) => f.pad(text),
             Value::Bytes(bytes) => {
                 let pairs: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
                 f.pad(&pairs.join(" "))

@@ -52,6 +52,7 @@ struct ProgramReport {
 impl Info {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         for node in session.options.node.list()? {
+            session.begin();
             let report = report(session, node)?;
             session.print(&report)?;
         }
@@ -82,7 +83,9 @@ fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
 /// What the next heartbeat says; nothing where there is none.
 fn state(session: &mut Session, node: NodeId, period: Option<u32>) -> Result<Option<&'static str>, Failure> {
     let Some(period) = period.filter(|&period| period > 0) else { return Ok(None) };
-    let time = Duration(MARGIN.0 + Duration::from_millis(period.into()).0);
+    // A node may say anything; 1017h has 16 bits, and nobody waits for a heartbeat longer than for a transfer.
+    let period = Duration::from_millis(period.into()).min(session.options.sdo().limit);
+    let time = Duration(period.0 + MARGIN.0);
     Ok(heartbeat::wait(&mut session.network, node, time)?.map(heartbeat::words))
 }
 

@@ -11,6 +11,7 @@ use serde::{Serialize, Serializer};
 use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::object::Place;
+use crate::text::visible;
 use crate::value::{Value, data_type, guess};
 use crate::{Catalogue, unit};
 
@@ -126,7 +127,7 @@ impl fmt::Display for Reading {
         if let Some(name) = &self.name {
             write!(f, "{name} ")?;
         }
-        write!(f, "= {}", self.value)?;
+        write!(f, "= {}", visible(&self.value.to_string()))?;
         // Identifiers, units and mappings are read digit by digit.
         if let (Value::Integer(value), Class::Unsigned(bits @ 32..)) = (&self.value, self.class) {
             write!(f, " ({value:0width$X}h)", width = usize::from(bits / 4))?;

@@ -46,6 +46,7 @@ impl Scan {
         let found = scan(&mut session.network, time)?;
         let mut nodes = Vec::new();
         for (node, presence) in found {
+            session.begin();
             nodes.push(row(session, node, presence)?);
         }
         let is_empty = nodes.is_empty();

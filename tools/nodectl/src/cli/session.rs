@@ -5,8 +5,8 @@ use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
-use canopen::NodeId;
 use canopen::sdo::Multiplexer;
+use canopen::{Instant, NodeId};
 use eds::Eds;
 use serde::Serialize;
 
@@ -26,6 +26,8 @@ pub struct Session {
     /// The data sheet of the options, once it is read.
     sheet: Option<Eds>,
     catalogues: BTreeMap<NodeId, Catalogue>,
+    /// Until when the transfers have to be over that are made for one node.
+    deadline: Instant,
 }
 
 impl Session {
@@ -44,12 +46,26 @@ impl Session {
     /// On a bus that is open.
     #[must_use]
     pub fn with(network: Network, options: &Options, output: Output) -> Session {
-        Session { network, options: options.clone(), output, sheet: None, catalogues: BTreeMap::new() }
+        Session {
+            network,
+            options: options.clone(),
+            output,
+            sheet: None,
+            catalogues: BTreeMap::new(),
+            deadline: Instant::NEVER,
+        }
     }
 
     /// The client of a node.
     pub(super) fn client(&mut self, node: NodeId) -> Client<'_> {
-        Client::new(&mut self.network, node, self.options.sdo())
+        let deadline = self.deadline;
+        Client::new(&mut self.network, node, self.options.sdo()).by(deadline)
+    }
+
+    /// The next transfers are about one node: together they may take as long as one. A node that is slow on purpose costs
+    /// no more, however much it is asked.
+    pub(super) fn begin(&mut self) {
+        self.deadline = self.network.now() + self.options.sdo().limit;
     }
 
     /// What is known about a node: from the file of the options, else by its identity.

@@ -2,6 +2,7 @@
 
 mod blocks;
 mod commands;
+mod hostile;
 mod loader;
 mod lss;
 mod pressure;

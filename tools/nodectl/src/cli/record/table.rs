@@ -7,6 +7,7 @@ use canopen::Instant;
 use crate::acquisition::{Sample, Signal};
 use crate::cli::Failure;
 use crate::object::Place;
+use crate::text::visible;
 
 /// A table that grows, row by row: a row that is complete is written at once.
 pub(super) struct Table<W: Write> {
@@ -48,7 +49,7 @@ impl<W: Write> Table<W> {
         }
         let place = self.row.as_mut().and_then(|row| row.values.get_mut(sample.signal));
         if let Some(place) = place {
-            *place = sample.value.to_string();
+            *place = visible(&sample.value.to_string());
         }
         Ok(())
     }
