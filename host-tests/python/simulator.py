@@ -7,7 +7,6 @@ clock of the host: what is asserted are the virtual time stamps that come with e
 import json
 import os
 import queue
-import re
 import subprocess
 from pathlib import Path
 
@@ -30,14 +29,11 @@ class Simulator:
         command = [os.environ["SIM_COMMAND"], "--bootloader", images / "bootloader", "--firmware", images / "firmware"]
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.socketcand = self._port(r"socketcand on 127\.0\.0\.1:(\d+)")
-        self.slcan = self._port(r"slcan on 127\.0\.0\.1:(\d+)")
-
-    def _port(self, pattern: str) -> int:
-        for line in self.process.stdout:
-            if found := re.search(pattern, line):
-                return int(found[1])
-        raise AssertionError("the simulator has ended without serving clients")
+        # The first line tells what is served.
+        line = self.process.stdout.readline()
+        assert line, "the simulator has ended without serving clients"
+        self.greeting = json.loads(line)
+        self.socketcand, self.slcan = (int(self.greeting[name].split(":")[1]) for name in ("socketcand", "slcan"))
 
     def command(self, line: str) -> None:
         """Types a command, as on the terminal."""
@@ -46,9 +42,14 @@ class Simulator:
     def quit(self) -> dict:
         """Ends the run and returns its summary."""
         self.command("quit")
+        return self.summary()
+
+    def summary(self) -> dict:
+        """The summary of a run that ends."""
         output, _ = self.process.communicate(timeout=PATIENCE)
         assert self.process.returncode == 0
-        return json.loads(output.splitlines()[-1])
+        (summary,) = output.splitlines()
+        return json.loads(summary)
 
     def bus(self) -> can.BusABC:
         """A python-can bus over socketcand."""
@@ -69,6 +70,9 @@ class Master:
         self.network.connect(interface="socketcand", host="127.0.0.1", port=simulator.socketcand, channel="vcan0")
         self.node = self.network.add_node(1, canopen.ObjectDictionary())
         self.node.sdo.RESPONSE_TIMEOUT = PATIENCE
+        # The client may be faster than the node, which answers nothing before it has booted.
+        if any(board["id"] == 1 for board in simulator.greeting["boards"]):
+            self.listen(0x701).next()
 
     def close(self) -> None:
         self.network.disconnect()

@@ -73,12 +73,16 @@ impl<'a, C: Checksum> Keeper<'a, C> {
         (Keeper { slots, checksum, sequence }, found)
     }
 
-    /// Keeps this.
-    pub fn write(&mut self, content: &Content) {
-        self.sequence = self.sequence.wrapping_add(1);
+    /// Keeps this. Whether the memory has taken it: if not, the next write goes to the same place, and the copy before stays.
+    pub fn write(&mut self, content: &Content) -> bool {
+        let next = self.sequence.wrapping_add(1);
         let [even, odd] = self.slots;
-        let slot = if self.sequence.is_multiple_of(2) { even } else { odd };
-        slot.write(self.sequence, content, &mut self.checksum);
+        let slot = if next.is_multiple_of(2) { even } else { odd };
+        let is_taken = slot.write(next, content, &mut self.checksum);
+        if is_taken {
+            self.sequence = next;
+        }
+        is_taken
     }
 }
 
@@ -99,16 +103,20 @@ impl Slot {
         is_good.then_some((sequence, content))
     }
 
-    /// The mark comes last: where a first write is cut short there was nothing, and not something that is damaged.
-    fn write(&self, sequence: u32, content: &Content, checksum: &mut impl Checksum) {
+    /// The mark comes last: where a first write is cut short there was nothing, and not something that is damaged. Whether the
+    /// first and the last words read back: memory that is locked or has no clock takes none.
+    fn write(&self, sequence: u32, content: &Content, checksum: &mut impl Checksum) -> bool {
         self.sequence.store(sequence, Ordering::Relaxed);
         checksum.start(sequence);
         for (to, from) in self.content.iter().zip(content) {
             to.store(*from, Ordering::Relaxed);
             checksum.add(*from);
         }
-        self.checksum.store(checksum.value(), Ordering::Relaxed);
+        let checksum = checksum.value();
+        self.checksum.store(checksum, Ordering::Relaxed);
         self.mark.store(MARK, Ordering::Release);
+        let read = (self.sequence.load(Ordering::Relaxed), self.checksum.load(Ordering::Relaxed));
+        read == (sequence, checksum) && self.has_mark()
     }
 }
 
@@ -184,7 +192,7 @@ mod tests {
     fn written(writes: u32) -> Slots {
         let slots = memory(0xA5A5_A5A5);
         let mut keeper = open(&slots).0;
-        (1..=writes).for_each(|number| keeper.write(&content(number)));
+        (1..=writes).for_each(|number| assert!(keeper.write(&content(number))));
         slots
     }
 

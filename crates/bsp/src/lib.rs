@@ -27,6 +27,7 @@ pub mod reset_cause;
 pub mod sectors;
 pub mod serial_number;
 pub mod ssi_word;
+pub mod step;
 pub mod supervision;
 pub mod transmit_queue;
 pub mod vectors;

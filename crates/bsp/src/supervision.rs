@@ -8,11 +8,15 @@ use core::sync::atomic::{AtomicU8, Ordering};
 pub enum Part {
     /// The 1 kHz sampling.
     Sampling = 1,
-    /// The services task, which runs below everything that could starve it.
-    Services = 2,
+    /// The task of the process data.
+    Process = 2,
+    /// The services task.
+    Services = 4,
+    /// The task that stores parameters. It is the one of the lowest priority, below everything that could starve it.
+    Keeper = 8,
 }
 
-const ALL: u8 = Part::Sampling as u8 | Part::Services as u8;
+const ALL: u8 = Part::Sampling as u8 | Part::Process as u8 | Part::Services as u8 | Part::Keeper as u8;
 
 /// Who has made progress since the watchdog was last fed.
 #[derive(Debug, Default)]
@@ -44,21 +48,23 @@ impl Supervision {
 mod tests {
     use super::*;
 
+    const PARTS: [Part; 4] = [Part::Sampling, Part::Process, Part::Services, Part::Keeper];
+
     #[test]
-    fn one_part_alone_never_feeds() {
-        for part in [Part::Sampling, Part::Services] {
+    fn without_one_of_them_nobody_feeds() {
+        for silent in PARTS {
             let supervision = Supervision::new();
-            assert!((0..1000).all(|_| !supervision.progress(part)));
+            let others = PARTS.into_iter().filter(|part| *part != silent);
+            assert!(others.cycle().take(1000).all(|part| !supervision.progress(part)), "without {silent:?}");
         }
     }
 
     #[test]
-    fn every_feed_needs_new_progress_of_both() {
+    fn every_feed_needs_new_progress_of_all() {
         let supervision = Supervision::new();
-        assert!(!supervision.progress(Part::Sampling));
-        assert!(supervision.progress(Part::Services));
-        assert!(!supervision.progress(Part::Services));
-        assert!(supervision.progress(Part::Sampling));
-        assert!(!supervision.progress(Part::Sampling));
+        for _ in 0..3 {
+            let fed = PARTS.map(|part| supervision.progress(part));
+            assert_eq!(fed, [false, false, false, true]);
+        }
     }
 }

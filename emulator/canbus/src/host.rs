@@ -90,6 +90,12 @@ impl HostNode {
         self.transmit.push(Stamped { at, frame });
     }
 
+    /// Forgets the frames that wait, and returns how many those were.
+    pub fn forget(&mut self) -> u64 {
+        self.on_wire = None;
+        self.transmit.drain(..).len() as u64
+    }
+
     /// Frames that wait, the one on the wire included.
     pub fn backlog(&self) -> usize {
         self.transmit.len()

@@ -66,6 +66,8 @@ pub(crate) struct Core<P> {
     pub(crate) without: Option<Mechanism>,
     /// Flash is busy, and what runs does not come from it: loads from there are to be noticed.
     pub(crate) flash_closed: bool,
+    /// How often the flash array was written.
+    pub(crate) flash_changes: u64,
     cyccnt: Option<Cyccnt>,
 }
 
@@ -98,6 +100,7 @@ impl<P: Peripherals> Core<P> {
             clearing_monitor: false,
             without: None,
             flash_closed: false,
+            flash_changes: 0,
             cyccnt: None,
         }
     }

@@ -252,6 +252,7 @@ pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Erro
 /// Writes memory behind the back of the CPU and forgets what was translated from it.
 pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]) -> Result<(), Error> {
     cpu.mem_write(address.into(), bytes)?;
+    cpu.get_data_mut().flash_changes += u64::from(address < RAM);
     if !cpu.get_data().lacks(Mechanism::Retranslation) {
         let end = u64::from(address) + bytes.len() as u64;
         cpu.ctl_remove_cache(address.into(), end)?;

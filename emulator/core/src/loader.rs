@@ -18,6 +18,16 @@ pub struct Image {
     pub ram_size: u32,
 }
 
+impl Image {
+    /// Whether a flash array has this program in it.
+    pub fn is_in(&self, model: &Model, flash: &[u8]) -> bool {
+        self.segments.iter().all(|Segment { address, bytes }| {
+            let start = (address - model.flash.start) as usize;
+            flash.get(start..start + bytes.len()) == Some(bytes.as_slice())
+        })
+    }
+}
+
 /// Bytes at an address.
 #[derive(Clone, Debug)]
 pub struct Segment {

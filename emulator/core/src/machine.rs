@@ -79,6 +79,19 @@ impl<P: Peripherals + 'static> Machine<P> {
         Ok(image)
     }
 
+    /// Reads an ELF file for this chip without writing it: what [`Machine::load_elf`] would write.
+    ///
+    /// # Errors
+    /// [`Error::Elf`] for anything but a program for this chip.
+    pub fn parse_elf(&self, file: &[u8]) -> Result<Image, Error> {
+        loader::parse(file, &self.model)
+    }
+
+    /// How often the flash array has changed: a program's stores, erasures, and what was loaded.
+    pub fn flash_changes(&self) -> u64 {
+        self.cpu.get_data().flash_changes
+    }
+
     /// The flash array.
     pub fn flash(&self) -> Vec<u8> {
         self.cpu.mem_read_as_vec(self.model.flash.start.into(), self.model.flash.len()).unwrap_or_default()
@@ -256,7 +269,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     fn step(&mut self, until: Time) {
         let masks = engine::masks(&self.cpu);
         if self.loading && self.now() < self.stall {
-            return self.pass_to(self.stall.min(until));
+            return self.wait_for_flash(until);
         }
         self.loading = false;
         let core = self.cpu.get_data();
@@ -273,13 +286,19 @@ impl<P: Peripherals + 'static> Machine<P> {
             return self.enter(exception);
         }
         if self.stalls() {
-            return self.pass_to(self.stall.min(until));
+            return self.wait_for_flash(until);
         }
         self.run_code();
     }
 
     fn stalls(&self) -> bool {
         self.now() < self.stall && self.model.flash.contains(&self.pc())
+    }
+
+    /// The core waits for the flash, and only the core: what the chip does meanwhile it does at its own instants.
+    fn wait_for_flash(&mut self, until: Time) {
+        let next = self.cpu.get_data().deadline().min(until);
+        self.pass_to(self.stall.min(next));
     }
 
     /// Nothing runs until the next event.

@@ -14,7 +14,8 @@ use crate::cli::{Options, Speed};
 use crate::console::{self, Command};
 use crate::display::Display;
 use crate::gateway::{BUS_NAME, Gateway, Protocol};
-use crate::greeting::greeting;
+use crate::greeting::Greeting;
+use crate::keeper::Keeper;
 use crate::pace::Pace;
 use crate::setup;
 use crate::summary::Summary;
@@ -29,6 +30,7 @@ struct App {
     gateway: Gateway,
     display: Display,
     commands: Option<Receiver<String>>,
+    keeper: Option<Keeper>,
     candump: Option<BufWriter<File>>,
     interrupted: Arc<AtomicBool>,
     options: Options,
@@ -47,7 +49,7 @@ pub fn run(options: Options) -> Result<Summary> {
 
 impl App {
     fn open(options: Options) -> Result<App> {
-        let mut gateway = Gateway::default();
+        let mut gateway = Gateway::new()?;
         let socketcand = gateway.listen(options.socketcand, Protocol::Socketcand)?;
         let slcan = options.slcan.map(|address| gateway.listen(address, Protocol::Slcan)).transpose()?;
         let mut world = setup::world(&options)?;
@@ -61,9 +63,16 @@ impl App {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
         ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot catch Ctrl-C")?;
-        let display = Display::open(&greeting(&options, socketcand, slcan))?;
+        let greeting = Greeting { options: &options, socketcand, slcan, boards: world.boards() };
+        let display = if options.json {
+            println!("{}", greeting.json());
+            Display::quiet()
+        } else {
+            Display::open(&greeting.lines())?
+        };
+        let keeper = options.flash.clone().map(Keeper::new);
         let commands = (!display.takes_commands()).then(console::lines);
-        Ok(App { world, gateway, display, commands, candump, interrupted, options })
+        Ok(App { world, gateway, display, commands, keeper, candump, interrupted, options })
     }
 
     fn run(&mut self) -> Result<()> {
@@ -84,6 +93,9 @@ impl App {
         self.world.run_until(end.min(self.world.now() + STEP));
         self.gateway.deliver(&mut self.world);
         self.write_candump()?;
+        if let Some(keeper) = &mut self.keeper {
+            keeper.look(self.world.boards(), Instant::now())?;
+        }
         self.show()
     }
 
@@ -120,7 +132,11 @@ impl App {
     fn obey(&mut self, command: Command) {
         match command {
             Command::Quit => self.interrupted.store(true, Ordering::Relaxed),
-            Command::Stimulus(stimulus) => self.world.apply(&stimulus),
+            Command::Stimulus(stimulus) => {
+                if let Err(error) = self.world.apply(&stimulus) {
+                    self.display.say(error.to_string());
+                }
+            }
         }
     }
 
@@ -129,6 +145,6 @@ impl App {
         if let Some(candump) = &mut self.candump {
             candump.flush().context("cannot write the candump file")?;
         }
-        setup::keep_flash(&self.options, &self.world)
+        self.keeper.as_ref().map_or(Ok(()), |keeper| keeper.close(self.world.boards()))
     }
 }

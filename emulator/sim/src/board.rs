@@ -38,6 +38,19 @@ pub(crate) struct Contents<'a> {
     pub(crate) flash: &'a [u8],
     /// The backup SRAM; `None` when no battery has kept it.
     pub(crate) backup: Option<&'a [u8]>,
+    /// Whether the images are written over the flash as a debug probe does it, or it stays as it is.
+    pub(crate) writes_images: bool,
+}
+
+/// Which programs a board runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Programs {
+    /// The images: they were written into its flash.
+    Written,
+    /// The images: its flash has kept them.
+    Kept,
+    /// Others, which its flash has kept. Their log cannot be read.
+    Others,
 }
 
 /// One emulated board.
@@ -48,14 +61,14 @@ pub struct Board {
     images: Rc<Images>,
     firmware: emulator::Image,
     bootloader_flash: u32,
+    programs: Programs,
     log: Log,
     /// Where the core stands still until a watchdog resets it.
     locked_up: Option<u32>,
 }
 
 impl Board {
-    /// A board with these contents of its memory. The images are written over its flash as a debug probe does it. It is
-    /// switched on.
+    /// A board with these contents of its memory. It is switched on.
     ///
     /// # Errors
     /// When an image does not fit the chip.
@@ -69,12 +82,19 @@ impl Board {
         contents.backup.into_iter().for_each(|backup| chip.set_kept_by_battery(backup));
         let mut machine = Machine::new(Model::stm32f4(flash::SIZE as u32), chip)?;
         machine.set_flash(contents.flash)?;
-        let bootloader = images.bootloader.as_ref().map(|image| load(&mut machine, image)).transpose()?;
+        let (firmware, bootloader) = images.parsed(&machine)?;
+        let programs = if contents.writes_images {
+            images.write(&mut machine)?
+        } else if bootloader
+            .iter()
+            .chain([&firmware])
+            .all(|image| image.is_in(machine.model(), contents.flash))
+        {
+            Programs::Kept
+        } else {
+            Programs::Others
+        };
         let bootloader_flash = bootloader.map_or(0, |bootloader| bootloader.flash_size);
-        let firmware = load(&mut machine, &images.firmware)?;
-        if let Some(header) = &images.header {
-            machine.write(HEADER_ADDRESS, header).map_err(|_| anyhow::anyhow!("no flash for a header"))?;
-        }
         machine.power_on(Time::ZERO);
         Ok(Board {
             id,
@@ -83,6 +103,7 @@ impl Board {
             images,
             firmware,
             bootloader_flash,
+            programs,
             log: Log::default(),
             locked_up: None,
         })
@@ -91,6 +112,16 @@ impl Board {
     /// The node-ID it was given on the command line.
     pub fn id(&self) -> u8 {
         self.id
+    }
+
+    /// Which programs it runs.
+    pub fn programs(&self) -> Programs {
+        self.programs
+    }
+
+    /// How often its flash has changed.
+    pub(crate) fn flash_changes(&self) -> u64 {
+        self.machine.flash_changes()
     }
 
     /// Runs to `limit`, or to the moment at which it requests a frame; returns the time reached.
@@ -122,6 +153,9 @@ impl Board {
         let (Some(control_block), Some(table)) = (self.firmware.rtt, &self.images.firmware.log) else {
             return;
         };
+        if self.programs == Programs::Others {
+            return;
+        }
         self.log.poll(table, &mut self.machine, control_block, &mut |level, text| {
             into.push(Line { at, node, level, text });
         });
@@ -137,10 +171,11 @@ impl Board {
         self.machine.peripherals().kept_by_battery(self.machine.now())
     }
 
-    pub(crate) fn status(&self, heard: Heard) -> NodeStatus {
+    pub(crate) fn status(&self, node_id: u8, heard: Heard) -> NodeStatus {
         let (now, plant) = (self.machine.now(), self.machine.peripherals().plant());
         NodeStatus {
             id: self.id,
+            node_id,
             personality: self.personality,
             heard,
             pressure: plant.pressure(now),
@@ -178,8 +213,26 @@ fn wiring(id: u8) -> Wiring {
     wiring
 }
 
-fn load(machine: &mut Machine<Stm32f4>, image: &Image) -> Result<emulator::Image> {
-    machine.load_elf(&image.elf).with_context(|| format!("{} is not an image for the board", image.path))
+impl Images {
+    /// Firmware and bootloader as the chip takes them.
+    fn parsed(&self, machine: &Machine<Stm32f4>) -> Result<(emulator::Image, Option<emulator::Image>)> {
+        let parse = |image: &Image| {
+            machine
+                .parse_elf(&image.elf)
+                .with_context(|| format!("{} is not an image for the board", image.path))
+        };
+        Ok((parse(&self.firmware)?, self.bootloader.as_ref().map(parse).transpose()?))
+    }
+
+    fn write(&self, machine: &mut Machine<Stm32f4>) -> Result<Programs> {
+        for image in self.bootloader.iter().chain([&self.firmware]) {
+            machine.load_elf(&image.elf)?;
+        }
+        if let Some(header) = &self.header {
+            machine.write(HEADER_ADDRESS, header).map_err(|_| anyhow::anyhow!("no flash for a header"))?;
+        }
+        Ok(Programs::Written)
+    }
 }
 
 impl Ram for Machine<Stm32f4> {

@@ -54,8 +54,13 @@ pub struct Options {
     pub duration: Option<Time>,
 
     /// Keep the boards' flash in this directory between runs, one file a node, and beside it what the battery keeps.
+    /// Firmware and bootloader are written into a flash that is not there yet.
     #[arg(long, value_name = "DIR")]
     pub flash: Option<PathBuf>,
+
+    /// Write firmware and bootloader also into a flash that --flash has kept; parameters stay.
+    #[arg(long, requires = "flash")]
+    pub reflash: bool,
 
     /// Write every frame to this file in the format of candump -l.
     #[arg(long, value_name = "FILE")]
@@ -93,7 +98,8 @@ pub struct Options {
     #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
     pub load: u8,
 
-    /// Print the summary as JSON.
+    /// Print JSON only: a line with the addresses served when they are, and the summary as the last line. The log goes to
+    /// the standard error output.
     #[arg(long)]
     pub json: bool,
 }
@@ -206,7 +212,7 @@ mod tests {
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
-             --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
+             --reflash --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));
@@ -226,6 +232,8 @@ mod tests {
             ("--for x", "not a number of seconds"),
             ("--socketcand nowhere", "nowhere"),
             ("--load 101", "101"),
+            ("--reflash", "--flash"),
+            ("--temperature const:25", "temperatures are in K"),
             ("--pressure 1=nonsense", "nonsense"),
             ("--speed warp", "real, max"),
             ("--wings", "--wings"),

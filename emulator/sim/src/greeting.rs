@@ -2,40 +2,84 @@
 
 use std::net::SocketAddr;
 
+use serde_json::{Value, json};
+
+use crate::board::{Board, Programs};
 use crate::cli::Options;
 use crate::console;
 use crate::gateway::BUS_NAME;
 
-/// Lines for the start of the display, with the addresses that are really served.
-pub(crate) fn greeting(options: &Options, socketcand: SocketAddr, slcan: Option<SocketAddr>) -> Vec<String> {
-    let nodes: Vec<String> =
-        options.nodes.iter().map(|node| format!("{} ({})", node.id, node.personality)).collect();
-    let first = options.nodes.first().map_or(1, |node| node.id);
-    let (host, port) = (socketcand.ip(), socketcand.port());
-    let mut lines = vec![
-        format!(
-            "node {} at {} kbit/s; socketcand on {socketcand}, bus {BUS_NAME}",
-            nodes.join(", "),
-            options.bitrate
-        ),
-        "python: import canopen; network = canopen.Network()".to_owned(),
-        format!(
-            "        network.connect(interface='socketcand', host='{host}', port={port}, channel='{BUS_NAME}')"
-        ),
-        format!("        node = network.add_node({first}, canopen.ObjectDictionary())"),
-        "        node.sdo.upload(0x1000, 0).hex(); node.nmt.state = 'OPERATIONAL'".to_owned(),
-    ];
-    lines.push(match &options.socketcan {
-        Some(name) => format!("can-utils: candump -ta {name}; cansend {name} 000#01{first:02X}"),
-        None => {
-            format!("can-utils: socketcandcl -i {BUS_NAME},vcan0 -s {host} -p {port} & candump -ta vcan0")
+/// What there is to tell, with the addresses that are really served.
+pub(crate) struct Greeting<'a> {
+    pub(crate) options: &'a Options,
+    pub(crate) socketcand: SocketAddr,
+    pub(crate) slcan: Option<SocketAddr>,
+    pub(crate) boards: &'a [Board],
+}
+
+impl Greeting<'_> {
+    /// For people: the start of the display.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        let Greeting { options, socketcand, slcan, boards } = *self;
+        let nodes: Vec<String> =
+            options.nodes.iter().map(|node| format!("{} ({})", node.id, node.personality)).collect();
+        let first = options.nodes.first().map_or(1, |node| node.id);
+        let (host, port) = (socketcand.ip(), socketcand.port());
+        let mut lines = vec![
+            format!(
+                "node {} at {} kbit/s; socketcand on {socketcand}, bus {BUS_NAME}",
+                nodes.join(", "),
+                options.bitrate
+            ),
+            "python: import canopen; network = canopen.Network()".to_owned(),
+            format!(
+                "        network.connect(interface='socketcand', host='{host}', port={port}, channel='{BUS_NAME}')"
+            ),
+            format!("        node = network.add_node({first}, canopen.ObjectDictionary())"),
+            "        node.sdo.upload(0x1000, 0).hex(); node.nmt.state = 'OPERATIONAL'".to_owned(),
+        ];
+        lines.push(match &options.socketcan {
+            Some(name) => format!("can-utils: candump -ta {name}; cansend {name} 000#01{first:02X}"),
+            None => {
+                format!("can-utils: socketcandcl -i {BUS_NAME},vcan0 -s {host} -p {port} & candump -ta vcan0")
+            }
+        });
+        lines.extend(slcan.map(|slcan| {
+            format!(
+                "slcan on {slcan}: can.Bus(interface='slcan', channel='socket://{slcan}', sleep_after_open=0)"
+            )
+        }));
+        if options.flash.is_some() {
+            lines.extend(boards.iter().map(programs));
         }
-    });
-    lines.extend(slcan.map(|slcan| {
-        format!(
-            "slcan on {slcan}: can.Bus(interface='slcan', channel='socket://{slcan}', sleep_after_open=0)"
-        )
-    }));
-    lines.push(console::HELP.to_owned());
-    lines
+        lines.push(console::HELP.to_owned());
+        lines
+    }
+
+    /// For programs: one line.
+    pub(crate) fn json(&self) -> Value {
+        let boards =
+            self.boards.iter().map(|board| json!({ "id": board.id(), "programs": name(board.programs()) }));
+        json!({ "socketcand": self.socketcand, "slcan": self.slcan, "bus": BUS_NAME, "boards": boards.collect::<Vec<_>>() })
+    }
+}
+
+/// What became of the flash that a board has kept.
+fn programs(board: &Board) -> String {
+    let what = match board.programs() {
+        Programs::Written => "firmware and bootloader are written into its flash",
+        Programs::Kept => "its flash is kept, with this firmware and bootloader",
+        Programs::Others => {
+            "its flash is kept, with other programs, whose log cannot be read; --reflash writes these"
+        }
+    };
+    format!("node {}: {what}", board.id())
+}
+
+fn name(programs: Programs) -> &'static str {
+    match programs {
+        Programs::Written => "written",
+        Programs::Kept => "kept",
+        Programs::Others => "others kept",
+    }
 }

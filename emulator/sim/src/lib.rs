@@ -24,5 +24,6 @@ pub mod world;
 
 mod figures;
 mod greeting;
+mod keeper;
 mod pace;
 mod retuning;

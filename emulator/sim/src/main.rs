@@ -14,20 +14,29 @@ fn main() -> ExitCode {
         Ok(options) => options,
         // Help and version are answers, not errors.
         Err(error) if !error.use_stderr() => error.exit(),
-        Err(error) => return refuse(&sim::cli::one_line(&error.to_string())),
+        Err(error) => {
+            let json = std::env::args_os().any(|word| word == "--json");
+            return refuse(&sim::cli::one_line(&error.to_string()), json);
+        }
     };
     let json = options.json;
     let summary = match sim::app::run(options) {
         Ok(summary) if json => format!("{}\n", serde_json::json!(summary)),
         Ok(summary) => summary.to_string(),
-        Err(error) => return refuse(&format!("error: {error:#}")),
+        Err(error) => return refuse(&format!("error: {error:#}"), json),
     };
     // Nobody may be reading any more.
     let _ = io::stdout().write_all(summary.as_bytes());
     ExitCode::SUCCESS
 }
 
-fn refuse(line: &str) -> ExitCode {
-    eprintln!("{line}");
+/// As `nodectl` does: with --json an error is an object on the standard output.
+fn refuse(line: &str, json: bool) -> ExitCode {
+    if json {
+        let error = line.strip_prefix("error: ").unwrap_or(line);
+        println!("{}", serde_json::json!({ "error": error, "exit_code": USAGE }));
+    } else {
+        eprintln!("{line}");
+    }
     ExitCode::from(USAGE)
 }

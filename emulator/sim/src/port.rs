@@ -11,10 +11,15 @@ pub struct Adapter {
     pub silent: bool,
 }
 
+/// A frame that the bus has not taken for so long will not be taken: nobody is there, or the bit rate is another one.
+const PATIENCE: Time = Time::from_millis(1000);
+
 /// A place on the bus: empty, or with an adapter whose driver sends in the order of the requests.
 #[derive(Debug, Default)]
 pub struct Port {
     node: Option<HostNode>,
+    /// When a frame last went out, or the first one began to wait.
+    moved: Time,
 }
 
 impl Port {
@@ -34,8 +39,17 @@ impl Port {
     /// Queues a frame. Off the bus it is lost, as with an interface that is down.
     pub fn send(&mut self, frame: Frame, now: Time) {
         if let Some(node) = &mut self.node {
+            if node.backlog() == 0 {
+                self.moved = now;
+            }
             node.send(frame, now);
         }
+    }
+
+    /// Forgets what waits when nothing has gone out for a second. Returns how many frames that were.
+    pub fn give_up(&mut self, now: Time) -> u64 {
+        let stuck = self.node.as_mut().filter(|node| node.backlog() > 0 && now.since(self.moved) > PATIENCE);
+        stuck.map_or(0, HostNode::forget)
     }
 
     /// The oldest frame received and not taken yet, with its instant.
@@ -71,6 +85,7 @@ impl Controller for Port {
     }
 
     fn sent(&mut self, at: Time) {
+        self.moved = at;
         self.tell(|node| node.sent(at));
     }
 

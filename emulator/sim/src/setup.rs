@@ -30,10 +30,10 @@ pub fn world(options: &Options) -> Result<World> {
     let boards = boards.collect::<Result<Vec<Board>>>()?;
     let mut world = World::new(boards, options.bitrate, options.load);
     let Options { pressure, temperature, thermistor, shaft, button, fault, .. } = options;
-    [pressure, temperature, thermistor, shaft, button, fault]
-        .into_iter()
-        .flatten()
-        .for_each(|stimulus| world.apply(stimulus));
+    let stimuli = [pressure, temperature, thermistor, shaft, button, fault].into_iter().flatten();
+    for stimulus in stimuli {
+        world.apply(stimulus).context("a stimulus is for nobody")?;
+    }
     Ok(world)
 }
 
@@ -41,10 +41,11 @@ fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
     let twice = options.nodes.iter().filter(|other| other.id == node.id).count() > 1;
     ensure!(!twice, "node {} is given more than once", node.id);
     let kept = options.flash.as_deref().map(|dir| flash::load(dir, node.id)).transpose()?.flatten();
+    let writes_images = kept.is_none() || options.reflash;
     let mut contents = kept.unwrap_or_else(|| vec![0xFF; flash::SIZE]);
     provision(&mut contents, node, options.bitrate)?;
     let backup = options.flash.as_deref().map(|dir| flash::load_backup(dir, node.id)).transpose()?.flatten();
-    let contents = Contents { flash: &contents, backup: backup.as_deref() };
+    let contents = Contents { flash: &contents, backup: backup.as_deref(), writes_images };
     Board::new(node.id, node.personality, contents, Rc::clone(images))
 }
 
@@ -60,13 +61,4 @@ fn provision(flash: &mut [u8], node: &Node, bit_rate: u16) -> Result<()> {
         DeviceRecord::new(node_id, bit_rate, node.personality.number()).context("no such device record")?;
     let done = storage::provision(Memory(flash), PAGES, &record);
     done.map_err(|error| anyhow::anyhow!("the parameter store takes no device record: {error:?}"))
-}
-
-/// Writes what the boards keep without power back to where it was read from.
-pub fn keep_flash(options: &Options, world: &World) -> Result<()> {
-    let Some(dir) = &options.flash else { return Ok(()) };
-    world.boards().iter().try_for_each(|board| {
-        flash::save(dir, board.id(), &board.flash())?;
-        flash::save_backup(dir, board.id(), board.backup().as_deref())
-    })
 }

@@ -19,8 +19,10 @@ pub struct Status {
 /// One board.
 #[derive(Clone, Debug)]
 pub struct NodeStatus {
-    /// Its node-ID.
+    /// Its number on the command line.
     pub id: u8,
+    /// The node-ID with which it has booted.
+    pub node_id: u8,
     /// What it is.
     pub personality: Personality,
     /// What the bus tells of it.
@@ -85,6 +87,7 @@ mod tests {
     fn status(at: u64, bus_busy: u64, sent: u64, awake: u64) -> Status {
         let node = NodeStatus {
             id: 1,
+            node_id: 1,
             personality: Personality::Pressure,
             heard: Heard { sent, ..Heard::default() },
             pressure: 0.0,

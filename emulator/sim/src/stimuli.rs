@@ -33,8 +33,8 @@ impl Stimulus {
     pub fn parse(kind: &str, text: &str) -> Result<Targeted<Stimulus>, String> {
         match kind {
             "pressure" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Pressure)),
-            "temperature" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Temperature)),
-            "thermistor" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Thermistor)),
+            "temperature" => in_kelvin(text).map(|spec| spec.map(Stimulus::Temperature)),
+            "thermistor" => in_kelvin(text).map(|spec| spec.map(Stimulus::Thermistor)),
             "shaft" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Shaft)),
             "button" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Button)),
             "fault" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Fault)),
@@ -55,6 +55,21 @@ impl Stimulus {
             Stimulus::Fault(fault) => plant.add_fault(fault),
         }
     }
+}
+
+/// What is colder than -100 degC was meant in degC.
+const COLDEST: f64 = 173.15;
+
+fn in_kelvin(text: &str) -> Result<Targeted<Signal>, String> {
+    let spec: Targeted<Signal> = text.parse()?;
+    let lowest = spec.what.lowest();
+    if lowest < COLDEST {
+        return Err(format!(
+            "{lowest} K is {:.2} degC; temperatures are in K, e.g. const:298.15",
+            lowest - 273.15
+        ));
+    }
+    Ok(spec)
 }
 
 /// Something for one node, written `ID=SPEC`, or for all of them, written `SPEC`.
@@ -102,6 +117,16 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn degrees_celsius_are_noticed() {
+        for kind in ["temperature", "thermistor"] {
+            let refused = Stimulus::parse(kind, "1=const:25").unwrap_err();
+            assert_eq!(refused, "25 K is -248.15 degC; temperatures are in K, e.g. const:298.15");
+            assert!(Stimulus::parse(kind, "const:298.15").is_ok());
+        }
+        assert!(Stimulus::parse("pressure", "const:25").is_ok());
+    }
 
     #[test]
     fn a_target_is_a_node_id_before_an_equals_sign() {

@@ -70,6 +70,9 @@ pub struct Heard {
     pub last_emcy: Option<u16>,
     /// The first four bytes of the last TPDO 1 as REAL32: the process value of the first channel.
     pub process_value: Option<f32>,
+    /// The data of the last TPDO 1.
+    #[serde(skip)]
+    pub tpdo1: Option<Vec<u8>>,
 }
 
 impl Heard {
@@ -93,7 +96,10 @@ impl Heard {
 
     fn on_tpdo(&mut self, number: u16, data: &[u8]) {
         self.tpdos += 1;
+        // Nobody sends PDOs in another state (CiA 301, 7.3.2.2.4).
+        self.state = NmtState::Operational;
         if number == 1 {
+            self.tpdo1 = Some(data.to_vec());
             self.process_value = data.first_chunk().map(|value| f32::from_le_bytes(*value));
         }
     }
@@ -159,7 +165,7 @@ mod tests {
         hear(&mut traffic, 0x185, &250_000f32.to_le_bytes());
         hear(&mut traffic, 0x285, &[1]);
         let heard = traffic.node(5);
-        assert_eq!(heard.state, NmtState::PreOperational);
+        assert_eq!(heard.state, NmtState::Operational, "who sends PDOs is");
         assert_eq!((heard.boot_ups, heard.heartbeats, heard.tpdos), (1, 1, 2));
         assert_eq!((heard.sdo_frames, heard.emcys, heard.sent), (2, 1, 7));
         assert_eq!((heard.last_emcy, heard.process_value), (Some(0), Some(250_000.0)));

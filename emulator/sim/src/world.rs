@@ -25,6 +25,11 @@ const SEED: u64 = 1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PortId(usize);
 
+/// A stimulus is for a board that is not there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no node {0} here")]
+pub struct NoSuchBoard(pub u8);
+
 /// Boards, a bus, foreign traffic and clients.
 pub struct World {
     now: Time,
@@ -56,6 +61,9 @@ struct Records {
     log: Vec<Line>,
     /// Nodes whose boot-up was heard since the last look.
     booted: Vec<u8>,
+    /// The node-ID of each board: that of the command line until it boots with another one, which it has by LSS or from its
+    /// flash.
+    node_ids: Vec<u8>,
     retuning: Retuning,
     good: u64,
     bad: u64,
@@ -66,7 +74,9 @@ impl World {
     pub fn new(boards: Vec<Board>, bit_rate: u16, load: u8) -> World {
         let bit = Time::of_cycle(u64::from(bit_rate) * 1000);
         let load = (load > 0).then(|| Babbler::new(bit, f64::from(load) / 100.0, Babbler::foreign(), SEED));
-        let (bus, host, records) = (Bus::new(), HostNode::new(bit), Records::default());
+        let node_ids = boards.iter().map(Board::id).collect();
+        let records = Records { node_ids, ..Records::default() };
+        let (bus, host) = (Bus::new(), HostNode::new(bit));
         World { now: Time::ZERO, bit_rate, bit, bus, boards, host, load, ports: Vec::new(), records }
     }
 
@@ -119,10 +129,16 @@ impl World {
     }
 
     /// Gives the boards another stimulus from now on.
-    pub fn apply(&mut self, stimulus: &Targeted<Stimulus>) {
-        for board in self.boards.iter_mut().filter(|board| stimulus.is_for(board.id())) {
-            board.apply(&stimulus.what, self.now);
+    ///
+    /// # Errors
+    /// When the board that is meant is not there.
+    pub fn apply(&mut self, stimulus: &Targeted<Stimulus>) -> Result<(), NoSuchBoard> {
+        let mut meant = self.boards.iter_mut().filter(|board| stimulus.is_for(board.id())).peekable();
+        if let (None, Some(node)) = (meant.peek(), stimulus.node) {
+            return Err(NoSuchBoard(node));
         }
+        meant.for_each(|board| board.apply(&stimulus.what, self.now));
+        Ok(())
     }
 
     /// Lets everything up to `end` happen.
@@ -195,7 +211,8 @@ impl World {
 
     /// The present state of everything.
     pub fn status(&self) -> Status {
-        let nodes = self.boards.iter().map(|board| board.status(self.records.traffic.node(board.id())));
+        let nodes = self.boards.iter().zip(&self.records.node_ids);
+        let nodes = nodes.map(|(board, &id)| board.status(id, self.records.traffic.node(id)));
         Status { at: self.now, bus_busy: self.bus.busy(self.now), nodes: nodes.collect() }
     }
 
@@ -208,7 +225,8 @@ impl World {
             load: share(self.bus.busy(self.now), self.now),
             lost_by_clients,
         };
-        let nodes = self.boards.iter().map(|board| board.summary(self.records.traffic.node(board.id())));
+        let nodes = self.boards.iter().zip(&self.records.node_ids);
+        let nodes = nodes.map(|(board, &id)| board.summary(self.records.traffic.node(id)));
         Summary { virtual_seconds: self.now.as_secs_f64(), host_seconds, bus, nodes: nodes.collect() }
     }
 }
@@ -216,9 +234,13 @@ impl World {
 impl Records {
     fn on_event(&mut self, event: &Event) {
         match event {
-            &Event::Frame { end: at, frame, .. } => {
+            &Event::Frame { end: at, frame, transmitter, .. } => {
                 self.good += 1;
-                self.booted.extend(self.traffic.on_frame(&frame));
+                let booted = self.traffic.on_frame(&frame);
+                if let (Some(node), Some(id)) = (booted, self.node_ids.get_mut(transmitter)) {
+                    *id = node;
+                }
+                self.booted.extend(booted);
                 self.retuning.on_frame(&frame, at);
                 self.frames.push(Stamped { at, frame });
             }

@@ -41,6 +41,20 @@ fn a_port_in_use() {
 }
 
 #[test]
+fn with_json_an_error_is_json_too() {
+    for flags in [
+        &["--json", "--wings"][..],
+        &["--json", "--firmware", "/nowhere/firmware", "--socketcand", "127.0.0.1:0"],
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_sim")).args(flags).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let error: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(error["exit_code"], 2);
+        assert!(!error["error"].as_str().unwrap().is_empty() && output.stderr.is_empty());
+    }
+}
+
+#[test]
 fn help_is_no_error() {
     let output = Command::new(env!("CARGO_BIN_EXE_sim")).arg("--help").output().unwrap();
     assert!(output.status.success());

@@ -15,10 +15,10 @@ struct Bench {
 
 impl Bench {
     fn new() -> Bench {
-        Bench { world: World::new(Vec::new(), 1000, 0), gateway: Gateway::default() }
+        Bench { world: World::new(Vec::new(), 1000, 0), gateway: Gateway::new().unwrap() }
     }
 
-    fn serve(&self, protocol: Protocol) -> SocketAddr {
+    fn serve(&mut self, protocol: Protocol) -> SocketAddr {
         self.gateway.listen("127.0.0.1:0".parse().unwrap(), protocol).unwrap()
     }
 
@@ -33,6 +33,10 @@ impl Bench {
         self.world.run_until(self.world.now() + Time::from_millis(1));
         self.gateway.deliver(&mut self.world);
         std::thread::yield_now();
+    }
+
+    fn run(&mut self, steps: usize) {
+        (0..steps).for_each(|_| self.step());
     }
 
     /// What the client gets, up to and including `end`.
@@ -122,9 +126,54 @@ fn a_client_that_leaves_gives_its_place_to_the_next() {
     }
 }
 
+/// What a client has sent before it closed its connection reaches the bus, over both protocols: six times `nmt start`.
+#[test]
+fn what_was_sent_before_the_end_reaches_the_bus() {
+    let mut bench = Bench::new();
+    let (socketcand, slcan) = (bench.serve(Protocol::Socketcand), bench.serve(Protocol::Slcan));
+    let mut client = bench.raw_client(socketcand);
+    client.write_all("< send 000 2 1 5 >".repeat(6).as_bytes()).unwrap();
+    drop(client);
+    bench.run(20);
+    assert_eq!(bench.world.take_frames().len(), 6);
+
+    let mut client = bench.connect(slcan);
+    client.write_all(&[b"S8\rO\r", "t00020105\r".repeat(6).as_bytes()].concat()).unwrap();
+    drop(client);
+    bench.run(20);
+    assert_eq!(bench.world.take_frames().len(), 6);
+    assert_eq!(bench.gateway.clients(), 0, "and then it is gone");
+}
+
+/// Also what is more than the queue of one client holds.
+#[test]
+fn a_thousand_frames_before_the_end_reach_the_bus() {
+    let mut bench = Bench::new();
+    let address = bench.serve(Protocol::Socketcand);
+    let mut client = bench.raw_client(address);
+    client.write_all("< send 7FF 0 >".repeat(1000).as_bytes()).unwrap();
+    drop(client);
+    bench.run(200);
+    assert_eq!(bench.world.take_frames().len(), 1000);
+    assert_eq!((bench.gateway.clients(), bench.gateway.lost()), (0, 0));
+}
+
+/// Frames that nobody takes at this bit rate are given up: the client can go, and what comes after is served.
+#[test]
+fn frames_that_the_bus_does_not_take_are_given_up() {
+    let mut bench = Bench::new();
+    let slcan = bench.serve(Protocol::Slcan);
+    let mut wrong = bench.connect(slcan);
+    wrong.write_all(&[b"S6\rO\r", "t7FF0\r".repeat(10).as_bytes()].concat()).unwrap();
+    drop(wrong);
+    bench.run(1100);
+    assert_eq!((bench.gateway.clients(), bench.gateway.lost()), (0, 10));
+    assert!(bench.world.take_frames().is_empty());
+}
+
 #[test]
 fn a_port_in_use_is_an_error_that_names_it() {
-    let bench = Bench::new();
+    let mut bench = Bench::new();
     let address = bench.serve(Protocol::Socketcand);
     let error = bench.gateway.listen(address, Protocol::Slcan).unwrap_err();
     let message = format!("{error:#}");

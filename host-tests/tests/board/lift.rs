@@ -33,7 +33,7 @@ fn lamps(world: &mut World) -> [bool; 2] {
 fn push(world: &mut World, master: &Master, spec: &str) -> Vec<(u64, Vec<u8>)> {
     world.take_frames();
     let pushed = world.now();
-    world.apply(&Stimulus::parse("button", spec).unwrap());
+    world.apply(&Stimulus::parse("button", spec).unwrap()).unwrap();
     world.run_until(pushed + Time::from_millis(40));
     master.heard(world, INPUT);
     let id = canbus::StandardId::new(INPUT).unwrap().into();

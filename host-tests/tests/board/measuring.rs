@@ -79,7 +79,7 @@ fn a_parameter_selects_the_sensor_of_the_chip_or_the_thermistor() {
     write(&mut world, &master, THERMOMETER, 1, 1);
     for kelvin in [350.0, 298.15, 240.0] {
         let now = world.now();
-        world.apply(&Stimulus::parse("thermistor", &format!("const:{kelvin}")).unwrap());
+        world.apply(&Stimulus::parse("thermistor", &format!("const:{kelvin}")).unwrap()).unwrap();
         world.run_until(now + Time::from_millis(5));
         let thermistor = measured(&mut world);
         // A step of the converter is 0.02 K at 25 degC, and 0.13 K at 240 K.

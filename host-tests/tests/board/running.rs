@@ -1,7 +1,9 @@
 //! Nodes that run undisturbed, and what they cost.
 
 use canbus::Time;
+use sim::board::Programs;
 use sim::port::Adapter;
+use sim::stimuli::Stimulus;
 use sim::summary::Summary;
 use sim::traffic::NmtState;
 
@@ -154,6 +156,37 @@ fn the_same_run_gives_the_same_bus_log() {
     assert!(first.len() > 1000);
     assert!(first == log(7), "the logs differ");
     assert!(first != log(8), "noise does not reach the bus");
+}
+
+/// A flash that is kept is not written again: what an update or a tamperer has left in it is what runs. The images come back
+/// with --reflash, and parameters stay either way.
+#[test]
+fn a_kept_flash_is_not_written_without_being_asked() {
+    let dir = std::env::temp_dir().join(format!("board-kept-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&dir);
+    let flags = format!("--node 5:pressure --flash {}", dir.display());
+    let programs = |flags: &str| world(flags).boards()[0].programs();
+    assert_eq!(programs(&flags), Programs::Written);
+
+    let mut flash = world(&flags).boards()[0].flash();
+    sim::flash::save(&dir, 5, &flash).unwrap();
+    assert_eq!(programs(&flags), Programs::Kept);
+    const IN_THE_APPLICATION: usize = 0x1_1000;
+    flash[IN_THE_APPLICATION] ^= 1;
+    sim::flash::save(&dir, 5, &flash).unwrap();
+    let tampered = world(&flags);
+    assert_eq!(tampered.boards()[0].programs(), Programs::Others);
+    assert!(tampered.boards()[0].flash() == flash, "it stays as it is");
+    assert_eq!(programs(&format!("{flags} --reflash")), Programs::Written);
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+/// A stimulus for a board that is not there is refused, not forgotten.
+#[test]
+fn a_stimulus_for_nobody_is_refused() {
+    let mut world = world("--node 1");
+    let refused = world.apply(&Stimulus::parse("pressure", "5=const:1").unwrap()).unwrap_err();
+    assert_eq!(refused.to_string(), "there is no node 5 here");
 }
 
 /// A board whose flash is kept comes up as it was left, whatever the command line says.

@@ -6,12 +6,11 @@ use std::rc::Rc;
 
 use canbus::{Stamped, Time};
 use canopen::sdo::Multiplexer;
-use canopen::{Duration, Frame, Instant};
+use canopen::{Action, Duration, Frame, Instant};
 use chip::plant::{Motion, Signal};
 use host_tests::bench::Queue;
 use host_tests::network::{Unit, from_bus, to_bus};
 use host_tests::sdo::{Channel, Client};
-use node::Request;
 use sim::stimuli::Stimulus;
 
 use crate::car::WIDTH;
@@ -67,8 +66,8 @@ impl Seat {
     }
 
     fn fulfil(&mut self) {
-        while let Some(request) = self.device.take_request() {
-            assert_eq!(request, Request::Filters, "nobody resets a virtual device");
+        while let Some(action) = self.device.take_action() {
+            assert_eq!(action, Action::Identifiers, "nobody resets a virtual device");
             self.filters = [self.device.process_ids(), self.device.service_ids()];
         }
     }
@@ -100,7 +99,7 @@ impl Boards {
             virtual_devices(&world).into_iter().map(|device| Seat::new(device, &mut boards)).collect();
         seats.iter_mut().for_each(|seat| seat.start(&mut boards));
         let mut lift = Boards { boards, master, seats, world, log: vec![] };
-        lift.boards.apply(&parse("shaft", &format!("{POSITION}=const:{}", 3_000.0 / TAPE)));
+        lift.boards.apply(&parse("shaft", &format!("{POSITION}=const:{}", 3_000.0 / TAPE))).unwrap();
         lift.load(0.0);
         lift.run(1000);
         lift
@@ -141,13 +140,13 @@ impl Boards {
 
     pub(crate) fn load(&mut self, kilograms: f64) {
         let pascal = 2.0e5 + kilograms * 500.0;
-        self.boards.apply(&parse("pressure", &format!("{LOAD}=const:{pascal}")));
+        self.boards.apply(&parse("pressure", &format!("{LOAD}=const:{pascal}"))).unwrap();
     }
 
     /// Button 1 is pressed for a moment.
     pub(crate) fn press_button(&mut self) {
         for what in ["down", "up"] {
-            self.boards.apply(&parse("button", &format!("{LOAD}=1:{what}")));
+            self.boards.apply(&parse("button", &format!("{LOAD}=1:{what}"))).unwrap();
             self.run(50);
         }
     }

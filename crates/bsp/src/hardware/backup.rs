@@ -4,6 +4,7 @@ use stm32f4xx_hal::pac::{CRC, PWR};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 use crate::kept::{Checksum, Content, Found, Keeper, Slots};
+use crate::losses::{Event, Losses};
 
 /// 4 KiB (RM0390, table 1; RM0090, table 1).
 const BASE: *const Slots = 0x4002_4000 as *const Slots;
@@ -14,6 +15,7 @@ const _: () = assert!(size_of::<Slots>() <= 4096);
 pub struct BackupMemory {
     power: PWR,
     keeper: Keeper<'static, CrcUnit>,
+    losses: &'static Losses,
 }
 
 /// CRC-32/MPEG-2, by the unit of the chip (RM0390, 4).
@@ -45,7 +47,12 @@ impl Checksum for CrcUnit {
 impl BackupMemory {
     /// Switches it on, and finds what was kept. The backup regulator need not be ready: it takes over when the main supply
     /// goes (RM0390, 5.1.2).
-    pub(crate) fn open(power: PWR, crc: CRC, rcc: &mut Rcc) -> (BackupMemory, Found) {
+    pub(crate) fn open(
+        power: PWR,
+        crc: CRC,
+        losses: &'static Losses,
+        rcc: &mut Rcc,
+    ) -> (BackupMemory, Found) {
         PWR::enable(rcc);
         rcc.ahb1enr().modify(|_, w| w.bkpsramen().set_bit());
         protect(&power, false);
@@ -55,14 +62,18 @@ impl BackupMemory {
         // only, once, so nothing else refers to it.
         let slots = unsafe { &*BASE };
         let (keeper, found) = Keeper::open(slots, CrcUnit::new(crc, rcc));
-        (BackupMemory { power, keeper }, found)
+        (BackupMemory { power, keeper, losses }, found)
     }
 
-    /// Keeps this. Nothing else can write to the memory: it is protected but for the time of this call.
+    /// Keeps this. Nothing else can write to the memory: it is protected but for the time of this call. A write that does not
+    /// arrive is counted, and the next one goes to the same place: the copy before it stays good.
     pub fn write(&mut self, content: &Content) {
         protect(&self.power, false);
-        self.keeper.write(content);
+        let is_kept = self.keeper.write(content);
         protect(&self.power, true);
+        if !is_kept {
+            self.losses.count(Event::BackupWrite);
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use super::can::registers;
 use super::time_base::Clock;
 use crate::filters::Fifo;
-use crate::losses::Losses;
+use crate::losses::{Event, Losses};
 use crate::mailbox::Mailbox;
 
 /// Frames that wait for their task. At 1 Mbit/s the shortest frame takes 47 us, so this is 1.5 ms of nothing but them.
@@ -88,7 +88,7 @@ impl Receiver {
 
     fn count(&self, lost: bool) {
         if lost {
-            self.lost.count();
+            self.lost.count(Event::Frame);
         }
     }
 }

@@ -18,19 +18,36 @@ const TXRQ: u32 = 1 << 0;
 const TXOK: u32 = 1 << 1;
 const ABRQ: u32 = 1 << 7;
 
+/// How often to look whether a frame is taken back: a matter of a few clocks, unless its transmission has just begun.
+const ABORT_POLLS: u32 = 100;
+
 /// The transmit mailboxes.
-pub struct Transmitter(());
+pub struct Transmitter {
+    /// A frame that is to be taken back, with the number of its mailbox, while the end of its transmission is awaited.
+    aborted: Option<(u32, Frame)>,
+}
 
 impl Transmitter {
     /// There is one.
     pub(super) fn new() -> Transmitter {
-        Transmitter(())
+        Transmitter { aborted: None }
     }
 
     /// Acknowledges the transmit interrupt. To be called before the queue is pumped: a mailbox that becomes free later
     /// interrupts again.
     pub fn acknowledge(&mut self) {
+        self.settle();
         registers().tsr().write(|w| w.rqcp0().set_bit().rqcp1().set_bit().rqcp2().set_bit());
+    }
+
+    /// A frame whose transmission had begun when it was to be taken back has ended: if nobody has received it, it is sent again.
+    fn settle(&mut self) {
+        if let Some((number, frame)) = self.aborted.filter(|(number, _)| !is_aborting(*number)) {
+            self.aborted = None;
+            if let Some(mailbox) = registers().tx_iter().nth(number as usize).filter(|_| !is_sent(number)) {
+                load(mailbox, &frame);
+            }
+        }
     }
 
     /// Whether all mailboxes are empty: everything that was sent is on the wire.
@@ -53,7 +70,10 @@ impl Mailboxes for Transmitter {
     /// Among equal identifiers the hardware prefers the mailbox of the lower number, not the frame that came first, so a
     /// frame waits for those of its own identifier.
     fn offer(&mut self, frame: &Frame) -> Offer {
-        if would_wait() || pending().any(|(_, other)| order(other) <= identifier(frame)) {
+        if self.aborted.is_some()
+            || would_wait()
+            || pending().any(|(_, other)| order(other) <= identifier(frame))
+        {
             return Offer::Refused;
         }
         if let Some(free) = registers().tx_iter().find(|mailbox| !is_pending(mailbox)) {
@@ -63,7 +83,13 @@ impl Mailboxes for Transmitter {
         let Some((number, last)) = pending().max_by_key(|(_, mailbox)| order(mailbox)) else {
             return Offer::Refused;
         };
-        let replaced = take_back(number, last);
+        let replaced = content(last);
+        abort(number);
+        if is_aborting(number) {
+            self.aborted = replaced.map(|replaced| (number, replaced));
+            return Offer::Refused;
+        }
+        let replaced = replaced.filter(|_| !is_sent(number));
         load(last, frame);
         replaced.map_or(Offer::Taken, Offer::Replaced)
     }
@@ -94,20 +120,35 @@ fn would_wait() -> bool {
     full && registers().msr().read().txm().bit_is_set()
 }
 
-/// Takes a frame out of its mailbox; `None` when it was sent meanwhile.
-fn take_back(number: u32, mailbox: &TX) -> Option<Frame> {
-    let flags = 8 * number;
-    // SAFETY: the other bits of TSR are cleared by writing 1, so 0 leaves them.
-    registers().tsr().write(|w| unsafe { w.bits(ABRQ << flags) });
-    while registers().tsr().read().bits() & ABRQ << flags != 0 {}
-    let is_sent = registers().tsr().read().bits() & TXOK << flags != 0;
+/// The frame in a mailbox.
+fn content(mailbox: &TX) -> Option<Frame> {
     let content = Mailbox {
         rir: mailbox.tir().read().bits(),
         rdtr: mailbox.tdtr().read().bits(),
         rdlr: mailbox.tdlr().read().bits(),
         rdhr: mailbox.tdhr().read().bits(),
     };
-    if is_sent { None } else { content.frame() }
+    content.frame()
+}
+
+/// Takes the frame out of a mailbox, unless it is on the wire by now: then the end of its transmission ends this too.
+fn abort(number: u32) {
+    // SAFETY: the other bits of TSR are cleared by writing 1, so 0 leaves them.
+    registers().tsr().write(|w| unsafe { w.bits(ABRQ << flags_of(number)) });
+    let _ = (0..ABORT_POLLS).find(|_| !is_aborting(number));
+}
+
+fn is_aborting(number: u32) -> bool {
+    registers().tsr().read().bits() & ABRQ << flags_of(number) != 0
+}
+
+fn is_sent(number: u32) -> bool {
+    registers().tsr().read().bits() & TXOK << flags_of(number) != 0
+}
+
+/// Where the flags of a mailbox are in TSR.
+fn flags_of(number: u32) -> u32 {
+    8 * (number % 3)
 }
 
 fn load(mailbox: &TX, frame: &Frame) {

@@ -66,6 +66,19 @@ impl Signal {
     }
 }
 
+impl Signal {
+    /// The lowest value that it has, noise left out.
+    pub fn lowest(&self) -> f64 {
+        match self {
+            Signal::Constant(value) => *value,
+            Signal::Sine { offset, amplitude, .. } => offset - amplitude.abs(),
+            Signal::Ramp { from, to, .. } | Signal::Step { from, to, .. } => from.min(*to),
+            Signal::Noise { mean, .. } => *mean,
+            Signal::Table(table) => table.lowest(),
+        }
+    }
+}
+
 /// A number of the standard normal distribution that depends on nothing but the seed and the instant (Box-Muller).
 fn normal(seed: u64, age: Time) -> f64 {
     let first = mix(mix(seed) ^ age.0);
@@ -119,6 +132,15 @@ mod tests {
         assert_eq!([0, 500, 2000, 9000].map(|t| at(&ramp, t)), [10.0, 7.5, 0.0, 0.0]);
         let step = Signal::Step { from: 1.0, to: 2.0, at: 0.5 };
         assert_eq!([0, 499, 500, 501].map(|t| at(&step, t)), [1.0, 1.0, 2.0, 2.0]);
+    }
+
+    #[test]
+    fn the_lowest_value_of_each() {
+        let sine = Signal::Sine { offset: 10.0, amplitude: -4.0, hertz: 2.0 };
+        let ramp = Signal::Ramp { from: 10.0, to: 0.0, seconds: 2.0 };
+        let step = Signal::Step { from: 1.0, to: 2.0, at: 0.5 };
+        let noise = Signal::Noise { mean: 3.0, sigma: 9.0, seed: 1 };
+        assert_eq!([sine, ramp, step, noise].map(|signal| signal.lowest()), [6.0, 0.0, 1.0, 3.0]);
     }
 
     #[test]

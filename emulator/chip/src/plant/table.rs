@@ -61,6 +61,11 @@ impl Table {
         Self::parse(&name, &text)
     }
 
+    /// The lowest of its points.
+    pub(super) fn lowest(&self) -> f64 {
+        self.points.iter().map(|&(_, value)| value).fold(f64::INFINITY, f64::min)
+    }
+
     fn parse(path: &str, text: &str) -> Result<Self, TableError> {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (index, line) in text.lines().enumerate() {

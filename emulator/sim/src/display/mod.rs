@@ -1,7 +1,8 @@
-//! What the user sees: a live screen on a terminal, plain lines elsewhere.
+//! What the user sees: a live screen on a terminal, plain lines elsewhere, nothing beside JSON.
 
 mod plain;
 mod screen;
+mod tpdo;
 
 use std::io::{self, IsTerminal};
 
@@ -13,12 +14,14 @@ use crate::status::{NodeStatus, Status};
 use plain::Plain;
 use screen::Screen;
 
-/// The one or the other.
+/// One of the three.
 pub struct Display(Kind);
 
 enum Kind {
     Screen(Box<Screen>),
     Plain(Plain),
+    /// The log goes to the standard error output: the other one is for a program.
+    Quiet,
 }
 
 impl Display {
@@ -33,6 +36,11 @@ impl Display {
         Ok(Display(kind))
     }
 
+    /// Shows nothing but the log, which goes to the standard error output.
+    pub fn quiet() -> Display {
+        Display(Kind::Quiet)
+    }
+
     /// Whether commands are typed on the screen; if not, they come line by line on the standard input.
     pub fn takes_commands(&self) -> bool {
         matches!(self.0, Kind::Screen(_))
@@ -43,6 +51,7 @@ impl Display {
         match &mut self.0 {
             Kind::Screen(screen) => screen.log(log_line(line)),
             Kind::Plain(plain) => plain.log(line)?,
+            Kind::Quiet => eprintln!("{}", log_line(line)),
         }
         Ok(())
     }
@@ -51,7 +60,7 @@ impl Display {
     pub fn say(&mut self, text: String) {
         match &mut self.0 {
             Kind::Screen(screen) => screen.log(text),
-            Kind::Plain(_) => eprintln!("{text}"),
+            Kind::Plain(_) | Kind::Quiet => eprintln!("{text}"),
         }
     }
 
@@ -60,6 +69,7 @@ impl Display {
         match &mut self.0 {
             Kind::Screen(screen) => screen.update(status),
             Kind::Plain(plain) => plain.update(now, status).map(|()| None),
+            Kind::Quiet => Ok(None),
         }
     }
 }
@@ -68,7 +78,7 @@ fn log_line(line: &Line) -> String {
     format!("{} node {} {:5} {}", line.at, line.node, format!("{:?}", line.level).to_lowercase(), line.text)
 }
 
-/// The process value as the node itself sends it.
-fn process_value(node: &NodeStatus) -> String {
-    node.heard.process_value.map_or_else(|| "no TPDO".to_owned(), |value| format!("{value:.3}"))
+/// The board's number, and its node-ID where that is another one.
+fn name(node: &NodeStatus) -> String {
+    if node.id == node.node_id { node.id.to_string() } else { format!("{} ({})", node.id, node.node_id) }
 }

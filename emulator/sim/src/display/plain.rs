@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use canbus::Time;
 
+use super::tpdo;
 use crate::log::Line;
 use crate::status::Status;
 
@@ -45,11 +46,11 @@ fn lines(status: &Status, earlier: &Status) -> Vec<String> {
     let rates = status.rates(earlier);
     let bus = format!("bus {:.1} %", rates.bus_load * 100.0);
     let nodes = status.nodes.iter().zip(&rates.nodes).map(|(node, rate)| {
-        let value = super::process_value(node);
+        let value = tpdo::value(node);
         format!(
-            "{} node {} {}: {} [sensor {:.0} Pa, {:.2} K, {:.4} rev] {:.1} frames/s, {bus}, CPU {:.2} %",
+            "{} node {} {}: TPDO 1 {} [sensor {:.0} Pa, {:.2} K, {:.4} rev] {:.1} frames/s, {bus}, CPU {:.2} %",
             status.at,
-            node.id,
+            super::name(node),
             node.heard.state,
             value,
             node.pressure,

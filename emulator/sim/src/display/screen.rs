@@ -5,7 +5,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
-use ratatui::layout::{Constraint, Layout};
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Stylize;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph, Row, Table};
@@ -135,7 +135,7 @@ impl View {
         let [heading, nodes, log, input] = Layout::vertical(areas).areas(frame.area());
         frame.render_widget(self.heading(), heading);
         frame.render_widget(self.nodes(), nodes);
-        frame.render_widget(self.log_lines(log.height), log);
+        frame.render_widget(self.log_lines(log), log);
         frame.render_widget(Paragraph::new(format!("> {}_", self.input)), input);
     }
 
@@ -147,18 +147,9 @@ impl View {
     }
 
     fn nodes(&self) -> Table<'_> {
-        let titles = [
-            "node",
-            "is",
-            "NMT state",
-            "TPDO 1",
-            "pressure Pa",
-            "temp. K",
-            "position rev",
-            "frames/s",
-            "CPU %",
-        ];
-        let widths = [4, 9, 15, 14, 12, 8, 12, 9, 7].map(Constraint::Length);
+        // Quantities over their units, so that the table fits 80 columns.
+        let titles = ["node", "is", "NMT state", "TPDO 1", "p/Pa", "T/K", "turns", "frames/s", "CPU/%"];
+        let widths = [7, 8, 15, 11, 7, 6, 7, 8, 5].map(Constraint::Max);
         let none = NodeRates { frames: 0.0, cpu_load: 0.0 };
         let rows = self.status.nodes.iter().enumerate().map(|(index, node)| {
             let rates = self.rates.as_ref().and_then(|rates| rates.nodes.get(index));
@@ -167,24 +158,31 @@ impl View {
         Table::new(rows, widths).header(Row::new(titles).bold()).block(Block::bordered().title(" nodes "))
     }
 
-    /// As many of the last lines as fit.
-    fn log_lines(&self, height: u16) -> Paragraph<'_> {
-        let room = usize::from(height.saturating_sub(2));
-        let lines = self.log.iter().skip(self.log.len().saturating_sub(room));
-        let lines: Vec<Line> = lines.map(|line| Line::from(line.as_str())).collect();
-        Paragraph::new(lines).block(Block::bordered().title(" log "))
+    /// As many of the last lines as fit; a long one is several.
+    fn log_lines(&self, area: Rect) -> Paragraph<'_> {
+        let inside = |length: u16| usize::from(length.saturating_sub(2));
+        let (room, width) = (inside(area.height), inside(area.width).max(1));
+        let lines: Vec<Line> = self.log.iter().flat_map(|line| wrapped(line, width)).collect();
+        Paragraph::new(lines[lines.len().saturating_sub(room)..].to_vec())
+            .block(Block::bordered().title(" log "))
     }
+}
+
+/// A line cut into lines of so many letters.
+fn wrapped(line: &str, width: usize) -> Vec<Line<'static>> {
+    let letters: Vec<char> = line.chars().collect();
+    letters.chunks(width).map(|part| Line::from(part.iter().collect::<String>())).collect()
 }
 
 fn row(node: &NodeStatus, rates: &NodeRates) -> Row<'static> {
     Row::new([
-        node.id.to_string(),
+        super::name(node),
         node.personality.to_string(),
         node.heard.state.to_string(),
-        super::process_value(node),
+        super::tpdo::value(node),
         format!("{:.0}", node.pressure),
         format!("{:.2}", node.temperature),
-        format!("{:.4}", node.position),
+        format!("{:.3}", node.position),
         format!("{:.1}", rates.frames),
         format!("{:.2}", rates.cpu_load * 100.0),
     ])
@@ -203,12 +201,13 @@ mod tests {
     fn view() -> View {
         let heard = Heard {
             state: NmtState::Operational,
-            process_value: Some(250_003.5),
+            tpdo1: Some([2.5_f32.to_le_bytes(), 25.0_f32.to_le_bytes()].concat()),
             sent: 12,
             ..Heard::default()
         };
         let node = NodeStatus {
             id: 5,
+            node_id: 5,
             personality: Personality::Pressure,
             heard,
             pressure: 250_000.0,
@@ -222,7 +221,7 @@ mod tests {
     }
 
     fn drawn(view: &View) -> String {
-        let mut terminal = Terminal::new(TestBackend::new(100, 14)).unwrap();
+        let mut terminal = Terminal::new(TestBackend::new(80, 14)).unwrap();
         terminal.draw(|frame| view.draw(frame)).unwrap();
         terminal.backend().to_string()
     }
@@ -240,10 +239,21 @@ mod tests {
         view.log("0.1 node 5 info started".into());
         view.average(Duration::from_secs(1));
         let screen = drawn(&view);
-        for text in ["2.00 x real time", "bus load 1.0 %", "hello", "operational", "250003.500", "250000"] {
+        for text in ["2.00 x real time", "bus load 1.0 %", "hello", "operational", "2.500 bar", "250000"] {
             assert!(screen.contains(text), "{text} in\n{screen}");
         }
-        for text in ["298.15", "0.2500", "6.0", "5.00", "node 5 info started"] {
+        for text in ["298.15", "0.250", "6.0", "5.00", "node 5 info started"] {
+            assert!(screen.contains(text), "{text} in\n{screen}");
+        }
+    }
+
+    #[test]
+    fn eighty_columns_are_enough_for_every_title_and_long_lines_go_on_in_the_next() {
+        let mut view = view();
+        view.status.nodes[0].node_id = 7;
+        view.log("x".repeat(100) + "end");
+        let screen = drawn(&view);
+        for text in ["NMT state", "TPDO 1", "p/Pa", "T/K", "turns", "frames/s", "CPU/%", "5 (7)", "xend"] {
             assert!(screen.contains(text), "{text} in\n{screen}");
         }
     }

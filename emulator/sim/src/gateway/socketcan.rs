@@ -1,53 +1,63 @@
 //! A SocketCAN interface of the host as a client, so that candump and its kin see the bus.
 
+use std::collections::VecDeque;
 use std::io;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, SyncSender, sync_channel};
-use std::thread;
-use std::time::Duration;
 
 use canbus::Frame;
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket};
 
-use super::tcp::{ClientId, Event};
+use crate::port::Adapter;
+use crate::world::{PortId, World};
 
-/// Frames that may wait for the interface.
-const BACKLOG: usize = 16_384;
+/// Frames that may wait for the interface. It loses what comes on top.
+const MOST: usize = 1024;
 
-/// How long the kernel may take to accept a frame before it is given up.
-const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+/// Frames of the interface that may wait for the bus. While so many wait nothing more is read from it.
+const QUEUE: usize = 64;
 
-/// Opens the interface and moves its frames; the sender takes those of the bus. Reading and writing share one
-/// socket, because a socket does not hear what it has sent itself.
-pub(super) fn open(
-    interface: &str,
-    client: ClientId,
-    events: Sender<Event>,
-) -> io::Result<SyncSender<Frame>> {
-    let socket = Arc::new(CanSocket::open(interface)?);
-    socket.set_write_timeout(WRITE_TIMEOUT)?;
-    let (frames, queue) = sync_channel(BACKLOG);
-    let reader = Arc::clone(&socket);
-    thread::spawn(move || read_all(&reader, client, &events));
-    thread::spawn(move || write_all(&socket, &queue));
-    Ok(frames)
+/// An interface. Reading and writing share one socket, because a socket does not hear what it has sent itself.
+pub(super) struct Interface {
+    socket: CanSocket,
+    port: PortId,
+    waiting: VecDeque<CanFrame>,
 }
 
-fn read_all(socket: &CanSocket, client: ClientId, events: &Sender<Event>) {
-    while let Ok(frame) = socket.read_frame() {
-        let Some(frame) = from_host(&frame) else { continue };
-        if events.send(Event::Frame(client, frame)).is_err() {
-            return;
+impl Interface {
+    /// Opens an interface and gives it a place on the bus.
+    pub(super) fn open(name: &str, world: &mut World) -> io::Result<Interface> {
+        let socket = CanSocket::open(name)?;
+        socket.set_nonblocking(true)?;
+        let (port, bit_rate) = (world.open_port(), world.bit_rate());
+        world.port(port).attach(Some(Adapter { bit_rate, silent: false }));
+        Ok(Interface { socket, port, waiting: VecDeque::new() })
+    }
+
+    /// Requests what the programs of the host have sent.
+    pub(super) fn listen(&mut self, world: &mut World) {
+        let now = world.now();
+        while world.port(self.port).backlog() < QUEUE
+            && let Ok(frame) = self.socket.read_frame()
+        {
+            from_host(&frame).into_iter().for_each(|frame| world.port(self.port).send(frame, now));
         }
     }
-    let _ = events.send(Event::Closed(client));
-}
 
-fn write_all(socket: &CanSocket, frames: &Receiver<Frame>) {
-    while let Ok(frame) = frames.recv() {
-        let Some(frame) = to_host(&frame) else { continue };
-        // A full queue of the interface loses the frame, as it would for any other sender.
-        let _ = socket.write_frame(&frame);
+    /// Tells the host what was on the bus; returns how many frames it was too slow for, or the bus did not take.
+    pub(super) fn tell(&mut self, world: &mut World) -> u64 {
+        let now = world.now();
+        let mut lost = world.port(self.port).give_up(now);
+        while let Some(stamped) = world.port(self.port).receive() {
+            match to_host(&stamped.frame).filter(|_| self.waiting.len() < MOST) {
+                Some(frame) => self.waiting.push_back(frame),
+                None => lost += 1,
+            }
+        }
+        while let Some(frame) = self.waiting.front()
+            && self.socket.write_frame(frame).is_ok()
+        {
+            self.waiting.pop_front();
+        }
+        lost
     }
 }
 

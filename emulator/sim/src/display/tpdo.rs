@@ -1,0 +1,49 @@
+//! TPDO 1 as a node sends it when it is delivered: what 1A00h maps and 6131h selects by default.
+
+use crate::personality::Personality;
+use crate::status::NodeStatus;
+
+/// The first value of the last TPDO 1 with its unit. A PDO that is mapped otherwise is shown as it is.
+pub(super) fn value(node: &NodeStatus) -> String {
+    let Some(data) = &node.heard.tpdo1 else { return "no TPDO".to_owned() };
+    match (node.personality, data.as_slice()) {
+        // Two process values, the first in bar.
+        (Personality::Pressure, &[a, b, c, d, _, _, _, _]) => {
+            format!("{:.3} bar", f32::from_le_bytes([a, b, c, d]))
+        }
+        // 6004h.
+        (Personality::Encoder | Personality::Combined, &[a, b, c, d]) => {
+            format!("{} units", u32::from_le_bytes([a, b, c, d]))
+        }
+        (_, bytes) => bytes.iter().map(|byte| format!("{byte:02X}")).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use canbus::Time;
+
+    use super::*;
+    use crate::traffic::Heard;
+
+    fn shown(personality: Personality, data: Option<&[u8]>) -> String {
+        let heard = Heard { tpdo1: data.map(<[u8]>::to_vec), ..Heard::default() };
+        let (pressure, temperature, position, awake) = (0.0, 0.0, 0.0, Time::ZERO);
+        value(&NodeStatus { id: 1, node_id: 1, personality, heard, pressure, temperature, position, awake })
+    }
+
+    #[test]
+    fn each_personality_has_its_value_and_its_unit() {
+        let pressure = [2.5_f32.to_le_bytes(), 25.0_f32.to_le_bytes()].concat();
+        assert_eq!(shown(Personality::Pressure, Some(&pressure)), "2.500 bar");
+        assert_eq!(shown(Personality::Encoder, Some(&4782_u32.to_le_bytes())), "4782 units");
+        assert_eq!(shown(Personality::Combined, Some(&1_u32.to_le_bytes())), "1 units");
+    }
+
+    #[test]
+    fn what_is_mapped_otherwise_is_shown_as_it_is() {
+        assert_eq!(shown(Personality::Pressure, Some(&[0x12, 0xAB])), "12AB");
+        assert_eq!(shown(Personality::Encoder, Some(&[])), "");
+        assert_eq!(shown(Personality::Lift, None), "no TPDO");
+    }
+}
