@@ -208,7 +208,9 @@ mod tests {
             assert_eq!(Formula::parse(text, data_type).unwrap().text(data_type), text);
         }
         // Vendors write real numbers with a point.
-        for (text, written) in [("0.1", "0x3DCCCCCD"), ("1e38", "0x7E967699"), ("-40.0", "0xC2200000"), ("0.0", "0")] {
+        for (text, written) in
+            [("0.1", "0x3DCCCCCD"), ("1e38", "0x7E967699"), ("-40.0", "0xC2200000"), ("0.0", "0")]
+        {
             assert_eq!(Formula::parse(text, REAL32).unwrap().text(REAL32), written);
         }
     }
