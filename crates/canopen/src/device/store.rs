@@ -83,7 +83,9 @@ impl Jobs {
     }
 }
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// The job is done, or cannot be: whoever waits for it is answered.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
@@ -105,7 +107,9 @@ impl Default for Jobs {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// Begins the job that a write to 1010h or 1011h asks for.
     pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;
