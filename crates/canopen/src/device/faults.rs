@@ -13,6 +13,7 @@ const TO_STOPPED: u32 = 2;
 
 /// What the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BusEvent {
     /// A received frame was lost.
     Overrun,

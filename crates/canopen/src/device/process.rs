@@ -2,7 +2,7 @@
 
 use super::{Application, Core, Device, Next, STALE};
 use crate::nmt::Command;
-use crate::pdo::{Chain, Rpdo, Tpdo};
+use crate::pdo::{Chain, Direction, Rpdo, Tpdo};
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
@@ -75,6 +75,22 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     ) -> Next {
         self.show(update);
         self.send_changes(now, out);
+        self.process_next()
+    }
+
+    /// Sends a TPDO of type 254 or 255 now, or as soon as its inhibit time is over: an event that the application has
+    /// found. `tpdo` is the number, 1 to 512; one that is not valid, or of another type, is not sent.
+    pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
+        let turn = &mut self.turn(now, out);
+        let mut numbers = self.core.dictionary.pdos(Direction::Transmit).map(|index| (index & 0x1FF) + 1);
+        let place = numbers.position(|number| number == tpdo);
+        if self.core.state.has_pdos()
+            && let Some(tpdo) = place.and_then(|place| self.core.tpdos.get_mut(place))
+        {
+            tpdo.on_event();
+            self.core.process_due = STALE;
+        }
+        self.send_process(turn);
         self.process_next()
     }
 

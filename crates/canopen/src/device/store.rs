@@ -21,6 +21,7 @@ const RESET_PROGRAM: u32 = 2;
 
 /// Something to be stored or restored. The job is done when [`Device::finish`] says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Job {
     /// Store the present values of these groups.
     Store(Groups),

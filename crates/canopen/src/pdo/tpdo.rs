@@ -136,6 +136,12 @@ impl Tpdo {
         }
     }
 
+    /// The application has found an event.
+    pub(crate) fn on_event(&mut self) {
+        self.pending |=
+            self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
+    }
+
     /// Mapped values may have changed.
     pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         if self.settings.as_ref().is_some_and(Settings::sends_on_change) && self.has_changed(image) {
