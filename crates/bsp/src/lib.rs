@@ -9,6 +9,7 @@
 #![deny(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 pub mod back_off;
+pub mod battery;
 pub mod bit_rate_detection;
 pub mod bit_timing;
 pub mod bus_state;

@@ -247,6 +247,57 @@ mod tests {
         assert_eq!(order, [(0x181, 0), (0x281, 0), (0x581, 0), (0x701, 1), (0x701, 4)]);
     }
 
+    /// Events and states of the same and of other identifiers, on a bus that comes and goes: every event arrives once and in
+    /// the order of its identifier, and of the states the newest.
+    #[test]
+    fn no_event_is_lost_or_passed_whatever_waits_beside_it() {
+        const IDS: [u16; 4] = [0x181, 0x183, 0x281, 0x701];
+        const EVENTS: usize = 10_000;
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        let (mut seed, mut sent, mut state) = (1_u32, [0_u16; 4], 0_u16);
+        let mut arrived: Vec<(u16, bool, u16)> = Vec::new();
+        let message = |id: u16, is_event: bool, number: u16| {
+            let [low, high] = number.to_le_bytes();
+            Frame::new(id, &[is_event.into(), low, high]).unwrap()
+        };
+        let mut take = |bus: &mut Fake| {
+            let Some(frame) = bus.send() else { return false };
+            let [is_event, low, high] = *frame.data() else { panic!("{frame:?}") };
+            arrived.push((frame.id(), is_event != 0, u16::from_le_bytes([low, high])));
+            true
+        };
+        while sent.iter().map(|count| usize::from(*count)).sum::<usize>() < EVENTS {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let (place, choice) = ((seed >> 30) as usize, seed >> 20 & 0xF);
+            // For a quarter of the time there is no bus.
+            let is_off = (sent.iter().map(|count| u32::from(*count)).sum::<u32>() / 64).is_multiple_of(4);
+            match choice {
+                // A sender that finds no room comes again with the same event.
+                0..6 if queue.send(message(IDS[place], true, sent[place])).is_ok() => sent[place] += 1,
+                6..10 => {
+                    state = state.wrapping_add(1);
+                    let _ = queue.send_state(message(IDS[place], false, state));
+                }
+                _ if !is_off || queue.room() == 0 => drop(take(&mut bus)),
+                _ => (),
+            }
+            queue.pump(&mut bus);
+        }
+        for id in IDS {
+            queue.send_state(message(id, false, u16::MAX)).unwrap_or_else(|QueueFull| ());
+        }
+        while take(&mut bus) {
+            queue.pump(&mut bus);
+        }
+        for (id, sent) in IDS.into_iter().zip(sent) {
+            let own = arrived.iter().filter(|(other, ..)| *other == id);
+            let events: Vec<u16> = own.filter(|(_, is_event, _)| *is_event).map(|event| event.2).collect();
+            assert!(events.iter().copied().eq(0..sent), "{id:03X}h");
+        }
+        let states = arrived.iter().filter(|(_, is_event, _)| !is_event).count();
+        assert!(states > 100 && states < usize::from(state), "{states} of {state} states: some gave way");
+    }
+
     #[test]
     fn a_full_queue_takes_a_state_that_waits_in_it() {
         let mut queue = TransmitQueue::new();
