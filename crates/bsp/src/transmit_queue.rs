@@ -3,8 +3,13 @@
 //! The bus itself prefers the lowest identifier. A plain queue in front of the mailboxes would undo that: a heartbeat
 //! that came first would hold up a SYNC (priority inversion).
 //!
-//! Of heartbeats and PDOs only the newest waits. Else a node that more urgent frames have kept silent would fill the queue with
-//! what has long ceased to be so, and would tell it all in the first gap.
+//! There are two kinds of frames, and the sender says which kind a frame is:
+//!
+//! * An event ([`Transmit::send`]) is sent once and in its order, however long it waits. When the queue is full, the sender keeps the event
+//!   and offers it again.
+//! * A state ([`Transmit::send_state`]), such as a heartbeat or a measured value, is worth nothing once there is a newer one. The newer
+//!   frame takes the place of the older one of its CAN-ID. So a node that more urgent frames keep silent for minutes sends one frame of
+//!   each CAN-ID in the first gap, and not a queue of old values.
 
 use canopen::{Frame, QueueFull, Transmit};
 use heapless::Vec;
@@ -33,7 +38,7 @@ pub trait Mailboxes {
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     frame: Frame,
-    /// A newer one of its identifier takes its place.
+    /// A newer frame of the same identifier may take the place of this one.
     is_state: bool,
 }
 
@@ -77,19 +82,19 @@ impl TransmitQueue {
         self.waiting.clear();
     }
 
-    /// Adds a frame before those of its identifier: it was taken before them. As there is one of an identifier in the mailboxes
-    /// at most, there is one of these at most, and it need not make way.
+    /// Adds a frame that comes back from a mailbox. The frame was queued before all others of its identifier, so its place is before
+    /// them. The mailboxes hold one frame of an identifier at most, so at most one such frame waits; it counts as an event.
     fn push_first(&mut self, frame: Frame) -> Result<(), QueueFull> {
         let index = self.waiting.partition_point(|other| other.frame.id() >= frame.id());
         self.insert(index, Waiting { frame, is_state: false })
     }
 
-    /// The place behind those of this identifier.
+    /// The place behind all frames of this identifier.
     fn place(&self, frame: &Frame) -> usize {
         self.waiting.partition_point(|other| other.frame.id() > frame.id())
     }
 
-    /// Moves what is behind the place one further. `Vec::insert` panics at a place behind the end.
+    /// Puts a frame at a place and moves all frames behind the place one further. `Vec::insert` would panic at a place behind the end.
     fn insert(&mut self, index: usize, new: Waiting) -> Result<(), QueueFull> {
         if self.waiting.is_full() {
             return Err(QueueFull);
@@ -103,13 +108,13 @@ impl TransmitQueue {
 }
 
 impl Transmit for TransmitQueue {
-    /// Adds a frame behind those of its identifier.
+    /// Adds an event behind the frames of its identifier.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.insert(self.place(&frame), Waiting { frame, is_state: false })
     }
 
-    /// The same, or in place of the last of its identifier, if that is a state as well: what was sent between two states keeps
-    /// them apart.
+    /// Adds a state behind the frames of its identifier. When the last of these frames is a state too, the new one takes its place. An
+    /// event between two states keeps both.
     fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
         let index = self.place(&frame);
         match self.waiting.get_mut(index).filter(|last| last.is_state && last.frame.id() == frame.id()) {
