@@ -65,6 +65,7 @@ mod app {
     use node::{EncoderBoard, FactoryCalibration, Measurement, Parameters, Parcel, Protocol};
 
     use crate::bit_rate::Rate;
+    use crate::configuration::Loaded;
     use crate::keeper::Keeper;
     use crate::latest::Latest;
     use crate::process::Process;
@@ -112,7 +113,8 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let (protocol, setup, store) = configuration::load(board.parameters, cx.local.protocol);
+        let Loaded { protocol, parameters, setup, store } =
+            configuration::load(board.parameters, cx.local.protocol);
         let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
@@ -123,12 +125,11 @@ mod app {
             Receiver::new(Fifo::Services, cx.local.services_queue, lost);
         let [process_alarm, mut services_alarm] = board.alarms;
         services_alarm.set(Clock::now() + FIRST_SAMPLE);
-        let parameters = Some(protocol.prepare());
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
             snapshot: Latest::default(),
-            parameters,
+            parameters: Some(parameters),
             watchdog: board.watchdog.supervise(),
         };
         let mut local = Local {
@@ -219,7 +220,7 @@ mod app {
     fn serve(mut cx: serve::Context) {
         let mut node = (cx.shared.protocol, cx.shared.transmit);
         cx.local.services.run(&mut node);
-        if let Some(new) = node.call(|protocol, _| protocol.take_parameters()) {
+        if let Some(new) = cx.local.services.take_parameters() {
             cx.shared.parameters.lock(|parameters| *parameters = Some(new));
         }
         cx.shared.watchdog.progress(Part::Services);

@@ -3,7 +3,7 @@
 
 use bsp::losses::{Event, Losses};
 use bsp::{Alarm, Clock, Frames, Lamps, Received, Ring};
-use canopen::{Duration, Instant};
+use canopen::{Duration, Instant, Next};
 use node::Snapshot;
 
 use crate::shared::Shared;
@@ -41,20 +41,28 @@ impl Process {
     /// Does everything that is due and sets the alarm for what comes next.
     pub(crate) fn run(&mut self, snapshot: Option<Snapshot>, node: &mut impl Shared) {
         while let Some(Received { frame, at }) = self.frames.dequeue() {
-            node.call(|protocol, out| protocol.on_process_frame(&frame, at, out));
-            // NMT may have asked for something, and moves the deadlines of the services.
-            rtic::pend(SERVICES);
+            let next = node.call(|protocol, out| protocol.on_process_frame(&frame, at, out));
+            self.follow(next, at);
         }
         let now = Clock::now();
         self.watch(snapshot.is_some(), now);
         let (next, lit) = node.call(|protocol, out| {
-            if let Some(snapshot) = snapshot {
-                protocol.publish(&snapshot, now, out);
-            }
-            (protocol.poll_process(now, out), protocol.lamps())
+            let next = match snapshot {
+                Some(snapshot) => protocol.publish(&snapshot, now, out),
+                None => protocol.poll_process(now, out),
+            };
+            (next, protocol.lamps())
         });
-        self.alarm.set(next.min(self.sampled + OVERDUE));
+        self.follow(next, now);
         self.lamps.set(lit);
+    }
+
+    /// Sets the alarm, and wakes the services where they are due: NMT may have asked for something.
+    fn follow(&mut self, next: Next, now: Instant) {
+        self.alarm.set(next.process.min(self.sampled + OVERDUE));
+        if next.services <= now {
+            rtic::pend(SERVICES);
+        }
     }
 
     fn watch(&mut self, has_sampled: bool, now: Instant) {

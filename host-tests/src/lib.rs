@@ -1,5 +1,6 @@
 //! What the tests that cross crates share.
 
+pub mod asked;
 pub mod bench;
 pub mod domain;
 pub mod lift417;

@@ -30,7 +30,8 @@ mod time;
 mod transmit;
 
 pub use can_id::{CanId, CobId};
-pub use device::{Action, Application, Device, Job, Part, Selection, Stored};
+pub use device::{Action, Application, BusEvent, Device, ErrorClass, Job, Next, Part, Stored};
+pub use emcy::{Condition, Fault};
 pub use frame::Frame;
 pub use node_id::NodeId;
 pub use time::{Duration, Instant};

@@ -31,7 +31,7 @@ impl Protocol {
     /// Shows how many events have been lost since the start, in the order of the sub-indexes of 2001h.
     pub fn show_lost_events(&mut self, counts: &[u32; LOST_EVENTS]) {
         self.device.application_mut().lost_events = *counts;
-        self.device.show(Profile::show_lost_events);
+        self.device.show(|profile, image| profile.show_lost_events(image));
     }
 }
 

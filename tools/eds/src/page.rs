@@ -113,15 +113,16 @@ fn pdo(mapping: Mapping) -> &'static str {
         Mapping::No => "",
         Mapping::Tpdo => "TPDO",
         Mapping::Rpdo => "RPDO",
+        Mapping::Both => "TPDO, RPDO",
     }
 }
 
-fn saved(group: Group) -> &'static str {
+fn saved(group: Option<Group>) -> &'static str {
     match group {
-        Group::Volatile => "",
-        Group::Communication => "communication",
-        Group::Application => "application",
-        Group::Calibration => "calibration",
+        None => "",
+        Some(Group::Communication) => "communication",
+        Some(Group::Application) => "application",
+        Some(Group::Calibration) => "calibration",
     }
 }
 

@@ -70,7 +70,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         (self.switching, self.switching_due) = match self.switching {
             Switching::Before(switch) => {
-                self.core.pending.request = Some(Action::BitRate(switch.bit_rate));
+                self.core.pending.ask(Action::BitRate(switch.bit_rate));
                 (Switching::After, now + switch.delay())
             }
             Switching::No | Switching::After => (Switching::No, Instant::NEVER),

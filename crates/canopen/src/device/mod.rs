@@ -2,12 +2,14 @@
 //!
 //! Without a node-ID it hears LSS and nothing else.
 //!
-//! Two callers share it, one for process data and one for services. After any call that took a frame or changed
-//! something, `poll_process` and `poll_services` say when the device wants to be called next.
+//! Every call returns what follows from it ([`Next`]). One caller uses `on_frame` and `poll`; two callers of two
+//! priorities share the device by its halves, one for process data and one for services.
 
 mod application;
+mod faults;
 mod lss;
 mod multiplexed;
+mod next;
 mod objects;
 mod pdos;
 mod process;
@@ -18,11 +20,12 @@ mod store;
 mod syncs;
 mod watches;
 
-pub use application::{Application, Part};
-pub use state::Action;
-pub use store::{Job, Selection, Stored};
+pub use application::{Application, ErrorClass, Part};
+pub use faults::BusEvent;
+pub use next::{Action, Next};
+pub use store::{Job, Stored};
 
-use crate::dictionary::Dictionary;
+use crate::dictionary::{Dictionary, Groups};
 use crate::lss::{BitRate, Configuration, Slave};
 use crate::nmt::State;
 use crate::pdo::{PdoSet, Rpdo, Scanner, Tpdo};
@@ -69,18 +72,19 @@ struct Core<A, const N: usize> {
     /// anybody else.
     rpdo_filter: u32,
     scanner: Scanner,
-    /// The PDOs that are valid, those of them that the SYNC concerns, and the RPDOs that have a fault.
+    /// The PDOs that are valid, and those of them that the SYNC concerns.
     valid_tpdos: PdoSet,
     synchronous_tpdos: PdoSet,
     valid_rpdos: PdoSet,
     synchronous_rpdos: PdoSet,
-    faulty_rpdos: PdoSet,
     /// Cached next deadlines; `STALE` after a change that may have moved them.
     process_due: Instant,
     services_due: Instant,
     pending: state::Pending,
     jobs: store::Jobs,
-    unsound: store::Unsound,
+    /// The groups whose stored values were not loaded as they should.
+    unsound: Groups,
+    is_bus_off: bool,
 }
 
 /// A deadline in the past: the next poll looks at everything.
@@ -113,7 +117,7 @@ impl<A: Application, const N: usize> Device<A, N> {
                 heartbeat: heartbeat::Producer::new(),
                 watches: heartbeat::Consumer::new(),
                 sync: sync::Consumer::new(),
-                emcy: emcy::Producer::new(),
+                emcy: emcy::Producer::new(A::CONDITIONS),
                 tpdos: [const { Tpdo::new() }; PDOS],
                 rpdos: [const { Rpdo::new() }; PDOS],
                 rpdo_filter: 0,
@@ -122,12 +126,12 @@ impl<A: Application, const N: usize> Device<A, N> {
                 synchronous_tpdos: PdoSet::EMPTY,
                 valid_rpdos: PdoSet::EMPTY,
                 synchronous_rpdos: PdoSet::EMPTY,
-                faulty_rpdos: PdoSet::EMPTY,
                 process_due: Instant::NEVER,
                 services_due: Instant::NEVER,
                 pending: state::Pending::new(),
                 jobs: store::Jobs::new(),
-                unsound: store::Unsound::default(),
+                unsound: Groups::NONE,
+                is_bus_off: false,
             },
         }
     }
@@ -157,20 +161,10 @@ impl<A: Application, const N: usize> Device<A, N> {
         &self.core.image
     }
 
-    /// The values of all objects, for the application to update. To be followed by [`changed`](Device::changed).
-    pub fn image_mut(&mut self) -> &mut [u8] {
-        &mut self.core.image
-    }
-
-    /// Lets the application show its state in the image. To be followed by [`changed`](Device::changed) where that can be
-    /// mapped.
-    pub fn show(&mut self, show: impl FnOnce(&A, &mut [u8])) {
-        show(&self.core.application, &mut self.core.image);
-    }
-
-    /// As [`show`](Device::show), where that changes the state of the application too.
-    pub fn update(&mut self, update: impl FnOnce(&mut A, &mut [u8])) {
-        update(&mut self.core.application, &mut self.core.image);
+    /// Lets the application show its state in the image. What of it is mapped is sent with the next
+    /// [`publish`](Device::publish) or timer.
+    pub fn show(&mut self, show: impl FnOnce(&mut A, &mut [u8])) {
+        show(&mut self.core.application, &mut self.core.image);
     }
 
     /// The application.

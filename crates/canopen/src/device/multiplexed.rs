@@ -1,7 +1,7 @@
 //! Multiplexed PDOs in the device: which objects the producer watches, and where a received one goes.
 
 use super::{Application, Core};
-use crate::dictionary::{Entry, Mapping};
+use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
 use crate::sdo::Multiplexer;
@@ -51,7 +51,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     fn watch_entry(&mut self, entry: &Entry) {
-        if entry.attributes.mapping == Mapping::Tpdo && entry.field.size <= LONGEST {
+        if entry.attributes.mapping.allows_tpdo() && entry.field.size <= LONGEST {
             let at = Multiplexer { index: entry.index(), sub: entry.sub() };
             self.scanner.watch(Watched::new(at, entry.field));
         }
@@ -84,10 +84,10 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
         let entry = self.dictionary.find(at.index, at.sub).ok();
         let entry =
-            entry.filter(|entry| entry.attributes.mapping == Mapping::Rpdo && entry.field.size <= LONGEST);
-        if let Some(entry) = entry {
+            entry.filter(|entry| entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST);
+        if let Some(entry) = &entry {
             let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
-            entry.field.set(&mut self.image, bytes);
+            self.store_process_value(entry, bytes);
         }
         entry.is_some()
     }

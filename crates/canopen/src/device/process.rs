@@ -1,40 +1,55 @@
 //! Process data: NMT commands, SYNC, PDOs.
 
-use super::{Application, Core, Device, STALE};
+use super::{Application, Core, Device, Next, STALE};
 use crate::nmt::Command;
 use crate::pdo::{PdoSet, Rpdo, Tpdo};
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize> Device<A, N> {
-    /// A frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
-    pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+    /// Takes a frame, whatever half it is for.
+    pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        let _ = self.on_process_frame(frame, now, out);
+        self.on_service_frame(frame, now, out)
+    }
+
+    /// Sends what is due in both halves.
+    pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        let _ = self.poll_process(now, out);
+        self.poll_services(now, out)
+    }
+
+    /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
+    pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.turn(now, out);
         if frame.id() == CanId::NMT.get() {
-            self.on_nmt(frame, turn);
+            self.on_nmt(frame);
         } else if self.core.state.has_pdos() && !A::SERVICES_ONLY {
             self.core.on_pdo_frame(frame, turn);
         }
+        self.send_process(turn);
+        self.process_next()
     }
 
     #[inline(never)]
-    fn on_nmt(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
+    fn on_nmt(&mut self, frame: &Frame) {
         let own = self.core.node_id.filter(|_| !self.core.is_initialising());
         let Some(command) = own.and_then(|own| Command::parse(frame.data(), own)) else { return };
         self.command(command);
-        self.send_process(turn);
     }
 
-    /// Sends what is due. Returns the instant of the next call.
-    pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+    /// Sends what is due of process data.
+    pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.turn(now, out);
-        self.send_process(turn)
+        self.send_process(turn);
+        self.process_next()
     }
 
-    pub(super) fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
+    pub(super) fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let core = &mut self.core;
         if A::SERVICES_ONLY {
-            return Instant::NEVER;
+            core.process_due = Instant::NEVER;
+            return;
         }
         if turn.now >= core.process_due {
             core.poll_sync(turn.now);
@@ -46,11 +61,22 @@ impl<A: Application, const N: usize> Device<A, N> {
             core.scanner.poll(&core.image, turn);
             core.process_due = due.min(core.scanner.due()).min(core.sync.due());
         }
-        core.process_due
     }
 
-    /// The application has updated values in the image: sends what a change triggers.
-    pub fn changed(&mut self, now: Instant, out: &mut impl Transmit) {
+    /// Lets the application update values in the image, and sends what their change triggers. The first call after a start
+    /// is the one with which a device that starts by itself (1F80h) becomes operational.
+    pub fn publish(
+        &mut self,
+        now: Instant,
+        out: &mut impl Transmit,
+        update: impl FnOnce(&mut A, &mut [u8]),
+    ) -> Next {
+        self.show(update);
+        self.send_changes(now, out);
+        self.process_next()
+    }
+
+    fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
         let turn = &mut self.turn(now, out);
         self.start_by_itself(turn);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
@@ -58,6 +84,7 @@ impl<A: Application, const N: usize> Device<A, N> {
             self.core.scanner.on_change(&self.core.image, turn);
             self.core.process_due = self.core.process_due.min(self.core.scanner.due());
         }
+        self.send_process(turn);
     }
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.

@@ -29,8 +29,11 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
         for number in self.synchronous_rpdos.iter() {
             let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
-            rpdo.on_sync(&mut self.image);
+            if let Some(data) = rpdo.take_waiting() {
+                self.store_rpdo(number, data);
+            }
         }
+        self.application.synchronised(sync.counter, &mut self.image);
         self.each_tpdo(self.synchronous_tpdos, |tpdo, image| tpdo.on_sync(sync, image, turn));
         self.process_due = self.process_due.min(self.sync.due());
     }

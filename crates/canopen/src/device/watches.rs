@@ -1,6 +1,6 @@
 //! The heartbeats of other nodes: object 1016h and what follows when one is missing.
 
-use super::{Application, Core, Device};
+use super::{Application, Core, Device, ErrorClass};
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::heartbeat::{Change, WATCHES, Watch};
@@ -8,8 +8,6 @@ use crate::sdo::Abort;
 use crate::{Frame, Instant};
 
 const CONSUMER_TIME: u16 = 0x1016;
-/// Sub-index of 1029h for communication errors.
-const COMMUNICATION_ERROR: u8 = 1;
 
 impl<A: Application, const N: usize> Device<A, N> {
     /// Looks for heartbeats that are missing.
@@ -19,7 +17,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         while let Some(change) = self.core.watches.expire(now) {
             self.core.on_watch(change, now);
-            self.apply_error_behaviour(COMMUNICATION_ERROR);
+            self.apply_error(ErrorClass::COMMUNICATION);
         }
     }
 }
@@ -61,8 +59,9 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// A new watch knows of no fault yet.
     pub(super) fn configure_watch(&mut self, sub: u8, now: Instant) {
         let number = sub.saturating_sub(1);
-        self.watches.configure(number.into(), self.watch(sub));
-        self.clear(Fault::Heartbeat(number), now);
+        if self.watches.configure(number.into(), self.watch(sub)) {
+            self.clear(Fault::Heartbeat(number), now);
+        }
     }
 
     pub(super) fn configure_watches(&mut self, now: Instant) {

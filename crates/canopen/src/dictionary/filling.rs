@@ -5,7 +5,7 @@ use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::Attributes;
 use super::limits::Limits;
 use super::tables::{Place, Series};
-use super::{Counts, DefaultValue, Object, Rule, image_size};
+use super::{Counts, DefaultValue, Group, Object, Rule, image_size};
 
 /// Room for tables, and how much of it is filled.
 pub(super) struct Filling {
@@ -158,8 +158,16 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.rule.code() == b.rule.code()
         && a.access as u8 == b.access as u8
         && a.mapping as u8 == b.mapping as u8
-        && a.group as u8 == b.group as u8
+        && group_code(a.group) == group_code(b.group)
         && a.node_relative == b.node_relative
+}
+
+/// A number for a group, as constant functions cannot compare groups.
+pub(super) const fn group_code(group: Option<Group>) -> u8 {
+    match group {
+        None => u8::MAX,
+        Some(group) => group as u8,
+    }
 }
 
 pub(super) const fn attributes(row: &Object) -> Attributes {

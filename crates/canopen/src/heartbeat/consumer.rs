@@ -55,11 +55,10 @@ impl Consumer {
         Consumer { entries: [unused; WATCHES as usize] }
     }
 
-    /// Takes an entry of 1016h, from 0. The watch starts afresh.
-    pub(crate) fn configure(&mut self, number: usize, watch: Option<Watch>) {
-        if let Some(entry) = self.entries.get_mut(number) {
-            *entry = Entry { watch, due: Instant::NEVER, is_lost: false };
-        }
+    /// Takes an entry of 1016h, from 0. The watch starts afresh; whether its node was lost.
+    pub(crate) fn configure(&mut self, number: usize, watch: Option<Watch>) -> bool {
+        let fresh = Entry { watch, due: Instant::NEVER, is_lost: false };
+        self.entries.get_mut(number).is_some_and(|entry| core::mem::replace(entry, fresh).is_lost)
     }
 
     /// Identifiers of the heartbeats that it watches.

@@ -11,7 +11,7 @@ mod transmission;
 pub use mapping::MappedObject;
 pub(crate) use mapping::{Content, Direction, Layout, locate};
 pub use multiplexed::{Address, Addressing, Mpdo};
-pub(crate) use rpdo::{Reception, Rpdo, RpdoSettings};
+pub(crate) use rpdo::{Reception, Rpdo, RpdoFault, RpdoSettings};
 pub(crate) use scanner::{Scanner, ScannerSettings, WATCHED, Watched};
 pub(crate) use set::PdoSet;
 pub(crate) use tpdo::{Settings, Tpdo};

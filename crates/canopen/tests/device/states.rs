@@ -1,10 +1,9 @@
 //! Which frames the device sends as states, of which a queue may drop all but the newest.
 
-use canopen::emcy::Fault;
 use canopen::lss::Request;
 use canopen::{Duration, Frame};
 
-use crate::bench::{Bench, ID};
+use crate::bench::{Bench, ID, SENSOR_BREAK};
 
 const HEARTBEAT: u16 = 0x700 + ID as u16;
 const TPDO: u16 = 0x180 + ID as u16;
@@ -48,7 +47,7 @@ fn a_multiplexed_pdo_is_none() {
 #[test]
 fn what_is_answered_or_told_once_is_none() {
     let mut bench = Bench::booted();
-    bench.device.raise(Fault::SensorBreak, bench.now);
+    bench.raise(SENSOR_BREAK);
     bench.read(0x1008, 0).unwrap();
     bench.receive(Frame::new(0x7E5, &Request::SwitchGlobal { configuration: true }.encode()).unwrap());
     bench.receive(Frame::new(0x7E5, &Request::InquireNodeId.encode()).unwrap());

@@ -11,7 +11,6 @@ mod values;
 
 pub(crate) use manufacturer::SENSORS;
 pub(crate) use pdos::{BY_EVENT, BY_SYNC};
-pub(crate) use rules::FIRST as FIRST_RULE;
 pub(crate) use sensors::Sensors;
 pub(crate) use values::{Fields, device_type};
 

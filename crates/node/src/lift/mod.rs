@@ -36,7 +36,7 @@ const PARTS: &[&[Object]] = &[
     communication::START_UP,
     &[personality(Personality::Lift)],
     lost_events::OBJECTS,
-    &sensors::OBJECTS,
+    sensors::OBJECTS,
     CALIBRATION,
     manufacturer::OBJECTS,
     &[TRANSFER_BUFFER],

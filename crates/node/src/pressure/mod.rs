@@ -7,7 +7,7 @@ mod profile;
 mod rules;
 mod values;
 
-pub(crate) use calibration::{CALIBRATION, Places, RULES as CALIBRATION_RULES};
+pub(crate) use calibration::{CALIBRATION, Places};
 pub(crate) use manufacturer::STATUS_AND_USER;
 pub(crate) use profile::{INTEGER, REAL};
 pub(crate) use values::Fields;
