@@ -89,10 +89,10 @@ impl<'n> Acquisition<'n> {
         catalogue: &Catalogue,
         objects: &[Multiplexer],
     ) -> Result<Acquisition<'n>, Interruption> {
-        let mut client = Client::new(network, setup.node, setup.options);
+        let deadline = network.now() + setup.options.limit;
+        let mut client = Client::new(network, setup.node, setup.options).by(deadline);
         let tpdos = tpdo::read(&mut client, catalogue)?;
-        let mapped = tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|mapped| at(mapped.index, mapped.sub));
-        let objects = if objects.is_empty() { mapped.collect() } else { objects.to_vec() };
+        let objects = if objects.is_empty() { mapped(&tpdos) } else { objects.to_vec() };
         let mut signals = Vec::new();
         for at in objects {
             signals.push(signal(&mut client, catalogue, &tpdos, at)?);
@@ -179,8 +179,13 @@ impl<'n> Acquisition<'n> {
                 continue;
             }
             let bytes = Client::new(self.network, self.setup.node, self.setup.options).upload(signal.at)?;
-            let at = self.network.bus_time().unwrap_or(self.network.now());
-            self.ready.push_back(Sample { at, signal: number, value: signal.decode(&bytes) });
+            let value = signal.decode(&bytes);
+            // The answer was the newest frame; what came before it goes first, so that times do not go backwards.
+            let at = self.network.newest_stamp().unwrap_or(self.network.now());
+            while let Some(received) = self.network.take_kept() {
+                self.take(&received);
+            }
+            self.ready.push_back(Sample { at, signal: number, value });
         }
         Ok(())
     }
@@ -196,6 +201,18 @@ impl Signal {
     fn decode(&self, bytes: &[u8]) -> Value {
         Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes)))
     }
+}
+
+/// What the TPDOs carry, each object once. Below the communication profile are the data types: they stand for a gap.
+fn mapped(tpdos: &[Tpdo]) -> Vec<Multiplexer> {
+    let mut objects = Vec::new();
+    for mapped in tpdos.iter().flat_map(|tpdo| &tpdo.mapping).filter(|mapped| mapped.index >= 0x1000) {
+        let object = at(mapped.index, mapped.sub);
+        if !objects.contains(&object) {
+            objects.push(object);
+        }
+    }
+    objects
 }
 
 fn signal(

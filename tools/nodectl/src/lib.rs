@@ -27,6 +27,7 @@ pub mod nmt;
 pub mod object;
 pub mod scan;
 pub mod sdo;
+pub mod text;
 pub mod tpdo;
 pub mod unit;
 pub mod update;

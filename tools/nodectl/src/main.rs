@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use nodectl::cli::{Cli, Failure, Output};
+use nodectl::text::visible_lines;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -20,6 +21,6 @@ fn report(failure: &Failure, json: bool) {
     if json {
         println!("{}", serde_json::json!({ "error": failure.to_string(), "exit_code": failure.exit_code() }));
     } else {
-        eprintln!("nodectl: {failure}");
+        eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
     }
 }

@@ -58,6 +58,17 @@ impl Network {
         self.newest.map(|(at, arrival)| at + Duration(self.now().0.saturating_sub(arrival.0)))
     }
 
+    /// The time stamp of the newest frame. `None` before the first.
+    #[must_use]
+    pub fn newest_stamp(&self) -> Option<Instant> {
+        self.newest.map(|(at, _)| at)
+    }
+
+    /// The oldest of the frames that were passed over.
+    pub fn take_kept(&mut self) -> Option<Received> {
+        self.kept.pop_front()
+    }
+
     /// Sends a frame.
     ///
     /// # Errors

@@ -206,7 +206,7 @@ pub fn guess(bytes: &[u8]) -> DataType {
     }
 }
 
-/// Numbers in decimal, bytes in hexadecimal.
+/// Numbers in decimal, bytes in hexadecimal, a text as it is: for a terminal, [`visible`](crate::text::visible) makes it fit.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

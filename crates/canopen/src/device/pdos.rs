@@ -31,6 +31,11 @@ impl Pdo {
         }
     }
 
+    /// 1 to 512.
+    fn number(self) -> u16 {
+        (self.communication & 0x01FF) + 1
+    }
+
     fn mapping(self) -> u16 {
         self.communication | 0x0200
     }
@@ -134,6 +139,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             inhibit: low_half(self.parameter(pdo, 3)),
             event: low_half(self.parameter(pdo, 5)),
             sync_start: low_byte(self.parameter(pdo, 6)),
+            sends_events: self.application.sends_events(pdo.number()),
             layout,
         })
     }

@@ -22,6 +22,8 @@ pub(crate) struct Settings {
     pub(crate) event: u16,
     /// SYNC counter with which the count of SYNCs begins; 0 for any.
     pub(crate) sync_start: u8,
+    /// A frame that waits for the bus gives way to no newer one.
+    pub(crate) sends_events: bool,
     pub(crate) layout: Layout,
 }
 
@@ -186,7 +188,8 @@ impl Tpdo {
     fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         let data = settings.layout.gather(image);
-        let sent = turn.send_state(Frame::data_frame(settings.id, settings.layout.len(), data));
+        let frame = Frame::data_frame(settings.id, settings.layout.len(), data);
+        let sent = if settings.sends_events { turn.send(frame) } else { turn.send_state(frame) };
         self.pending = !sent;
         self.inhibited_until = turn.now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
         if sent {

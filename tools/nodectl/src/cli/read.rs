@@ -1,16 +1,17 @@
 //! `nodectl read`
 
 use std::fmt;
-use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use canopen::sdo::Multiplexer;
 use clap::Args;
 use eds::{Class, DataType};
 use serde::{Serialize, Serializer};
 
+use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::object::Place;
+use crate::text::visible;
 use crate::value::{Value, data_type, guess};
 use crate::{Catalogue, unit};
 
@@ -107,11 +108,11 @@ impl Reading {
     }
 }
 
-fn write_out(session: &mut Session, path: &PathBuf, bytes: &[u8]) -> Result<(), Failure> {
+fn write_out(session: &mut Session, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if path.as_os_str() == "-" {
         return Ok(session.output.write(bytes)?);
     }
-    fs::write(path, bytes).map_err(|error| Failure::file(path, error))
+    Replacement::write(path, bytes)
 }
 
 /// As a person writes it.
@@ -126,7 +127,7 @@ impl fmt::Display for Reading {
         if let Some(name) = &self.name {
             write!(f, "{name} ")?;
         }
-        write!(f, "= {}", self.value)?;
+        write!(f, "= {}", visible(&self.value.to_string()))?;
         // Identifiers, units and mappings are read digit by digit.
         if let (Value::Integer(value), Class::Unsigned(bits @ 32..)) = (&self.value, self.class) {
             write!(f, " ({value:0width$X}h)", width = usize::from(bits / 4))?;

@@ -9,7 +9,10 @@ use crate::pressure::Pressure;
 use crate::wire::Wire;
 
 /// Does a command; what it printed and how it ended.
-fn run<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (String, Result<(), Failure>) {
+pub(crate) fn run<S: nodectl::bus::Station + 'static>(
+    wire: &Wire<S>,
+    line: &[&str],
+) -> (String, Result<(), Failure>) {
     let cli = Cli::try_parse_from(std::iter::once(&"nodectl").chain(line)).expect("a command line");
     let paper = Paper::default();
     let output = Output::new(paper.clone(), cli.options.json);
@@ -17,13 +20,13 @@ fn run<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (St
     (paper.take(), result)
 }
 
-fn printed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> String {
+pub(crate) fn printed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> String {
     let (printed, result) = run(wire, line);
     result.unwrap_or_else(|failure| panic!("{line:?}: {failure}"));
     printed
 }
 
-fn failed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (u8, String) {
+pub(crate) fn failed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (u8, String) {
     let failure = run(wire, line).1.expect_err("a failure");
     (failure.exit_code(), failure.to_string())
 }

@@ -2,10 +2,12 @@
 
 mod blocks;
 mod commands;
+mod hostile;
 mod loader;
 mod lss;
 mod pressure;
 mod process;
+mod safety;
 mod transfers;
 mod update;
 mod wire;

@@ -16,6 +16,7 @@ use super::read::place;
 use super::{Failure, Output, Session};
 use crate::acquisition::{Acquisition, Sample, Setup, Signal};
 use crate::object::Place;
+use crate::text::visible;
 use crate::value::Value;
 
 /// After so long without a value somebody wonders.
@@ -133,6 +134,6 @@ fn line<'a>(signal: &'a Signal, sample: &'a Sample, start: Instant) -> Line<'a> 
 impl fmt::Display for Line<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Line { time, at, name, value, unit } = self;
-        write!(f, "{time:10.6} {} {name} = {value} {unit}", Place(*at))
+        write!(f, "{time:10.6} {} {name} = {} {unit}", Place(*at), visible(&value.to_string()))
     }
 }
