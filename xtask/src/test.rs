@@ -100,7 +100,16 @@ fn test_python() -> Result<()> {
         .args(tools.iter().flat_map(|tool| ["-p", tool])))?;
     let [nodectl, sign] =
         tools.map(|tool| sim.with_file_name(format!("{tool}{}", std::env::consts::EXE_SUFFIX)));
-    run(cargo().args(["build", "--quiet", "--profile", "sim", "-p", "canopen-device", "--example", "io_module"]))?;
+    run(cargo().args([
+        "build",
+        "--quiet",
+        "--profile",
+        "sim",
+        "-p",
+        "canopen-device",
+        "--example",
+        "io_module",
+    ]))?;
     let io_module = sim.with_file_name("examples").join(format!("io_module{}", std::env::consts::EXE_SUFFIX));
     let python = python::ensure()?;
     run(with_images(&mut Command::new(python))
