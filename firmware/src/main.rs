@@ -71,7 +71,6 @@ mod app {
     use crate::process::Process;
     use crate::services::{Findings, Services};
     use crate::shaft::Shaft;
-    use crate::shared::Shared as _;
     use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, remembering};
 
     #[shared]
@@ -118,6 +117,7 @@ mod app {
         let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
+        remembering::report_battery(board.reset_cause, &board.found);
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = EncoderBoard { watchdog_reset, ..EncoderBoard::default() };
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);
