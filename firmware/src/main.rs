@@ -117,6 +117,7 @@ mod app {
         let keeper = Keeper::new(store, cx.local.job.write(StoreJob::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
+        remembering::report_battery(board.reset_cause, &board.found);
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = Surroundings { watchdog_reset, ..Surroundings::default() };
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);

@@ -2,7 +2,9 @@
 
 use core::mem::MaybeUninit;
 
+use bsp::battery::Battery;
 use bsp::kept::Found;
+use bsp::reset_cause::ResetCause;
 use node::{Measurement, Personality};
 use profiles::board::{PowerOn, Retained};
 
@@ -16,6 +18,17 @@ pub(crate) fn make(
     found: &Found,
 ) -> &'static mut Measurement {
     place.write(Measurement::new(personality, &power_on(found)))
+}
+
+/// Says what the start tells of the battery.
+pub(crate) fn report_battery(cause: ResetCause, found: &Found) {
+    match Battery::after(cause, found) {
+        Battery::Unknown => {}
+        Battery::Holds => defmt::info!("the battery has kept the backup SRAM"),
+        Battery::Lost => {
+            defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new")
+        }
+    }
 }
 
 /// What the board knows when the power comes.

@@ -11,6 +11,7 @@ mod faults;
 mod lift;
 mod lost_events;
 mod measuring;
+mod power_cycles;
 mod running;
 mod saves;
 mod stack;

@@ -42,7 +42,14 @@ impl Pressure {
 
     fn with_flash(setup: Setup, flash: Vec<u8>) -> Pressure {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
-        let mut protocol = Protocol::new(&setup);
+        let record = view.device().expect("a record or none");
+        // What LSS has stored of the device comes before what the factory has set.
+        let stored = record.map_or(setup, |record| Setup {
+            node_id: NodeId::new(record.node_id()),
+            bit_rate: BitRate::from_kbit(record.bit_rate_kbit()).expect("a bit rate"),
+            ..setup
+        });
+        let mut protocol = Protocol::new(&stored);
         protocol.load(&mut view);
         let store = Store::prepare(view).expect("a store");
         Pressure { setup, protocol, store, is_started: false }
