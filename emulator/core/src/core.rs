@@ -4,11 +4,13 @@
 use std::collections::VecDeque;
 
 use canbus::Time;
-use chip::{Effect, Memory, Peripherals};
+use chip::{Effect, Peripherals};
 
 use crate::cost::Costs;
 use crate::exception::Exception;
 use crate::mechanism::Mechanism;
+use crate::memory::Memory as Bytes;
+use crate::model::Model;
 use crate::nvic::{Masks, Nvic};
 use crate::profile::Profile;
 use crate::scb::Scb;
@@ -42,6 +44,7 @@ pub(crate) struct Unmapped {
 /// Everything but the registers and the memory.
 pub(crate) struct Core<P> {
     pub(crate) chip: P,
+    pub(crate) memory: Bytes,
     pub(crate) now: Time,
     /// Length of a core cycle.
     pub(crate) cycle: Time,
@@ -61,6 +64,8 @@ pub(crate) struct Core<P> {
     pub(crate) pended: [Time; Exception::COUNT],
     pub(crate) costs: Costs,
     pub(crate) reset_requested: bool,
+    /// The program has begun an exclusive access since the monitor was cleared.
+    pub(crate) exclusive: bool,
     /// The emulator itself runs code, not the program.
     pub(crate) clearing_monitor: bool,
     pub(crate) without: Option<Mechanism>,
@@ -79,9 +84,10 @@ struct Cyccnt {
 }
 
 impl<P: Peripherals> Core<P> {
-    pub(crate) fn new(chip: P) -> Core<P> {
+    pub(crate) fn new(chip: P, model: &Model) -> Core<P> {
         Core {
             chip,
+            memory: Bytes::new(model),
             now: Time::ZERO,
             cycle: Time::of_cycle(16_000_000),
             until: Time::ZERO,
@@ -97,6 +103,7 @@ impl<P: Peripherals> Core<P> {
             pended: [Time::ZERO; Exception::COUNT],
             costs: Costs::default(),
             reset_requested: false,
+            exclusive: false,
             clearing_monitor: false,
             without: None,
             flash_closed: false,
@@ -139,9 +146,9 @@ impl<P: Peripherals> Core<P> {
     }
 
     /// Lets everything due happen, and samples the interrupt lines.
-    pub(crate) fn advance(&mut self, memory: &dyn Memory) {
+    pub(crate) fn advance(&mut self) {
         if self.chip.deadline() <= self.now {
-            self.chip.advance(self.now, memory);
+            self.chip.advance(self.now, &self.memory);
         }
         if self.systick.advance(self.now) {
             self.pend(Exception::SYS_TICK);

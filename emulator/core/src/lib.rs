@@ -8,7 +8,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `machine`, `model`, `incident` | the machine as its user sees it, and its run loop |
-//! | `engine` | the CPU library: memory map, hooks, registers |
+//! | `engine`, `memory` | the CPU library: memory map, hooks, registers; flash and RAM |
 //! | `core` | what hooks and run loop share |
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
 //! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
@@ -36,6 +36,7 @@ mod incident;
 mod loader;
 mod machine;
 mod mechanism;
+mod memory;
 mod model;
 mod nvic;
 mod ppb;

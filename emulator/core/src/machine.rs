@@ -1,7 +1,7 @@
 //! The machine: a core with its memory and a chip around it, run in virtual time.
 
 use canbus::Time;
-use chip::{BusFault, Effect, Memory, Peripherals};
+use chip::{BusFault, Effect, Peripherals};
 use unicorn_engine::{RegisterARM, uc_error};
 
 use crate::core::{Core, Halt};
@@ -53,8 +53,8 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// # Errors
     /// When the CPU library refuses.
     pub fn new(model: Model, peripherals: P) -> Result<Machine<P>, Error> {
-        let mut cpu = engine::new(&model, Core::new(peripherals))?;
-        cpu.mem_write(model.flash.start.into(), &vec![0xFF; model.flash.len()])?;
+        let mut cpu = engine::new(&model, Core::new(peripherals, &model))?;
+        engine::store(&mut cpu, model.flash.start, &vec![0xFF; model.flash.len()])?;
         Ok(Machine {
             cpu,
             model,
@@ -94,7 +94,9 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     /// The flash array.
     pub fn flash(&self) -> Vec<u8> {
-        self.cpu.mem_read_as_vec(self.model.flash.start.into(), self.model.flash.len()).unwrap_or_default()
+        let mut bytes = vec![0; self.model.flash.len()];
+        let _ = self.read(self.model.flash.start, &mut bytes);
+        bytes
     }
 
     /// Replaces the flash array, from its start.
@@ -110,7 +112,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// # Errors
     /// [`BusFault`] where there is no memory.
     pub fn read(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
-        self.cpu.mem_read(address.into(), bytes).map_err(|_| BusFault)
+        self.cpu.get_data().memory.read(address, bytes).ok_or(BusFault)
     }
 
     /// Writes memory, not registers.
@@ -242,10 +244,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     }
 
     fn advance_chip(&mut self) {
-        let core: *mut Core<P> = self.cpu.get_data_mut();
-        // SAFETY: `View` reads guest memory only, through the library's handle; it does not touch the user data
-        // that `core` points to, and nothing else holds a reference to it meanwhile.
-        unsafe { (*core).advance(&View(&self.cpu)) };
+        self.cpu.get_data_mut().advance();
     }
 
     fn carry_out(&mut self, effect: Effect) -> Option<Stop> {
@@ -312,6 +311,8 @@ impl<P: Peripherals + 'static> Machine<P> {
     fn run_code(&mut self) {
         let closed = self.now() < self.stall && !self.cpu.get_data().lacks(Mechanism::FlashLoads);
         engine::close_flash(&mut self.cpu, &self.model, closed);
+        let pc = self.pc();
+        engine::forget_code_in_ram(&mut self.cpu, pc);
         let core = self.cpu.get_data_mut();
         core.halt = None;
         core.unmapped = None;
@@ -363,6 +364,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// The core after any reset: stack pointer and program counter from the start of flash.
     fn restart(&mut self) {
         self.cpu.get_data_mut().reset();
+        self.cpu.get_data_mut().memory.code_is_old = true;
         self.sleeping = false;
         self.locked = None;
         self.stall = Time::ZERO;
@@ -375,7 +377,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     pub(crate) fn word(&self, address: u32) -> Option<u32> {
         let mut bytes = [0; 4];
-        self.cpu.mem_read(address.into(), &mut bytes).ok()?;
+        self.cpu.get_data().memory.read(address, &mut bytes)?;
         Some(u32::from_le_bytes(bytes))
     }
 
@@ -389,14 +391,5 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     pub(crate) fn pc(&self) -> u32 {
         self.register(RegisterARM::PC) & !1
-    }
-}
-
-/// Guest memory for a DMA transfer.
-struct View<'a, P: 'static>(&'a unicorn_engine::Unicorn<'static, Core<P>>);
-
-impl<P: 'static> Memory for View<'_, P> {
-    fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
-        self.0.mem_read(address.into(), bytes).map_err(|_| BusFault)
     }
 }
