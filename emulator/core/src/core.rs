@@ -15,6 +15,7 @@ use crate::nvic::{Masks, Nvic};
 use crate::profile::Profile;
 use crate::scb::Scb;
 use crate::stats::Stats;
+use crate::stepping::Stepping;
 use crate::systick::SysTick;
 
 /// Why the CPU library was stopped.
@@ -57,6 +58,8 @@ pub(crate) struct Core<P> {
     pub(crate) systick: SysTick,
     pub(crate) stats: Stats,
     pub(crate) profile: Profile,
+    /// Interrupts come between any two instructions.
+    pub(crate) stepping: Option<Stepping>,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
     pub(crate) effects: VecDeque<Effect>,
@@ -97,6 +100,7 @@ impl<P: Peripherals> Core<P> {
             systick: SysTick::default(),
             stats: Stats::default(),
             profile: Profile::default(),
+            stepping: None,
             halt: None,
             unmapped: None,
             effects: VecDeque::new(),

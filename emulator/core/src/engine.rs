@@ -10,7 +10,7 @@ use crate::cost::Cost;
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::nvic::Masks;
-use crate::ppb;
+use crate::{ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
@@ -70,20 +70,55 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
 /// The clock: charges a block before it runs, or stops before it when something is due.
 fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
     if address & !0xFFF == HIDDEN {
-        return guard_hidden(cpu);
+        guard_hidden(cpu);
+    } else if cpu.get_data().stepping.is_none() {
+        pass(cpu, address, size);
     }
+}
+
+/// Has every instruction charged by itself from now on.
+pub(crate) fn step_instructions<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
+    cpu.add_code_hook(1, 0, on_instruction)?;
+    Ok(cpu.ctl_flush_tb()?)
+}
+
+/// The clock of the mode in which interrupts come between any two instructions.
+fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
+    let place = address as u32;
+    let Some(stepping) = &mut cpu.get_data_mut().stepping else { return };
+    if address & !0xFFF == HIDDEN || stepping.is_charged(place) {
+        return;
+    }
+    if let Some(exception) = stepping.arrived(place) {
+        cpu.get_data_mut().pend(exception);
+    }
+    let mut code = [0; 18];
+    let charged = cpu.get_data().memory.read(place, &mut code).map_or(size, |()| stepping::length(&code));
+    if pass(cpu, address, charged) {
+        let core = cpu.get_data_mut();
+        let wait = core.stepping.as_mut().map_or(0, |stepping| {
+            stepping.charged(place, size, charged);
+            stepping.wait()
+        });
+        core.spend(0, wait);
+    }
+}
+
+/// Charges code that is about to run, or stops before it when something is due.
+fn pass<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) -> bool {
     let core = cpu.get_data();
     let waits = core.flash_closed && address < u64::from(RAM);
     if waits || core.halt.is_some() || core.needs_attention() || core.nvic.could_preempt() && preempts(cpu) {
         cpu.get_data_mut().halt.get_or_insert(Halt::Attention);
         let _ = cpu.emu_stop();
-        return;
+        return false;
     }
     let cost = core.costs.get(address as u32, size).unwrap_or_else(|| learn(cpu, address, size));
     let core = cpu.get_data_mut();
     core.exclusive |= cost.exclusive;
     core.profile.visit(address as u32, size);
     core.spend(cost.instructions, cost.cycles);
+    true
 }
 
 /// Lets loads from flash fail while it is busy, or lets them through again.

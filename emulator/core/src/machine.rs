@@ -14,6 +14,7 @@ use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::profile::Visits;
 use crate::stats::Stats;
+use crate::stepping::Stepping;
 
 /// The value of every byte of RAM after power-on: what still has it was never written.
 pub const RAM_PATTERN: u8 = 0xA5;
@@ -173,6 +174,25 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// Forgets the worst activation and latency of every exception: what comes now is judged by itself.
     pub fn forget_worst(&mut self) {
         self.cpu.get_data_mut().stats.forget_worst();
+    }
+
+    /// Lets interrupts come between any two instructions, and time advance with each of them, from now on and over resets.
+    /// With a seed some instructions take a few cycles longer, so that each seed gives another course. It is several times
+    /// slower than to look between blocks of code only.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn interleave(&mut self, seed: Option<u64>) -> Result<(), Error> {
+        let fresh = self.cpu.get_data_mut().stepping.replace(Stepping::new(seed)).is_none();
+        if fresh { engine::step_instructions(&mut self.cpu) } else { Ok(()) }
+    }
+
+    /// Pends an exception before the next time that the instruction at this address runs. Does nothing unless
+    /// [`Machine::interleave`] was called.
+    pub fn interrupt_before(&mut self, address: u32, exception: Exception) {
+        if let Some(stepping) = &mut self.cpu.get_data_mut().stepping {
+            stepping.interrupt_before(address, exception);
+        }
     }
 
     /// Counts how often each block of code runs, from now on or no longer.

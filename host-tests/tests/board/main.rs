@@ -10,6 +10,7 @@ mod encoder;
 mod faults;
 mod lift;
 mod measuring;
+mod races;
 mod running;
 mod stack;
 mod support;
