@@ -1,11 +1,6 @@
 //! The objects of the bootloader: communication (CiA 301) and the program (CiA 302-3).
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Object, Rule, Type};
-
-/// Number of the rule of 1F50h:1, program data.
-pub(crate) const DATA: u8 = 0;
-/// Number of the rule of 1F51h:1, program control.
-pub(crate) const CONTROL: u8 = 1;
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Object, Type};
 
 /// 'BOOT': what 1000h reads in a bootloader.
 const BOOT: i64 = 0x424F_4F54;
@@ -22,19 +17,16 @@ const OBJECTS: [Object; 19] = [
     fixed(0x1009, 0, "Manufacturer hardware version", Type::VisibleString(13)),
     fixed(0x100A, 0, "Manufacturer software version", Type::VisibleString(11))
         .default(DefaultValue::Text(env!("CARGO_PKG_VERSION"))),
-    Object::new(0x1017, 0, "Producer heartbeat time", Type::Unsigned16, Access::ReadWrite)
-        .value(1000)
-        .rule(Rule::HeartbeatTime),
+    Object::new(0x1017, 0, "Producer heartbeat time", Type::Unsigned16, Access::ReadWrite).value(1000),
     Object::highest(0x1018, 4, "Identity"),
     fixed(0x1018, 1, "Vendor-ID", Type::Unsigned32),
     fixed(0x1018, 2, "Product code", Type::Unsigned32),
     fixed(0x1018, 3, "Revision number", Type::Unsigned32),
     fixed(0x1018, 4, "Serial number", Type::Unsigned32),
     Object::highest(0x1F50, 1, "Program data"),
-    Object::new(0x1F50, 1, "Program 1 data", Type::Domain, Access::WriteOnly).rule(Rule::Application(DATA)),
+    Object::new(0x1F50, 1, "Program 1 data", Type::Domain, Access::WriteOnly),
     Object::highest(0x1F51, 1, "Program control"),
-    Object::new(0x1F51, 1, "Program 1 control", Type::Unsigned8, Access::ReadWrite)
-        .rule(Rule::Application(CONTROL)),
+    Object::new(0x1F51, 1, "Program 1 control", Type::Unsigned8, Access::ReadWrite).handled(),
     Object::highest(0x1F56, 1, "Program identification"),
     fixed(0x1F56, 1, "Program 1 identification", Type::Unsigned32),
     Object::highest(0x1F57, 1, "Flash status"),

@@ -2,11 +2,11 @@
 
 use bsp::{ProgramFlash, board, factory};
 use canopen::dictionary::{Entry, Field};
-use canopen::sdo::Abort;
+use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Part};
 use update::{Refusal, Status, Target, Updater};
 
-use crate::dictionary::{CONTROL, DATA, DICTIONARY};
+use crate::dictionary::DICTIONARY;
 use crate::target::{PRODUCT, REVISION, VENDOR};
 
 /// What 1F51h takes (CiA 302-3).
@@ -101,20 +101,21 @@ impl Application for Program {
         self.readings().store(image);
     }
 
-    fn write(&mut self, number: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        match (number, bytes) {
-            (CONTROL, &[command]) => self.control(command),
+    /// 1F51h:1 is the one object that is handled.
+    fn write(&mut self, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        match bytes {
+            &[command] => self.control(command),
             _ => Err(Abort::Access),
         }
     }
 
-    fn write_domain(&mut self, number: u8, part: Part<'_>) -> Result<(), Abort> {
+    /// 1F50h:1 is the one domain.
+    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         let updater = &mut self.updater;
-        let outcome = match (number, part) {
-            (DATA, Part::Begin(size)) => updater.begin(size.map(|size| size.try_into().unwrap_or(u32::MAX))),
-            (DATA, Part::Data(_, bytes)) => updater.receive(bytes),
-            (DATA, Part::End(_)) => updater.finish(),
-            _ => return Err(Abort::Access),
+        let outcome = match part {
+            Part::Begin(size) => updater.begin(size.map(|size| size.try_into().unwrap_or(u32::MAX))),
+            Part::Data(_, bytes) => updater.receive(bytes),
+            Part::End(_) => updater.finish(),
         };
         outcome.map_err(abort)
     }

@@ -84,7 +84,8 @@ impl Session {
             return;
         }
         self.can.start(self.timing, &[]);
-        self.device.start(Clock::now(), out);
+        // What follows is left to the next poll.
+        let _ = self.device.start(Clock::now(), out);
         self.note();
         self.filter();
     }
@@ -92,10 +93,9 @@ impl Session {
     /// A frame has come: each of the two takes what is its own.
     pub(crate) fn take(&mut self, received: &Received, out: &mut Outbox) {
         let Received { frame, at } = received;
-        self.device.on_process_frame(frame, *at, out);
-        self.device.on_service_frame(frame, *at, out);
+        let next = self.device.on_frame(frame, *at, out);
         self.publish();
-        self.fulfil(out);
+        self.fulfil(next, out);
     }
 
     /// One step of everything.
@@ -103,8 +103,8 @@ impl Session {
         let now = Clock::now();
         self.watch_bus(now);
         let next = self.advance(now, out);
-        let due = self.device.poll_services(now, out);
-        self.fulfil(out);
+        let next_call = self.device.poll(now, out);
+        let due = self.fulfil(next_call, out);
         match (self.reset, next) {
             (Some(latest), _) => Then::Reset(latest),
             (None, Next::Step) => Then::Again,
@@ -140,13 +140,12 @@ impl Session {
     }
 
     fn publish(&mut self) {
-        let readings = self.device.application().readings();
-        readings.store(self.device.image_mut());
+        self.device.show(|program, image| program.readings().store(image));
     }
 
-    /// Does what the device asks for, until it asks for nothing.
-    fn fulfil(&mut self, out: &mut Outbox) {
-        while let Some(action) = self.device.take_action() {
+    /// Does what a call leaves to the bootloader, until nothing is left; when the next call is due.
+    fn fulfil(&mut self, mut next: canopen::Next, out: &mut Outbox) -> Instant {
+        while let Some(action) = next.action {
             match action {
                 Action::ResetNode | Action::Bootloader => self.reset_soon(),
                 Action::ResetCommunication => self.join(out),
@@ -160,11 +159,13 @@ impl Session {
                 // The parameters are the application's.
                 Action::Store(_) => (),
             }
+            next = self.device.poll(Clock::now(), out);
         }
         if self.device.application().starts() {
             retained::set_trial(retained::trial().confirmed());
             self.reset_soon();
         }
+        next.due()
     }
 
     fn reset_soon(&mut self) {

@@ -4,7 +4,7 @@ use core::mem::MaybeUninit;
 
 use bsp::reset_cause::ResetCause;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory};
-use node::{BitRate, FactoryCalibration, NodeId, Personality, Protocol, RawSample, Setup};
+use node::{BitRate, FactoryCalibration, NodeId, Parameters, Personality, Protocol, RawSample, Setup};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 
 /// Where the store has nothing to say: node-ID 1, 250 kbit/s, pressure.
@@ -12,24 +12,32 @@ const DEFAULT_NODE_ID: Option<NodeId> = NodeId::new(1);
 const DEFAULT_BIT_RATE: u16 = 250;
 const PAGES: Pages = Pages::new(0, memory::PARAMETER_PAGE);
 
-/// Makes the protocol in its place, with what is stored of it; gives its set-up, and the store ready to save. Without a
-/// store that works, the node runs with its defaults.
-pub(crate) fn load(
-    flash: ParameterFlash,
-    place: &'static mut MaybeUninit<Protocol>,
-) -> (&'static mut Protocol, Setup, Option<Store<ParameterFlash>>) {
+/// The node as it is stored.
+pub(crate) struct Loaded {
+    pub(crate) protocol: &'static mut Protocol,
+    /// Those of the measurement.
+    pub(crate) parameters: Parameters,
+    pub(crate) setup: Setup,
+    /// Ready to store; `None` where nothing can be stored.
+    pub(crate) store: Option<Store<ParameterFlash>>,
+}
+
+/// Makes the protocol in its place, with what is stored of it. Without a store that works, the node runs with its defaults.
+pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protocol>) -> Loaded {
     let mut view = match View::open(flash, PAGES) {
         Ok(view) => view,
         Err(error) => {
             defmt::error!("the parameter store cannot be read: {=str}", reason(&error));
             let setup = setup(None);
-            return (make(place, &setup), setup, None);
+            let protocol = make(place, &setup);
+            let parameters = protocol.load_defaults();
+            return Loaded { protocol, parameters, setup, store: None };
         }
     };
     let setup = setup(view.device().ok().flatten());
     let protocol = make(place, &setup);
-    protocol.load(&mut view);
-    (protocol, setup, prepare(view))
+    let parameters = protocol.load(&mut view);
+    Loaded { protocol, parameters, setup, store: prepare(view) }
 }
 
 /// Not inlined: the stack on which the value is made is free again for what reads the flash.

@@ -38,7 +38,8 @@ impl Keeper {
             Ok(()) => defmt::info!("stored"),
             Err(abort) => defmt::error!("not stored: {=u32:#010x}", abort.code()),
         }
-        node.call(|protocol, out| protocol.finish(parcel, result, Clock::now(), out));
+        // What follows is left to the services, which find it when they poll.
+        let _ = node.call(|protocol, out| protocol.finish(parcel, result, Clock::now(), out));
         rtic::pend(SERVICES);
     }
 }

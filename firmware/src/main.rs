@@ -35,6 +35,8 @@ const PROCESS: Interrupt = Interrupt::TIM2;
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
 /// Pended by whoever has something to store. The interrupt is that of a peripheral which the board does not use.
 const KEEPER: Interrupt = Interrupt::SDIO;
+/// Pended by whoever misses samples.
+const SAMPLING: Interrupt = Interrupt::DMA2_STREAM0;
 /// Pended by whoever has put a frame into the transmit queue.
 const TRANSMIT: Interrupt = Interrupt::CAN1_TX;
 /// The node goes on the bus when its first sample has been taken, so that no PDO carries a value from before it.
@@ -57,18 +59,18 @@ mod app {
     use bsp::supervision::Part;
     use bsp::transmit_queue::TransmitQueue;
     use bsp::{
-        BackupMemory, Board, Buttons, Clock, ReceiveQueue, Receiver, Sampling, TimeInterrupt, Transmitter,
-        Watchdog,
+        BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TimeInterrupt,
+        Transmitter, Watchdog,
     };
     use node::{EncoderBoard, FactoryCalibration, Measurement, Parameters, Parcel, Protocol};
 
     use crate::bit_rate::Rate;
+    use crate::configuration::Loaded;
     use crate::keeper::Keeper;
     use crate::latest::Latest;
     use crate::process::Process;
     use crate::services::{Findings, Services};
     use crate::shaft::Shaft;
-    use crate::shared::Shared as _;
     use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, remembering};
 
     #[shared]
@@ -85,7 +87,7 @@ mod app {
     struct Local {
         receiver_process: Receiver,
         receiver_services: Receiver,
-        sampling: Sampling,
+        front_end: FrontEnd,
         shaft: Shaft,
         buttons: Buttons,
         measurement: &'static mut Measurement,
@@ -108,38 +110,39 @@ mod app {
         parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let board = Board::start(cx.device);
-        let (protocol, setup, store) = configuration::load(board.parameters, cx.local.protocol);
+        let lost: &'static Losses = cx.local.lost;
+        let board = Board::start(cx.device, lost);
+        let Loaded { protocol, parameters, setup, store } =
+            configuration::load(board.parameters, cx.local.protocol);
         let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
+        remembering::report_battery(board.reset_cause, &board.found);
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = EncoderBoard { watchdog_reset, ..EncoderBoard::default() };
-        let lost: &'static Losses = cx.local.lost;
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);
         let (receiver_services, service_frames) =
             Receiver::new(Fifo::Services, cx.local.services_queue, lost);
         let [process_alarm, mut services_alarm] = board.alarms;
         services_alarm.set(Clock::now() + FIRST_SAMPLE);
-        let parameters = Some(protocol.prepare());
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
             snapshot: Latest::default(),
-            parameters,
+            parameters: Some(parameters),
             watchdog: board.watchdog.supervise(),
         };
         let mut local = Local {
             receiver_process,
             receiver_services,
-            sampling: board.sampling,
-            shaft: Shaft::new(board.encoder, board.ssi, surroundings),
+            front_end: board.front_end,
+            shaft: Shaft::new(board.ssi, surroundings),
             buttons: board.buttons,
             measurement: remembering::make(cx.local.measurement_place, setup.personality, &board.found),
             factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
-            process: Process { frames: process_frames, alarm: process_alarm, lamps: board.lamps },
+            process: Process::new(process_frames, process_alarm, board.lamps, lost),
             services: Services::new(
                 board.can,
                 Rate::of(setup.bit_rate),
@@ -152,7 +155,7 @@ mod app {
             keeper,
             backup: board.backup,
         };
-        local.sampling.start();
+        local.front_end.start();
         (shared, local)
     }
 
@@ -176,14 +179,10 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [sampling, shaft, buttons, measurement, factory, backup],
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, shaft, buttons, measurement, factory, backup],
            shared = [snapshot, parameters, &watchdog])]
     fn sample(mut cx: sample::Context) {
-        let Some(sums) = cx.local.sampling.take() else { return };
-        match cx.local.sampling.lost() {
-            0 => {}
-            lost => defmt::error!("{=u32} milliseconds were not collected in time", lost),
-        }
+        let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
         let (measurement, shaft) = (&mut *cx.local.measurement, cx.local.shaft);
         cx.shared.parameters.lock(|parameters| {
             if let Some(new) = parameters {
@@ -193,7 +192,7 @@ mod app {
             }
         });
         let raw = configuration::raw_sample(&sums, *cx.local.factory);
-        let (encoder, pressed) = (shaft.read(&sums), cx.local.buttons.sample());
+        let (encoder, pressed) = (shaft.read(counted), cx.local.buttons.sample());
         cx.shared.snapshot.lock(|latest| measurement.update(&raw, &encoder, pressed, latest.renew()));
         measurement.keep(|words| cx.local.backup.write(words));
         cx.shared.watchdog.progress(Part::Sampling);
@@ -206,14 +205,14 @@ mod app {
         cx.shared.transmit.lock(|queue| queue.pump(cx.local.transmitter));
     }
 
-    #[task(binds = TIM2, priority = 3, local = [time, process], shared = [protocol, transmit, snapshot])]
+    #[task(binds = TIM2, priority = 3, local = [time, process],
+           shared = [protocol, transmit, snapshot, &watchdog])]
     fn process(mut cx: process::Context) {
         let [_, services_due] = cx.local.time.acknowledge();
-        if services_due {
-            rtic::pend(SERVICES);
-        }
+        cx.local.process.wake_services(services_due);
         let snapshot = cx.shared.snapshot.lock(Latest::take);
         cx.local.process.run(snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
+        cx.shared.watchdog.progress(Part::Process);
     }
 
     #[task(binds = CAN1_SCE, priority = 2, local = [services],
@@ -221,14 +220,15 @@ mod app {
     fn serve(mut cx: serve::Context) {
         let mut node = (cx.shared.protocol, cx.shared.transmit);
         cx.local.services.run(&mut node);
-        if let Some(new) = node.call(|protocol, _| protocol.take_parameters()) {
+        if let Some(new) = cx.local.services.take_parameters() {
             cx.shared.parameters.lock(|parameters| *parameters = Some(new));
         }
         cx.shared.watchdog.progress(Part::Services);
     }
 
-    #[task(binds = SDIO, priority = 1, local = [keeper], shared = [protocol, transmit])]
+    #[task(binds = SDIO, priority = 1, local = [keeper], shared = [protocol, transmit, &watchdog])]
     fn keep(cx: keep::Context) {
         cx.local.keeper.run(&mut (cx.shared.protocol, cx.shared.transmit));
+        cx.shared.watchdog.progress(Part::Keeper);
     }
 }

@@ -2,7 +2,9 @@
 
 use core::mem::MaybeUninit;
 
+use bsp::battery::Battery;
 use bsp::kept::Found;
+use bsp::reset_cause::ResetCause;
 use node::{Kept, Measurement, Personality, Start};
 
 /// Makes the measurement in its place. Not inlined: the stack on which the value is made is free again after it.
@@ -13,6 +15,17 @@ pub(crate) fn make(
     found: &Found,
 ) -> &'static mut Measurement {
     place.write(Measurement::new(personality, start(found)))
+}
+
+/// Says what the start tells of the battery.
+pub(crate) fn report_battery(cause: ResetCause, found: &Found) {
+    match Battery::after(cause, found) {
+        Battery::Unknown => {}
+        Battery::Holds => defmt::info!("the battery has kept the backup SRAM"),
+        Battery::Lost => {
+            defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new")
+        }
+    }
 }
 
 /// What the encoder goes on from.

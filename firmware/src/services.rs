@@ -6,10 +6,11 @@ use bsp::can::Controller;
 use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::led::Led;
-use bsp::losses::Losses;
+use bsp::losses::{EVENTS, Event, Losses};
+use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
-use node::{BusEvent, Fault, NodeId, Request};
+use node::{Action, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
 
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
@@ -28,12 +29,16 @@ pub(crate) struct Services {
     rate: Rate,
     frames: Frames,
     lost: &'static Losses,
+    /// What of `lost` has been reported.
+    told: [u32; EVENTS],
     alarm: Alarm,
     led: Led,
     watch: BusWatch,
     back_off: BackOff,
-    /// Going on the bus for the first time is a reset of the communication too.
-    request: Option<Request>,
+    /// Whether the node has been on the bus since its start.
+    has_joined: bool,
+    /// New ones, for the sampling task.
+    parameters: Option<Parameters>,
     /// What the start-up has found, until the bus has been told.
     findings: Findings,
 }
@@ -58,28 +63,75 @@ impl Services {
         led: Led,
         findings: Findings,
     ) -> Services {
-        let request = Some(Request::ResetCommunication);
-        let (watch, back_off) = (BusWatch::default(), BackOff::default());
-        Services { can, rate, frames, lost, alarm, led, watch, back_off, request, findings }
+        Services {
+            can,
+            rate,
+            frames,
+            lost,
+            told: [0; EVENTS],
+            alarm,
+            led,
+            watch: BusWatch::default(),
+            back_off: BackOff::default(),
+            has_joined: false,
+            parameters: None,
+            findings,
+        }
     }
 
     /// Does everything that is due and sets the alarm for what comes next.
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
-        self.fulfil(node);
+        if !core::mem::replace(&mut self.has_joined, true) {
+            let next = self.join(node);
+            let _ = self.settle(next, node);
+        }
         if self.rate.is_searched() {
             self.search(node);
         } else {
             self.report_bus(node);
             self.receive(node);
         }
+        self.report_losses(node);
         let now = Clock::now();
-        let next = node.call(|protocol, out| protocol.poll_services(now, out));
-        self.fulfil(node);
+        let next = self.call(node, |protocol, out| protocol.poll_services(now, out));
+        let next = self.settle(next, node);
         if now >= CONFIRMATION {
             retained::set_trial(retained::trial().confirmed());
         }
         self.led.set(blink(now));
-        self.alarm.set(next.min(now + PERIOD).min(self.back_off.due()));
+        self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
+        // It tells the watchdog that it is there, whether there is something to store or not.
+        rtic::pend(KEEPER);
+    }
+
+    /// The parameters that have changed, once.
+    pub(crate) fn take_parameters(&mut self) -> Option<Parameters> {
+        self.parameters.take()
+    }
+
+    /// One call into the protocol.
+    fn call(
+        &mut self,
+        node: &mut impl Shared,
+        call: impl FnOnce(&mut Protocol, &mut TransmitQueue) -> Next,
+    ) -> Next {
+        let (next, parameters) = node.call(|protocol, out| {
+            let next = call(protocol, out);
+            (next, next.parameters.then(|| protocol.parameters()))
+        });
+        self.parameters = parameters.or(self.parameters.take());
+        if next.process <= Clock::now() {
+            rtic::pend(PROCESS);
+        }
+        next
+    }
+
+    /// Does what a call has left to the firmware, until nothing is left.
+    fn settle(&mut self, mut next: Next, node: &mut impl Shared) -> Next {
+        while let Some(action) = next.action {
+            next = self.fulfil(action, node);
+        }
+        next
     }
 
     /// Listens for the bit rate; goes on the bus when it is found.
@@ -87,26 +139,21 @@ impl Services {
         let has_frame = self.frames.dequeue().is_some();
         if self.rate.go_on(&mut self.can, has_frame, Clock::now()) {
             while self.frames.dequeue().is_some() {}
-            self.join(node);
+            let next = self.join(node);
+            let _ = self.settle(next, node);
         }
     }
 
     fn receive(&mut self, node: &mut impl Shared) {
         while let Some(received) = self.frames.dequeue() {
-            node.call(|protocol, out| protocol.on_service_frame(&received.frame, received.at, out));
-            self.fulfil(node);
-            // A write to the dictionary moves the deadlines of the process data.
-            rtic::pend(PROCESS);
+            let next =
+                self.call(node, |protocol, out| protocol.on_service_frame(&received.frame, received.at, out));
+            let _ = self.settle(next, node);
         }
     }
 
     fn report_bus(&mut self, node: &mut impl Shared) {
         let now = Clock::now();
-        let lost = self.lost.take();
-        if lost > 0 {
-            defmt::warn!("{=u32} received frames lost", lost);
-            node.call(|protocol, out| protocol.bus_event(BusEvent::Overrun, now, out));
-        }
         let state = self.can.state();
         if state == BusState::Off {
             self.back_off.bus_off(now);
@@ -116,40 +163,60 @@ impl Services {
         }
         let change = self.watch.change(state);
         if let Some(event) = change.and_then(|(before, after)| event_of(before, after)) {
-            node.call(|protocol, out| protocol.bus_event(event, now, out));
+            self.report(event, now, node);
         }
     }
 
-    /// Does what the protocol asks for, until it asks for nothing.
-    fn fulfil(&mut self, node: &mut impl Shared) {
-        while let Some(request) =
-            self.request.take().or_else(|| node.call(|protocol, _| protocol.take_request()))
-        {
-            match request {
-                Request::ResetNode => restart(),
-                Request::ResetCommunication => self.join(node),
-                Request::Filters => self.filter(node),
-                Request::BitRate(bit_rate) => {
-                    self.rate = Rate::of(bit_rate);
-                    self.go_on_bus(node);
-                }
-                Request::Bootloader => {
-                    self.hand_over(node, true);
-                    restart()
-                }
-                Request::Store => rtic::pend(KEEPER),
-            }
+    /// Counts of the hardware to where they can be seen. A lost frame has an emergency of its own.
+    fn report_losses(&mut self, node: &mut impl Shared) {
+        let all = self.lost.all();
+        let told = core::mem::replace(&mut self.told, all);
+        if all == told {
+            return;
         }
+        for (kind, count) in (1_u8..).zip(&all).filter(|(_, count)| **count > 0) {
+            defmt::warn!("lost events of kind {=u8}: {=u32}", kind, count);
+        }
+        let has_lost_frame = all.get(Event::Frame as usize) != told.get(Event::Frame as usize);
+        let _ = node.call(|protocol, _| protocol.show_lost_events(&all));
+        if has_lost_frame {
+            self.report(BusEvent::Overrun, Clock::now(), node);
+        }
+    }
+
+    /// What follows is found by the poll at the end of the run.
+    fn report(&mut self, event: BusEvent, now: Instant, node: &mut impl Shared) {
+        let _ = self.call(node, |protocol, _| protocol.bus_event(event, now));
+    }
+
+    /// Does one thing that the protocol leaves to the firmware.
+    fn fulfil(&mut self, action: Action, node: &mut impl Shared) -> Next {
+        match action {
+            Action::ResetNode => restart(),
+            Action::ResetCommunication => return self.join(node),
+            Action::Identifiers => self.filter(node),
+            Action::BitRate(bit_rate) => {
+                self.rate = Rate::of(bit_rate);
+                self.go_on_bus(node);
+            }
+            Action::Bootloader => {
+                self.hand_over(node, true);
+                restart()
+            }
+            Action::Store(_) => rtic::pend(KEEPER),
+        }
+        self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out))
     }
 
     /// Starts the communication on a bus whose bit rate is known; looks for it first where it is not.
-    fn join(&mut self, node: &mut impl Shared) {
-        if self.go_on_bus(node) {
-            node.call(|protocol, out| protocol.start(Clock::now(), out));
-            self.report_findings(node);
-            self.filter(node);
-            rtic::pend(PROCESS);
+    fn join(&mut self, node: &mut impl Shared) -> Next {
+        if !self.go_on_bus(node) {
+            return self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out));
         }
+        let next = self.call(node, |protocol, out| protocol.start(Clock::now(), out));
+        self.report_findings(node);
+        rtic::pend(PROCESS);
+        next
     }
 
     /// Goes on the bus, deaf at first: which identifiers are of interest is known after the start of the protocol. False
@@ -179,7 +246,8 @@ impl Services {
         self.findings.crashed = false;
         for (fault, found) in [(Fault::UnexpectedReset, crashed), (Fault::ParameterStore, no_store)] {
             if found {
-                node.call(|protocol, out| protocol.set_fault(fault, true, Clock::now(), out));
+                // The message goes out with the next poll.
+                let _ = node.call(|protocol, _| protocol.set_fault(fault, true, Clock::now()));
             }
         }
     }

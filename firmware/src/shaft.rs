@@ -1,11 +1,10 @@
 //! The inputs of the encoder, as the measurement takes them.
 
-use bsp::{Counted, Encoder, Ssi, Sums};
+use bsp::{Counted, Ssi};
 use node::{EncoderBoard, Parameters, RawEncoder, SsiFrame};
 
 /// What the sampling task owns of them.
 pub(crate) struct Shaft {
-    encoder: Encoder,
     ssi: Ssi,
     /// Whether the personality has sensors of positions at all.
     is_used: bool,
@@ -15,8 +14,8 @@ pub(crate) struct Shaft {
 }
 
 impl Shaft {
-    pub(crate) fn new(encoder: Encoder, ssi: Ssi, board: EncoderBoard) -> Shaft {
-        Shaft { encoder, ssi, is_used: false, length: None, board }
+    pub(crate) fn new(ssi: Ssi, board: EncoderBoard) -> Shaft {
+        Shaft { ssi, is_used: false, length: None, board }
     }
 
     /// Looks which sensors there are.
@@ -27,15 +26,15 @@ impl Shaft {
         self.length = sensors.map(|sensors| sensors.format.length());
     }
 
-    /// What belongs to the millisecond of these sums. A word of SSI is that of the last millisecond, and the next one is
+    /// What belongs to the millisecond of this count. A word of SSI is that of the last millisecond, and the next one is
     /// started.
-    pub(crate) fn read(&mut self, sums: &Sums) -> RawEncoder {
+    pub(crate) fn read(&mut self, counted: Counted) -> RawEncoder {
         if !self.is_used {
             return RawEncoder::default();
         }
-        let Counted { counter, index } = self.encoder.take(sums);
-        let ssi = self.ssi.take().map(|word| SsiFrame { bits: word.bits, clocks: word.clocks });
-        self.length.into_iter().for_each(|length| self.ssi.start(length));
+        let Counted { counter, index } = counted;
+        let ssi = self.ssi.read(self.length);
+        let ssi = ssi.map(|word| SsiFrame { bits: word.bits, clocks: word.clocks });
         RawEncoder { counter, index, ssi, board: self.board }
     }
 }

@@ -1,10 +1,10 @@
 //! A node with its parameter store on a bench, without a bus: frames in and out, and the time under control.
 
 use canopen::sdo::Multiplexer;
-use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
 use node::{
-    BitRate, FactoryCalibration, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample,
-    Request as Demand, Setup, Start,
+    BitRate, BusEvent, FactoryCalibration, Fault, Measurement, Parcel, Personality, Protocol, RawEncoder,
+    RawSample, Setup, Start,
 };
 use std::collections::VecDeque;
 use storage::{DeviceRecord, Memory, Pages, Store, View};
@@ -48,7 +48,8 @@ pub struct Bench {
     pub buttons: [bool; 2],
     /// What it is where nothing is stored.
     setup: Setup,
-    demands: VecDeque<Demand>,
+    actions: VecDeque<Action>,
+    has_parameters: bool,
 }
 
 /// The parameter store in RAM.
@@ -114,7 +115,7 @@ pub fn deliver(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &m
     let mut parcel = Parcel::new(Personality::default());
     if protocol.pack(&mut parcel) {
         let result = parcel.deliver(store);
-        protocol.finish(&parcel, result, now, out);
+        let _ = protocol.finish(&parcel, result, now, out);
     }
 }
 
@@ -152,9 +153,10 @@ impl Bench {
             encoder: RawEncoder::default(),
             buttons: [false; 2],
             setup: *unless_stored,
-            demands: VecDeque::new(),
+            actions: VecDeque::new(),
+            has_parameters: true,
         };
-        bench.protocol.start(bench.now, &mut bench.out);
+        bench.restart();
         bench.take();
         bench
     }
@@ -166,20 +168,51 @@ impl Bench {
         Bench::start(flash, &self.setup, kept.map_or(Start::First, Start::Kept))
     }
 
-    /// The next thing that the node asks of its firmware, but for storing, which it has got.
-    pub fn take_request(&mut self) -> Option<Demand> {
-        self.demands.pop_front().or_else(|| self.protocol.take_request())
+    /// The same, with one bit changed of what was stored last.
+    ///
+    /// # Panics
+    /// When nothing is stored.
+    #[must_use]
+    pub fn power_cycled_with_damage(self) -> Bench {
+        let mut flash = self.store.into_flash().0;
+        let (first_page, _) = flash.split_at(flash.len() / 2);
+        let last = first_page.iter().rposition(|&byte| byte != 0xFF).expect("something is stored");
+        // Behind the values are the commit word and the closing mark, four bytes each.
+        flash[last - 8] ^= 1;
+        Bench::start(flash, &self.setup, Start::First)
     }
 
-    /// Stores what the node asks to be stored.
-    fn serve_store(&mut self) {
-        while let Some(demand) = self.protocol.take_request() {
-            if demand != Demand::Store {
-                self.demands.push_back(demand);
-                continue;
-            }
-            deliver(&mut self.protocol, &mut self.store, self.now, &mut self.out);
+    /// Boots, or boots again after a reset.
+    pub fn restart(&mut self) {
+        let next = self.protocol.start(self.now, &mut self.out);
+        self.keep(next);
+    }
+
+    /// The next thing that the node has left to its firmware, but for storing, which it has got.
+    pub fn take_action(&mut self) -> Option<Action> {
+        self.poll();
+        self.actions.pop_front()
+    }
+
+    /// Keeps what follows from a call, and stores what the node wants stored.
+    fn keep(&mut self, next: Next) {
+        self.has_parameters |= next.parameters;
+        match next.action {
+            Some(Action::Store(_)) => deliver(&mut self.protocol, &mut self.store, self.now, &mut self.out),
+            other => self.actions.extend(other),
         }
+    }
+
+    /// An event on the bus.
+    pub fn bus_event(&mut self, event: BusEvent) {
+        let _ = self.protocol.bus_event(event, self.now);
+        self.poll();
+    }
+
+    /// A fault that the firmware has found, or that is gone.
+    pub fn set_fault(&mut self, fault: Fault, active: bool) {
+        let _ = self.protocol.set_fault(fault, active, self.now);
+        self.poll();
     }
 
     /// All frames sent since the last call, as identifier and data.
@@ -192,12 +225,12 @@ impl Bench {
         let is_process = self.protocol.process_ids().any(|id| id == frame.id());
         let is_service = self.protocol.service_ids().any(|id| id == frame.id());
         if is_process {
-            self.protocol.on_process_frame(frame, self.now, &mut self.out);
+            let _ = self.protocol.on_process_frame(frame, self.now, &mut self.out);
         }
         if is_service {
-            self.protocol.on_service_frame(frame, self.now, &mut self.out);
+            let next = self.protocol.on_service_frame(frame, self.now, &mut self.out);
+            self.keep(next);
         }
-        self.serve_store();
         self.poll();
     }
 
@@ -208,18 +241,24 @@ impl Bench {
 
     /// Does what is due and returns the next deadline.
     pub fn poll(&mut self) -> Instant {
-        let process = self.protocol.poll_process(self.now, &mut self.out);
-        process.min(self.protocol.poll_services(self.now, &mut self.out))
+        loop {
+            let process = self.protocol.poll_process(self.now, &mut self.out).process;
+            let next = self.protocol.poll_services(self.now, &mut self.out);
+            self.keep(next);
+            if next.action.is_none() {
+                return process.min(next.services);
+            }
+        }
     }
 
     /// Lets a millisecond pass with these readings.
     pub fn sample(&mut self, raw: &RawSample) {
         self.now = self.now + Duration::from_millis(1);
-        if let Some(parameters) = self.protocol.take_parameters() {
-            self.measurement.apply(&parameters);
+        if std::mem::take(&mut self.has_parameters) {
+            self.measurement.apply(&self.protocol.parameters());
         }
         let snapshot = self.measurement.sample(raw, &self.encoder, self.buttons);
-        self.protocol.publish(&snapshot, self.now, &mut self.out);
+        let _ = self.protocol.publish(&snapshot, self.now, &mut self.out);
         self.poll();
     }
 

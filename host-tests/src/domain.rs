@@ -1,10 +1,10 @@
 //! A small device with what the pressure node has not: an object of several KiB, for long transfers.
 
-use canopen::dictionary::{self, Access, Dictionary, Entry, Object, Rule, Type};
+use canopen::dictionary::{self, Access, Dictionary, Object, Type};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Action, Application, CanId, Device, Frame, Instant, NodeId, Part, Transmit};
-use node::Request;
 
+use crate::asked::Asked;
 use crate::network::Unit;
 
 /// Node-ID of the device.
@@ -26,7 +26,7 @@ const fn parameter(at: Multiplexer, kind: Type) -> Object {
 
 const ROWS: &[Object] = &[
     Object::new(0x1001, 0, "", Type::Unsigned8, Access::ReadOnly),
-    parameter(DOMAIN, Type::Domain).rule(Rule::Application(0)),
+    parameter(DOMAIN, Type::Domain),
     parameter(TEXT, Type::VisibleString(TEXT_CAPACITY)),
     parameter(WORD, Type::Unsigned32),
 ];
@@ -42,17 +42,11 @@ pub struct Store {
 }
 
 impl Application for Store {
-    fn initialise(&mut self, _image: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        Err(Abort::Access)
-    }
-
-    fn read_domain(&self, _number: u8) -> Result<&[u8], Abort> {
+    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
         Ok(&self.content)
     }
 
-    fn write_domain(&mut self, _number: u8, part: Part<'_>) -> Result<(), Abort> {
+    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         match part {
             Part::Begin(size) if size.is_some_and(|size| size > CAPACITY) => return Err(Abort::TooLong),
             Part::Begin(_) => self.incoming.clear(),
@@ -70,6 +64,7 @@ impl Application for Store {
 #[derive(Debug)]
 pub struct DomainDevice {
     device: Device<Store, SIZE>,
+    asked: Asked,
 }
 
 impl DomainDevice {
@@ -80,7 +75,7 @@ impl DomainDevice {
     #[must_use]
     pub fn new() -> DomainDevice {
         let node_id = NodeId::new(ID).expect("a node-ID");
-        DomainDevice { device: Device::new(&DICTIONARY, node_id, Store::default()) }
+        DomainDevice { device: Device::new(&DICTIONARY, node_id, Store::default()), asked: Asked::default() }
     }
 
     /// What is stored.
@@ -103,28 +98,25 @@ impl Default for DomainDevice {
 
 impl Unit for DomainDevice {
     fn start(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.device.start(now, out);
+        self.asked.keep(self.device.start(now, out));
     }
 
     fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        self.device.on_process_frame(frame, now, out);
+        self.asked.keep(self.device.on_process_frame(frame, now, out));
     }
 
     fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        self.device.on_service_frame(frame, now, out);
+        self.asked.keep(self.device.on_service_frame(frame, now, out));
     }
 
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
-        self.device.poll_process(now, out).min(self.device.poll_services(now, out))
+        let next = self.device.poll(now, out);
+        self.asked.keep(next);
+        next.due()
     }
 
-    fn take_request(&mut self) -> Option<Request> {
-        self.device.take_action().map(|action| match action {
-            Action::ResetNode => Request::ResetNode,
-            Action::ResetCommunication => Request::ResetCommunication,
-            Action::Identifiers => Request::Filters,
-            other => panic!("{other:?}: the dictionary has nothing that leads to it"),
-        })
+    fn take_action(&mut self) -> Option<Action> {
+        self.asked.take_action()
     }
 
     fn process_ids(&self) -> Vec<u16> {

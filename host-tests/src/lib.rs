@@ -1,5 +1,6 @@
 //! What the tests that cross crates share.
 
+pub mod asked;
 pub mod bench;
 pub mod domain;
 pub mod lift417;
@@ -8,3 +9,4 @@ pub mod network;
 pub mod sdo;
 pub mod station;
 pub mod tables;
+pub mod thorough;

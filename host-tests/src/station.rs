@@ -1,9 +1,10 @@
 //! A node as a station of a network: both halves, its parameter store, and what its sensors read.
 
-use canopen::{Duration, Frame, Instant, NodeId, Transmit};
-use node::{BitRate, Measurement, Protocol, RawEncoder, RawSample, Request, Setup, Start};
+use canopen::{Action, Duration, Frame, Instant, NodeId, Transmit};
+use node::{BitRate, Measurement, Protocol, RawEncoder, RawSample, Setup, Start};
 use profiles::lift::panel::BUTTONS;
 
+use crate::asked::Asked;
 use crate::bench::{Flash, deliver, empty_store, setup};
 use crate::network::Unit;
 
@@ -36,6 +37,7 @@ pub struct Station<S> {
     pub store: Flash,
     sensors: S,
     next_sample: Instant,
+    asked: Asked,
 }
 
 /// A pressure node whose readings do not change.
@@ -59,45 +61,48 @@ impl<S: Sensors> Station<S> {
             store: empty_store(),
             sensors,
             next_sample: Instant::NEVER,
+            asked: Asked::default(),
         }
     }
 
     /// The sampling task: takes new parameters, samples and publishes.
     fn sample(&mut self, now: Instant, out: &mut impl Transmit) {
         self.next_sample = now + SAMPLE_PERIOD;
-        if let Some(parameters) = self.protocol.take_parameters() {
-            self.measurement.apply(&parameters);
+        if self.asked.take_parameters() {
+            self.measurement.apply(&self.protocol.parameters());
         }
         let (raw, encoder, buttons) = self.sensors.read(now);
         let snapshot = self.measurement.sample(&raw, &encoder, buttons);
-        self.protocol.publish(&snapshot, now, out);
+        self.asked.keep(self.protocol.publish(&snapshot, now, out));
     }
 }
 
 impl<S: Sensors> Unit for Station<S> {
     fn start(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.protocol.start(now, out);
+        self.asked.keep(self.protocol.start(now, out));
         self.next_sample = now;
     }
 
     fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        self.protocol.on_process_frame(frame, now, out);
+        self.asked.keep(self.protocol.on_process_frame(frame, now, out));
     }
 
     fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        self.protocol.on_service_frame(frame, now, out);
+        self.asked.keep(self.protocol.on_service_frame(frame, now, out));
     }
 
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         if now >= self.next_sample {
             self.sample(now, out);
         }
-        let process = self.protocol.poll_process(now, out);
-        process.min(self.protocol.poll_services(now, out)).min(self.next_sample)
+        let process = self.protocol.poll_process(now, out).process;
+        let next = self.protocol.poll_services(now, out);
+        self.asked.keep(next);
+        process.min(next.services).min(self.next_sample)
     }
 
-    fn take_request(&mut self) -> Option<Request> {
-        self.protocol.take_request()
+    fn take_action(&mut self) -> Option<Action> {
+        self.asked.take_action()
     }
 
     fn store(&mut self, now: Instant, out: &mut impl Transmit) {

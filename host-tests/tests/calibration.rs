@@ -38,7 +38,7 @@ fn is_close(value: f32, expected: f32, tolerance: f32) -> bool {
 
 fn reset(bench: &mut Bench, command: u8) {
     bench.nmt(command);
-    bench.protocol.start(bench.now, &mut bench.out);
+    bench.restart();
 }
 
 #[test]

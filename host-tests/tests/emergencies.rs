@@ -3,7 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use canopen::Frame;
+use canopen::dictionary::Group;
+use canopen::{Condition, Frame};
 use host_tests::bench::{Bench, ID, raw};
 use node::{BusEvent, Fault, Personality, RawSample};
 use profiles::encoder::Board;
@@ -17,7 +18,7 @@ const EMCY: u16 = 0x080 + ID as u16;
 struct Row {
     code: u16,
     flag: Option<(u16, u8, u32)>,
-    fault: Option<Fault>,
+    fault: Option<Any>,
     remark: &'static str,
 }
 
@@ -32,8 +33,56 @@ fn rows() -> impl Iterator<Item = Row> {
     })
 }
 
-fn named(name: &str) -> Fault {
-    Fault::all().find(|fault| format!("{fault:?}") == name).unwrap_or_else(|| panic!("no fault {name}"))
+/// A fault of the node or of communication, by the name that the table has for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Any {
+    Node(Fault),
+    Bus(canopen::Fault),
+}
+
+impl Any {
+    fn all() -> impl Iterator<Item = Any> {
+        use canopen::Fault as Bus;
+        let bus = [
+            Bus::Overrun,
+            Bus::ErrorPassive,
+            Bus::BusOffRecovered,
+            Bus::SyncMissing,
+            Bus::SyncLength,
+            Bus::MpdoNotTaken,
+            Bus::Heartbeat(0),
+            Bus::RpdoTooShort(0),
+            Bus::RpdoTooLong(0),
+            Bus::RpdoDeadline(0),
+            Bus::StoredData(Group::Communication),
+            Bus::StoredData(Group::Application),
+            Bus::StoredData(Group::Calibration),
+        ];
+        Fault::ALL.into_iter().map(Any::Node).chain(bus.into_iter().map(Any::Bus))
+    }
+
+    fn name(self) -> String {
+        match self {
+            Any::Node(fault) => format!("{fault:?}"),
+            Any::Bus(canopen::Fault::StoredData(group)) => format!("{group:?}Data"),
+            Any::Bus(fault) => format!("{fault:?}"),
+        }
+    }
+
+    fn condition(self) -> Condition {
+        match self {
+            Any::Node(fault) => fault.condition(),
+            Any::Bus(fault) => fault.condition(&[]),
+        }
+    }
+
+    fn code(self) -> u16 {
+        self.condition().code
+    }
+}
+
+fn named(name: &str) -> Any {
+    Any::all().find(|fault| fault.name() == name).unwrap_or_else(|| panic!("no fault {name}"))
 }
 
 fn intact() -> RawSample {
@@ -51,7 +100,14 @@ fn measuring() -> Bench {
 }
 
 /// Brings the fault about from outside, where the bench has the means; otherwise as the firmware does that has found it.
-fn provoke(bench: &mut Bench, fault: Fault) {
+fn provoke(bench: &mut Bench, fault: Any) {
+    match fault {
+        Any::Node(fault) => provoke_in_node(bench, fault),
+        Any::Bus(fault) => provoke_on_bus(bench, fault),
+    }
+}
+
+fn provoke_in_node(bench: &mut Bench, fault: Fault) {
     let mut sample = intact();
     match fault {
         Fault::SensorBreak => sample.pressure = 100,
@@ -61,11 +117,19 @@ fn provoke(bench: &mut Bench, fault: Fault) {
         Fault::InputCurrent => bench.encoder.board.current = Some(1000),
         Fault::InputVoltage => bench.encoder.board.supply = Some(0),
         Fault::HardwareMemory => bench.encoder.board.memory_error = true,
-        Fault::Overrun => return tell(bench, BusEvent::Overrun),
-        Fault::ErrorPassive => return tell(bench, BusEvent::Passive),
+        _ => return bench.set_fault(fault, true),
+    }
+    (0..1000).for_each(|_| bench.sample(&sample));
+}
+
+fn provoke_on_bus(bench: &mut Bench, fault: canopen::Fault) {
+    use canopen::Fault;
+    match fault {
+        Fault::Overrun => return bench.bus_event(BusEvent::Overrun),
+        Fault::ErrorPassive => return bench.bus_event(BusEvent::Passive),
         Fault::BusOffRecovered => {
-            tell(bench, BusEvent::BusOff);
-            return tell(bench, BusEvent::Recovered);
+            bench.bus_event(BusEvent::BusOff);
+            return bench.bus_event(BusEvent::Recovered);
         }
         Fault::SyncLength => return bench.receive(&Frame::new(0x80, &[1, 2]).unwrap()),
         Fault::SyncMissing => {
@@ -85,9 +149,23 @@ fn provoke(bench: &mut Bench, fault: Fault) {
             bench.write(0x1016, 1, &0x0005_0005_u32.to_le_bytes()).unwrap();
             bench.receive(&Frame::new(0x705, &[5]).unwrap());
         }
-        _ => return bench.protocol.set_fault(fault, true, bench.now, &mut bench.out),
+        Fault::StoredData(group) => return lose_stored(bench, group),
+        Fault::Application(_) => unreachable!("the node names its own"),
     }
-    (0..1000).for_each(|_| bench.sample(&sample));
+    (0..1000).for_each(|_| bench.sample(&intact()));
+}
+
+/// Stores a group, and starts with one bit of it changed.
+fn lose_stored(bench: &mut Bench, group: Group) {
+    let (index, sub) = match group {
+        Group::Communication => (0x1010, 2),
+        Group::Application => (0x1010, 3),
+        Group::Calibration => (0x2204, 0),
+    };
+    bench.write(index, sub, b"save").unwrap();
+    *bench = std::mem::replace(bench, Bench::booted()).power_cycled_with_damage();
+    bench.restart();
+    (0..20).for_each(|_| bench.sample(&intact()));
 }
 
 /// RPDO 1 with this many objects, the first of them a byte that nobody takes (CiA 301, 7.4.7.1), and its data.
@@ -99,10 +177,6 @@ fn receive_pdo(bench: &mut Bench, objects: u8, data: &[u8]) {
     bench.receive(&Frame::new(id, data).unwrap());
 }
 
-fn tell(bench: &mut Bench, event: BusEvent) {
-    bench.protocol.bus_event(event, bench.now, &mut bench.out);
-}
-
 /// EMCY messages sent since the last look.
 fn emergencies(bench: &mut Bench) -> Vec<[u8; 8]> {
     let messages = bench.take().into_iter().filter(|(id, _)| *id == EMCY);
@@ -111,17 +185,17 @@ fn emergencies(bench: &mut Bench) -> Vec<[u8; 8]> {
 
 #[test]
 fn the_table_has_every_fault_that_the_node_can_signal() {
-    let of_a_kind = |fault: Fault| format!("{fault:?}").split('(').next().unwrap().to_string();
+    let of_a_kind = |fault: Any| fault.name().split('(').next().unwrap().to_string();
     let known: BTreeSet<_> = rows().filter_map(|row| row.fault).map(of_a_kind).collect();
-    assert_eq!(known, Fault::all().map(of_a_kind).collect());
+    assert_eq!(known, Any::all().map(of_a_kind).collect());
     for row in rows() {
-        assert_eq!(row.fault.map_or(row.code, Fault::code), row.code, "{row:X?}");
+        assert_eq!(row.fault.map_or(row.code, Any::code), row.code, "{row:X?}");
     }
 }
 
 #[test]
 fn what_is_never_sent_has_a_reason() {
-    let sent: BTreeSet<u16> = Fault::all().map(Fault::code).collect();
+    let sent: BTreeSet<u16> = Any::all().map(Any::code).collect();
     for row in rows().filter(|row| row.fault.is_none()) {
         assert!(!sent.contains(&row.code) && !row.remark.is_empty(), "{row:X?}");
     }
@@ -140,7 +214,7 @@ fn every_fault_is_told_in_an_emcy_in_the_list_in_the_register_and_in_its_flag() 
         else {
             panic!("{row:X?}: {messages:X?}");
         };
-        assert_eq!(([*a, *b], detail), ([low, high], &fault.detail()), "{row:X?}");
+        assert_eq!(([*a, *b], detail), ([low, high], &fault.condition().detail), "{row:X?}");
         assert_eq!(register & 1, 1, "{row:X?}");
         let listed: Vec<_> = (1..=10).filter_map(|sub| bench.read(0x1003, sub).ok()).collect();
         assert!(listed.contains(&vec![low, high, 0, 0]), "{row:X?}: {listed:X?}");
@@ -156,10 +230,10 @@ fn every_fault_is_told_in_an_emcy_in_the_list_in_the_register_and_in_its_flag() 
 #[test]
 fn what_the_firmware_takes_back_is_gone_everywhere() {
     for row in rows() {
-        let (Some(fault), Some((index, sub, bit))) = (row.fault, row.flag) else { continue };
+        let (Some(Any::Node(fault)), Some((index, sub, bit))) = (row.fault, row.flag) else { continue };
         let mut bench = measuring();
         for is_set in [true, false] {
-            bench.protocol.set_fault(fault, is_set, bench.now, &mut bench.out);
+            bench.set_fault(fault, is_set);
             let flags = u32::from_le_bytes(bench.read(index, sub).unwrap().try_into().unwrap());
             assert_eq!(flags, u32::from(is_set) << bit, "{row:X?}");
         }

@@ -194,7 +194,7 @@ fn the_serial_number_is_that_of_the_identity() {
     let mut bench = booted();
     assert_eq!(number(&mut bench, 0x650B, 0), number(&mut bench, 0x1018, 4));
     bench.nmt(0x82);
-    bench.protocol.start(bench.now, &mut bench.out);
+    bench.restart();
     assert_eq!(number(&mut bench, 0x650B, 0), number(&mut bench, 0x1018, 4));
 }
 

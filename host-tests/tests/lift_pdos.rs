@@ -1,9 +1,8 @@
 //! Each of the 290 PDOs of the table, produced and consumed by a device of the stack: at its number, with its CAN-ID, and
 //! laid out as the table says.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Mapping, Object, Tables, Type};
-use canopen::sdo::Abort;
-use canopen::{Application, Device, Duration, Frame, Instant, NodeId};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Tables, Type};
+use canopen::{Device, Duration, Frame, Instant, NodeId};
 use host_tests::bench::Queue;
 use host_tests::lift417::{Pdo, pdos};
 use node::lift::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
@@ -72,7 +71,7 @@ fn kind(bits: u8) -> Type {
 }
 
 /// The objects of a PDO, and the dictionary of a device with nothing else.
-fn device(row: &Pdo) -> (&'static Dictionary, Device<NoRules, SIZE>) {
+fn device(row: &Pdo) -> (&'static Dictionary, Device<(), SIZE>) {
     let (access, mapping) =
         if row.is_produced { (Access::ReadOnly, Mapping::Tpdo) } else { (Access::ReadWrite, Mapping::Rpdo) };
     let mapped = carried(row).into_iter().filter(|(index, ..)| *index >= 0x1000);
@@ -87,28 +86,18 @@ fn device(row: &Pdo) -> (&'static Dictionary, Device<NoRules, SIZE>) {
     let rows: [Object; ROWS] = rows.try_into().unwrap();
     let tables: &'static Tables<1, ROWS, ROWS, ROWS, SIZE> =
         Box::leak(Box::new(dictionary::compile(&[&rows])));
-    let [dictionary] = tables.dictionaries(&[&rows]);
+    let [dictionary] = tables.dictionaries();
     let dictionary: &'static Dictionary = Box::leak(Box::new(dictionary));
-    (dictionary, Device::new(dictionary, NodeId::new(ID), NoRules))
-}
-
-struct NoRules;
-
-impl Application for NoRules {
-    fn initialise(&mut self, _: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        Ok(())
-    }
+    (dictionary, Device::new(dictionary, NodeId::new(ID), ()))
 }
 
 /// A device in Operational, with what it has sent on the way there.
-fn operational(row: &Pdo) -> (&'static Dictionary, Device<NoRules, SIZE>, Vec<Frame>) {
+fn operational(row: &Pdo) -> (&'static Dictionary, Device<(), SIZE>, Vec<Frame>) {
     let (dictionary, mut device) = device(row);
     let mut out = Queue::default();
-    device.start(NOW, &mut out);
+    let _ = device.start(NOW, &mut out);
     out.0.clear();
-    device.on_process_frame(&Frame::new(0, &[1, ID]).unwrap(), NOW, &mut out);
+    let _ = device.on_process_frame(&Frame::new(0, &[1, ID]).unwrap(), NOW, &mut out);
     (dictionary, device, out.0)
 }
 
@@ -141,11 +130,13 @@ fn every_tpdo_is_sent_on_entering_operational_and_on_each_change() {
         let (dictionary, mut device, first) = operational(&row);
         assert_eq!(first, [frame(&row, 0)], "{}", row.number);
         for (step, (index, sub, bits)) in (1..).zip(carried(&row)) {
-            dictionary.field(index, sub).set(device.image_mut(), &[7; 8][..usize::from(bits / 8)]);
             let mut out = Queue::default();
             let now = LATER + Duration::from_millis(step);
-            device.changed(now, &mut out);
-            device.changed(now, &mut out);
+            let field = dictionary.field(index, sub);
+            let mut change = || {
+                device.publish(now, &mut out, |(), image| field.set(image, &[7; 8][..usize::from(bits / 8)]))
+            };
+            let _ = [change(), change()];
             assert_eq!(out.0.len(), 1, "{index:X}h of {}: one change, one frame", row.number);
             let is_last = usize::try_from(step).unwrap() == carried(&row).len();
             assert_eq!(out.0[0] == frame(&row, 7), is_last);
@@ -160,9 +151,10 @@ fn every_object_has_its_bytes_in_the_frame() {
         for (index, sub, bits) in carried(&row) {
             let (dictionary, mut device, _) = operational(&row);
             let len = usize::from(bits / 8);
-            dictionary.field(index, sub).set(device.image_mut(), &[1, 2, 3, 4, 5, 6][..len]);
+            let field = dictionary.field(index, sub);
             let mut out = Queue::default();
-            device.changed(LATER, &mut out);
+            let set = |(): &mut (), image: &mut [u8]| field.set(image, &[1, 2, 3, 4, 5, 6][..len]);
+            let _ = device.publish(LATER, &mut out, set);
             let mut expected = vec![0; frame(&row, 0).data().len()];
             expected[at..at + len].copy_from_slice(&[1, 2, 3, 4, 5, 6][..len]);
             assert_eq!(out.0[0].data(), expected, "{index:X}h of {}", row.number);
@@ -177,7 +169,7 @@ fn every_rpdo_is_taken_at_once() {
         let (dictionary, mut device, first) = operational(&row);
         assert_eq!(first, []);
         assert!(device.process_ids().any(|id| u32::from(id.get()) == row.cob_id(ID)));
-        device.on_process_frame(&frame(&row, 7), LATER, &mut Queue::default());
+        let _ = device.on_process_frame(&frame(&row, 7), LATER, &mut Queue::default());
         for (index, sub, bits) in carried(&row).into_iter().filter(|(index, ..)| *index >= 0x1000) {
             let value = dictionary.field(index, sub).get(device.image());
             assert_eq!(value, &[7; 8][..usize::from(bits / 8)], "{}", row.number);

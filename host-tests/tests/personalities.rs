@@ -4,7 +4,7 @@ use canopen::Instant;
 use canopen::lss::Request as LssRequest;
 use canopen::sdo::Abort;
 use host_tests::bench::{Bench, ID};
-use node::{Parcel, Personality, Request};
+use node::{Action, Parcel, Personality};
 
 const VALUE_TOO_HIGH: u32 = 0x0609_0031;
 
@@ -45,7 +45,7 @@ fn a_reset_of_the_communication_shows_what_is_stored() {
     let mut bench = Bench::booted();
     bench.write(0x2000, 0, &[1]).unwrap();
     bench.nmt(0x82);
-    bench.protocol.start(bench.now, &mut bench.out);
+    bench.restart();
     assert_eq!((personality(&mut bench), device_type(&mut bench)), (1, 0x0002_0194));
 }
 
@@ -85,12 +85,14 @@ fn a_store_that_fails_is_told_and_changes_nothing() {
     let now = Instant(1);
     // Written without the bench, which would store it.
     let frame = canopen::Frame::new(0x600 + u16::from(ID), &[0x2F, 0, 0x20, 0, 1, 0, 0, 0]).unwrap();
-    bench.protocol.on_service_frame(&frame, now, &mut bench.out);
+    let mut next = bench.protocol.on_service_frame(&frame, now, &mut bench.out);
     assert_eq!(bench.take(), [], "the answer waits");
-    while bench.protocol.take_request().is_some_and(|request| request != Request::Store) {}
+    while !matches!(next.action, Some(Action::Store(_))) {
+        next = bench.protocol.poll_services(now, &mut bench.out);
+    }
     let mut parcel = Parcel::new(Personality::default());
     assert!(bench.protocol.pack(&mut parcel));
-    bench.protocol.finish(&parcel, Err(Abort::Hardware), now, &mut bench.out);
+    let _ = bench.protocol.finish(&parcel, Err(Abort::Hardware), now, &mut bench.out);
     assert_eq!(bench.take(), [(0x580 + u16::from(ID), vec![0x80, 0, 0x20, 0, 0, 0, 6, 6])]);
     assert_eq!(personality(&mut bench), 0);
 }

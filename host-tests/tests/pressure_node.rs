@@ -2,7 +2,7 @@
 
 use canopen::{Frame, Instant};
 use host_tests::bench::{Bench, ID, Queue, raw, setup};
-use node::{BusEvent, Fault, Measurement, Protocol, RawEncoder, Request, Start, State};
+use node::{Action, BusEvent, Fault, Measurement, Protocol, RawEncoder, Start, State};
 
 const TPDO1: u16 = 0x180 + ID as u16;
 const EMCY: u16 = 0x080 + ID as u16;
@@ -51,11 +51,11 @@ fn a_node_that_is_started_the_moment_it_boots_sends_what_it_has_measured_before(
     let mut protocol = Protocol::new(&setup);
     let mut measurement = Measurement::new(setup.personality, Start::First);
     let (mut out, now) = (Queue::default(), Instant(0));
-    measurement.apply(&protocol.prepare());
+    measurement.apply(&protocol.load_defaults());
     let snapshot = measurement.sample(&raw(250_000.0, 298.15), &RawEncoder::default(), [false; 2]);
-    protocol.publish(&snapshot, now, &mut out);
-    protocol.start(now, &mut out);
-    protocol.on_process_frame(&Frame::new(0, &[1, ID]).unwrap(), now, &mut out);
+    let _ = protocol.publish(&snapshot, now, &mut out);
+    let _ = protocol.start(now, &mut out);
+    let _ = protocol.on_process_frame(&Frame::new(0, &[1, ID]).unwrap(), now, &mut out);
     let last = out.0.last().unwrap();
     assert_eq!(last.id(), TPDO1);
     let bar = f32::from_le_bytes(last.data()[..4].try_into().unwrap());
@@ -175,11 +175,11 @@ fn the_span_sets_the_overload_bits() {
 #[test]
 fn flags_survive_a_reset_as_what_they_report_does() {
     let mut bench = Bench::booted();
-    bench.protocol.set_fault(Fault::UnexpectedReset, true, bench.now, &mut bench.out);
+    bench.set_fault(Fault::UnexpectedReset, true);
     assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
     bench.nmt(0x81);
-    while bench.take_request().is_some_and(|request| request != Request::ResetNode) {}
-    bench.protocol.start(bench.now, &mut bench.out);
+    while bench.take_action().is_some_and(|action| action != Action::ResetNode) {}
+    bench.restart();
     assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
     assert_eq!(bench.read(0x3000, 3), Ok(vec![1 << 6, 0, 0, 0]));
     assert_eq!(bench.read(0x1002, 0), Ok(vec![4, 0, 0, 0]));
@@ -188,20 +188,20 @@ fn flags_survive_a_reset_as_what_they_report_does() {
 #[test]
 fn bus_off_applies_the_communication_error_behaviour_and_is_told_afterwards() {
     let mut bench = operational();
-    bench.protocol.bus_event(BusEvent::Passive, bench.now, &mut bench.out);
+    bench.bus_event(BusEvent::Passive);
     assert_eq!(emergencies(&mut bench), [(0x8120, 0x11)]);
-    bench.protocol.bus_event(BusEvent::BusOff, bench.now, &mut bench.out);
+    bench.bus_event(BusEvent::BusOff);
     assert_eq!(bench.protocol.state(), State::PreOperational);
-    bench.protocol.bus_event(BusEvent::Recovered, bench.now, &mut bench.out);
+    bench.bus_event(BusEvent::Recovered);
     assert_eq!(emergencies(&mut bench), [(0x8140, 0x11), (0, 0)]);
 }
 
 #[test]
 fn a_warning_says_nothing_and_an_overrun_is_an_event() {
     let mut bench = operational();
-    bench.protocol.bus_event(BusEvent::Warning, bench.now, &mut bench.out);
+    bench.bus_event(BusEvent::Warning);
     assert_eq!(emergencies(&mut bench), []);
-    bench.protocol.bus_event(BusEvent::Overrun, bench.now, &mut bench.out);
+    bench.bus_event(BusEvent::Overrun);
     assert_eq!(emergencies(&mut bench), [(0x8110, 0x11), (0, 0)]);
     assert_eq!(bench.protocol.state(), State::Operational);
 }
@@ -209,13 +209,13 @@ fn a_warning_says_nothing_and_an_overrun_is_an_event() {
 #[test]
 fn the_firmware_is_told_what_it_must_do() {
     let mut bench = Bench::booted();
-    assert_eq!(bench.take_request(), Some(Request::Filters));
-    assert_eq!(bench.take_request(), None);
+    assert_eq!(bench.take_action(), Some(Action::Identifiers));
+    assert_eq!(bench.take_action(), None);
     bench.write(0x1005, 0, &[0x90, 0, 0, 0]).unwrap();
-    assert_eq!(bench.take_request(), Some(Request::Filters));
+    assert_eq!(bench.take_action(), Some(Action::Identifiers));
     bench.nmt(0x82);
-    assert_eq!(bench.take_request(), Some(Request::ResetCommunication));
-    assert_eq!(bench.take_request(), None);
+    assert_eq!(bench.take_action(), Some(Action::ResetCommunication));
+    assert_eq!(bench.take_action(), None);
 }
 
 #[test]

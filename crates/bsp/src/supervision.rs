@@ -8,26 +8,30 @@ use core::sync::atomic::{AtomicU8, Ordering};
 pub enum Part {
     /// The 1 kHz sampling.
     Sampling = 1,
-    /// The services task, which runs below everything that could starve it.
-    Services = 2,
+    /// The task of the process data.
+    Process = 2,
+    /// The services task.
+    Services = 4,
+    /// The task that stores parameters. It has the lowest priority, so a task that never ends starves this one as well.
+    Keeper = 8,
 }
 
-const ALL: u8 = Part::Sampling as u8 | Part::Services as u8;
+const ALL: u8 = Part::Sampling as u8 | Part::Process as u8 | Part::Services as u8 | Part::Keeper as u8;
 
-/// Who has made progress since the watchdog was last fed.
+/// Which parts have made progress since the watchdog was last fed.
 #[derive(Debug, Default)]
 pub struct Supervision {
     done: AtomicU8,
 }
 
 impl Supervision {
-    /// Nobody yet.
+    /// No part has made progress yet.
     #[must_use]
     pub const fn new() -> Supervision {
         Supervision { done: AtomicU8::new(0) }
     }
 
-    /// Notes that `part` has made progress. True when that made it complete: feed now.
+    /// Notes that `part` has made progress. True when now all parts have: feed the watchdog.
     pub fn progress(&self, part: Part) -> bool {
         let done = self.done.fetch_or(part as u8, Ordering::Relaxed) | part as u8;
         let complete = done == ALL;
@@ -44,21 +48,23 @@ impl Supervision {
 mod tests {
     use super::*;
 
+    const PARTS: [Part; 4] = [Part::Sampling, Part::Process, Part::Services, Part::Keeper];
+
     #[test]
-    fn one_part_alone_never_feeds() {
-        for part in [Part::Sampling, Part::Services] {
+    fn without_one_of_them_nobody_feeds() {
+        for silent in PARTS {
             let supervision = Supervision::new();
-            assert!((0..1000).all(|_| !supervision.progress(part)));
+            let others = PARTS.into_iter().filter(|part| *part != silent);
+            assert!(others.cycle().take(1000).all(|part| !supervision.progress(part)), "without {silent:?}");
         }
     }
 
     #[test]
-    fn every_feed_needs_new_progress_of_both() {
+    fn every_feed_needs_new_progress_of_all() {
         let supervision = Supervision::new();
-        assert!(!supervision.progress(Part::Sampling));
-        assert!(supervision.progress(Part::Services));
-        assert!(!supervision.progress(Part::Services));
-        assert!(supervision.progress(Part::Sampling));
-        assert!(!supervision.progress(Part::Sampling));
+        for _ in 0..3 {
+            let fed = PARTS.map(|part| supervision.progress(part));
+            assert_eq!(fed, [false, false, false, true]);
+        }
     }
 }

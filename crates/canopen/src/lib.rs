@@ -17,12 +17,16 @@ pub mod client;
 mod copy;
 mod device;
 pub mod dictionary;
+pub mod eds;
+#[cfg(feature = "embedded-can")]
+pub mod embedded_can;
 pub mod emcy;
 mod frame;
 mod heartbeat;
 pub mod lss;
 pub mod nmt;
 mod node_id;
+pub mod objects;
 pub mod pdo;
 pub mod sdo;
 mod sync;
@@ -30,7 +34,8 @@ mod time;
 mod transmit;
 
 pub use can_id::{CanId, CobId};
-pub use device::{Action, Application, Device, Job, Part, Selection, Stored};
+pub use device::{Action, Application, BusEvent, Device, ErrorClass, Job, Next, Part, Stored};
+pub use emcy::{Condition, Fault};
 pub use frame::Frame;
 pub use node_id::NodeId;
 pub use time::{Duration, Instant};

@@ -23,11 +23,11 @@ impl Configured {
     pub(crate) fn after(self, job: Job) -> Configured {
         match job {
             Job::Configure(lss) => Configured { lss, ..self },
-            Job::Set(number) => {
+            Job::Setting(number) => {
                 let personality = Personality::numbered(number).unwrap_or(self.personality);
                 Configured { personality, ..self }
             }
-            Job::Save(_) | Job::Restore(_) => self,
+            Job::Store(_) | Job::Restore(_) => self,
         }
     }
 

@@ -1,14 +1,8 @@
 //! Faults: from the sensor, from the bus, and from the firmware.
 
-use crate::profile::Profile;
-use crate::{BusEvent, Protocol, Snapshot};
-use canopen::emcy::Fault;
-use canopen::{Instant, Transmit};
+use crate::{BusEvent, Fault, Next, Protocol, Snapshot};
+use canopen::{ErrorClass, Instant};
 use profiles::{encoder, lift, pressure};
-
-/// Sub-indexes of 1029h.
-const COMMUNICATION_ERROR: u8 = 1;
-const DEVICE_ERROR: u8 = 2;
 
 /// What the measurement finds wrong.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,55 +46,25 @@ impl Conditions {
 
 impl Protocol {
     /// Takes note of an event on the bus.
-    pub fn bus_event(&mut self, event: BusEvent, now: Instant, out: &mut impl Transmit) {
-        match event {
-            // A warning has no emergency code: the node works, and error passive would follow.
-            BusEvent::Warning => (),
-            BusEvent::Overrun => {
-                self.device.raise(Fault::Overrun, now);
-                self.device.clear(Fault::Overrun, now);
-            }
-            BusEvent::Passive => self.device.raise(Fault::ErrorPassive, now),
-            BusEvent::BusOff => {
-                self.is_bus_off = true;
-                self.device.apply_error_behaviour(COMMUNICATION_ERROR);
-            }
-            BusEvent::Recovered => self.recover(now),
-        }
-        self.device.poll_services(now, out);
-    }
-
-    /// That the node was off the bus can only be said afterwards.
-    fn recover(&mut self, now: Instant) {
-        if core::mem::take(&mut self.is_bus_off) {
-            self.device.raise(Fault::BusOffRecovered, now);
-        }
-        self.device.clear(Fault::ErrorPassive, now);
-        self.device.clear(Fault::BusOffRecovered, now);
+    pub fn bus_event(&mut self, event: BusEvent, now: Instant) -> Next {
+        self.device.on_bus(event, now)
     }
 
     /// Sets or clears a fault that the firmware has found: in the flags of 3000h where there are any, the error register
     /// and an EMCY.
-    pub fn set_fault(&mut self, fault: Fault, active: bool, now: Instant, out: &mut impl Transmit) {
+    pub fn set_fault(&mut self, fault: Fault, active: bool, now: Instant) -> Next {
         let has_flag = self.device.application_mut().flags.set(fault, active);
-        self.device.show(Profile::show_flags);
-        if active {
-            self.device.raise(fault, now);
-        } else {
-            self.device.clear(fault, now);
-        }
-        if active && has_flag {
-            self.device.apply_error_behaviour(DEVICE_ERROR);
-        }
-        self.device.poll_services(now, out);
+        self.device.show(|profile, image| profile.show_flags(image));
+        let next = self.device.set_condition(fault.number(), active, now);
+        if active && has_flag { self.device.error(ErrorClass::DEVICE) } else { next }
     }
 
-    /// Turns the conditions that have changed into faults.
-    pub(crate) fn take_conditions(&mut self, new: Conditions, now: Instant, out: &mut impl Transmit) {
+    /// Turns the conditions that have changed into faults. The services send them.
+    pub(crate) fn take_conditions(&mut self, new: Conditions, now: Instant) {
         let old = core::mem::replace(&mut self.conditions, new);
         let changes = old.faults().into_iter().zip(new.faults()).filter(|(old, new)| old != new);
         for (_, (fault, active)) in changes {
-            self.set_fault(fault, active, now, out);
+            let _ = self.set_fault(fault, active, now);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Status flags: faults as they appear in 3000h, and their summary in 1002h.
 
-use canopen::dictionary::{Dictionary, Field};
-use canopen::emcy::Fault;
+use crate::Fault;
+use canopen::dictionary::{Dictionary, Field, Group};
 
 /// Where they are in the image of a dictionary that has them.
 pub(crate) struct Fields {
@@ -31,12 +31,27 @@ pub(crate) struct Flags {
 }
 
 impl Flags {
-    /// Sets or clears the flag of a fault. `false` for a fault that has none: those of communication.
+    /// Sets or clears the flag of a fault; whether there is one.
     pub(crate) fn set(&mut self, fault: Fault, active: bool) -> bool {
         let (sensor, system) = bits(fault);
+        self.set_bits(sensor, system, active);
+        sensor | system != 0
+    }
+
+    /// Sets or clears the flag of a storage group whose values could not be loaded. Without its calibration, the sensor
+    /// runs with that of no device.
+    pub(crate) fn set_stored(&mut self, group: Group, active: bool) {
+        let (sensor, system) = match group {
+            Group::Calibration => (1, 0),
+            Group::Communication => (0, 1 << 4),
+            Group::Application => (0, 1 << 5),
+        };
+        self.set_bits(sensor, system, active);
+    }
+
+    fn set_bits(&mut self, sensor: u32, system: u32, active: bool) {
         self.sensor = if active { self.sensor | sensor } else { self.sensor & !sensor };
         self.system = if active { self.system | system } else { self.system & !system };
-        sensor | system != 0
     }
 
     /// Writes the flags and their summary: bit 0 any sensor error, bit 1 any internal protocol error (there is none),
@@ -53,8 +68,6 @@ impl Flags {
 /// The bits of a fault in 3000h:1 and 3000h:3. Bits 0 to 6 are those of a pressure transmitter, the rest is the encoder's.
 fn bits(fault: Fault) -> (u32, u32) {
     match fault {
-        // The sensor was not set up as it should: it runs with the calibration of no device.
-        Fault::CalibrationData => (1, 0),
         Fault::SensorClock => (1 << 1, 0),
         Fault::SensorBoot => (1 << 2, 0),
         Fault::TemperatureRail => (1 << 3, 0),
@@ -68,10 +81,7 @@ fn bits(fault: Fault) -> (u32, u32) {
         Fault::HardwareIdentification => (0, 1 << 1),
         Fault::ParameterStore => (0, 1 << 2),
         Fault::BootData => (0, 1 << 3),
-        Fault::CommunicationData => (0, 1 << 4),
-        Fault::ApplicationData => (0, 1 << 5),
         Fault::UnexpectedReset => (0, 1 << 6),
         Fault::HardwareMemory => (0, 1 << 8),
-        _ => (0, 0),
     }
 }

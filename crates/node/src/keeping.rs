@@ -1,22 +1,30 @@
 //! The protocol's side of the parameter store: what is packed for it, and what is taken over when it is done.
 
-use crate::profile::Profile;
 use crate::stored::{Kept, layout};
-use crate::{Parcel, Protocol};
-use canopen::dictionary::Group;
+use crate::{Next, Parameters, Parcel, Protocol};
+use canopen::dictionary::{Group, Groups};
 use canopen::sdo::Abort;
-use canopen::{Instant, Job, Selection, Transmit};
+use canopen::{Instant, Job, Transmit};
 use embedded_storage::nor_flash::ReadNorFlash;
 use storage::View;
 
 impl Protocol {
-    /// Reads the stored parameters, for [`start`](Protocol::start) and every reset after it.
-    pub fn load<F: ReadNorFlash>(&mut self, view: &mut View<F>) {
+    /// Reads the stored parameters, for [`start`](Protocol::start) and every reset after it. Gives the parameters of the
+    /// measurement: one that has them before the start has a sample for the first PDO.
+    pub fn load<F: ReadNorFlash>(&mut self, view: &mut View<F>) -> Parameters {
         let profile = self.device.application_mut();
         profile.stored.load(layout(profile.setup.personality), view);
+        self.device.load();
+        self.parameters()
     }
 
-    /// Takes the job that `Request::Store` announced, with the values of this moment. `false` when there is none. The
+    /// The same for a node whose store cannot be read.
+    pub fn load_defaults(&mut self) -> Parameters {
+        self.device.load();
+        self.parameters()
+    }
+
+    /// Takes the job that `Action::Store` announced, with the values of this moment. `false` when there is none. The
     /// values are only copied: to pack them takes half a millisecond, in which nobody should have to wait for the protocol.
     pub fn pack(&mut self, parcel: &mut Parcel) -> bool {
         let profile = self.device.application();
@@ -25,9 +33,9 @@ impl Protocol {
         parcel.node_id = self.device.node_id();
         match parcel.job {
             None => return false,
-            Some(Job::Save(_)) => parcel.image = *self.device.image(),
+            Some(Job::Store(_)) => parcel.image = *self.device.image(),
             Some(Job::Restore(_)) => {}
-            Some(job @ (Job::Configure(_) | Job::Set(_))) => {
+            Some(job @ (Job::Configure(_) | Job::Setting(_))) => {
                 parcel.device = profile.configured.after(job).encode();
             }
         }
@@ -41,28 +49,28 @@ impl Protocol {
         result: Result<(), Abort>,
         now: Instant,
         out: &mut impl Transmit,
-    ) {
+    ) -> Next {
         if let (Ok(()), Some(job)) = (result, parcel.job) {
             self.take_over(job, parcel);
         }
-        self.device.finish(result, now, out);
+        self.device.finish(result, now, out)
     }
 
     fn take_over(&mut self, job: Job, parcel: &Parcel) {
         let profile = self.device.application_mut();
         profile.configured = profile.configured.after(job);
-        if let Job::Save(selection) | Job::Restore(selection) = job {
+        if let Job::Store(groups) | Job::Restore(groups) = job {
             let stored = &mut profile.stored;
-            take_over(&mut stored.communication, Group::Communication, selection, &parcel.communication);
-            take_over(&mut stored.application, Group::Application, selection, &parcel.application);
-            take_over(&mut stored.calibration, Group::Calibration, selection, &parcel.calibration);
+            take_over(&mut stored.communication, Group::Communication, groups, &parcel.communication);
+            take_over(&mut stored.application, Group::Application, groups, &parcel.application);
+            take_over(&mut stored.calibration, Group::Calibration, groups, &parcel.calibration);
         }
-        self.device.show(Profile::show_personality);
+        self.device.show(|profile, image| profile.show_personality(image));
     }
 }
 
-fn take_over<const N: usize>(kept: &mut Kept<N>, group: Group, selection: Selection, packed: &[u8]) {
-    if selection.contains(group) {
+fn take_over<const N: usize>(kept: &mut Kept<N>, group: Group, groups: Groups, packed: &[u8]) {
+    if groups.contains(group) {
         kept.replace(packed);
     }
 }

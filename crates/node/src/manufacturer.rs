@@ -1,7 +1,7 @@
 //! Manufacturer-specific objects that every personality has.
 
 use crate::Personality;
-use canopen::dictionary::{Access, Object, Rule, Type};
+use canopen::dictionary::{Access, Object, Type};
 
 /// Index of the object that says which personality the node has after the next reset.
 pub(crate) const PERSONALITY: u16 = 0x2000;
@@ -13,13 +13,9 @@ pub(crate) const fn personality(own: Personality) -> Object {
     Object::new(PERSONALITY, 0, "Personality", Type::Unsigned8, Access::ReadWrite)
         .value(own.number() as i64)
         .limits(0, Personality::ALL.len() as i64 - 1)
-        .rule(Rule::Setting)
+        .setting()
 }
 
-/// The one domain there is: `Application::read_domain` has no other number to tell apart.
-const DOMAIN: u8 = 0;
-
-/// 2F00h.
+/// 2F00h, the one domain there is.
 pub(crate) const TRANSFER_BUFFER: Object =
-    Object::new(0x2F00, 0, "Transfer buffer", Type::Domain, Access::ReadWrite)
-        .rule(Rule::Application(DOMAIN));
+    Object::new(0x2F00, 0, "Transfer buffer", Type::Domain, Access::ReadWrite);

@@ -3,9 +3,9 @@
 use crate::Personality;
 use crate::profile::{APPLICATION_SIZE, CALIBRATION_SIZE, COMMUNICATION_SIZE, IMAGE_SIZE};
 use crate::stored::{CALIBRATION_LAYOUT, layout};
-use canopen::dictionary;
+use canopen::dictionary::{self, Groups};
 use canopen::sdo::Abort;
-use canopen::{Job, NodeId, Selection};
+use canopen::{Job, NodeId};
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
 use storage::{Change, DeviceRecord, Error, Group, Store};
@@ -59,12 +59,12 @@ impl Parcel {
         self.pack();
         let changes: Vec<Change<'_>, GROUPS> = match self.job {
             None => Vec::new(),
-            Some(Job::Configure(_) | Job::Set(_)) => some([Some(self.change(Group::Device))]),
-            Some(Job::Save(selection)) => {
-                some(SAVED.map(|(group, of)| selection.contains(of).then(|| self.change(group))))
+            Some(Job::Configure(_) | Job::Setting(_)) => some([Some(self.change(Group::Device))]),
+            Some(Job::Store(groups)) => {
+                some(SAVED.map(|(group, of)| groups.contains(of).then(|| self.change(group))))
             }
-            Some(Job::Restore(selection)) => {
-                some(SAVED.map(|(group, of)| selection.contains(of).then_some(Change::Restore(group))))
+            Some(Job::Restore(groups)) => {
+                some(SAVED.map(|(group, of)| groups.contains(of).then_some(Change::Restore(group))))
             }
         };
         store.save(&changes).map_err(|error| match error {
@@ -78,11 +78,11 @@ impl Parcel {
         self.communication.clear();
         self.application.clear();
         self.calibration.clear();
-        if let Some(Job::Save(selection)) = self.job {
+        if let Some(Job::Store(groups)) = self.job {
             let values = Values { personality: self.personality, node_id: self.node_id, image: &self.image };
-            values.pack(dictionary::Group::Communication, selection, &mut self.communication);
-            values.pack(dictionary::Group::Application, selection, &mut self.application);
-            values.pack(dictionary::Group::Calibration, selection, &mut self.calibration);
+            values.pack(dictionary::Group::Communication, groups, &mut self.communication);
+            values.pack(dictionary::Group::Application, groups, &mut self.application);
+            values.pack(dictionary::Group::Calibration, groups, &mut self.calibration);
         }
     }
 
@@ -104,11 +104,13 @@ struct Values<'a> {
 }
 
 impl Values<'_> {
-    fn pack<const N: usize>(&self, group: dictionary::Group, selection: Selection, out: &mut Vec<u8, N>) {
-        if selection.contains(group) {
+    fn pack<const N: usize>(&self, group: dictionary::Group, groups: Groups, out: &mut Vec<u8, N>) {
+        if groups.contains(group) {
             let dictionary = self.personality.definition().dictionary;
             // The buffers are as large as the largest dictionary needs: `profile` computes them from the tables.
-            let _ = dictionary.pack(group, self.node_id, self.image, out);
+            let _ = out.resize(N, 0);
+            let len = dictionary.pack(group, self.node_id, self.image, out).unwrap_or(0);
+            out.truncate(len);
         }
     }
 }

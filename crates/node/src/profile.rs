@@ -3,15 +3,15 @@
 use crate::configured::Configured;
 use crate::dictionaries::TABLES;
 use crate::flags::Flags;
+use crate::lost_events::LOST_EVENTS;
 use crate::manufacturer::PERSONALITY;
 use crate::personality::Definition;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
-use crate::{REVISION, Setup, Snapshot, VENDOR_ID, combined, encoder, lift, pressure};
+use crate::{Fault, REVISION, Setup, Snapshot, VENDOR_ID, combined, encoder, lift, pressure};
 use canopen::dictionary::{Entry, Group, packed_size};
-use canopen::emcy::Fault;
-use canopen::sdo::Abort;
-use canopen::{Application, Part};
+use canopen::sdo::{Abort, Multiplexer};
+use canopen::{Application, Condition, Part};
 use profiles::lift::panel::{LAMPS, Lamp};
 
 /// Large enough for the values of every personality.
@@ -49,6 +49,8 @@ pub(crate) struct Profile {
     pub(crate) flags: Flags,
     pub(crate) stored: Stored,
     pub(crate) buffer: TransferBuffer,
+    /// As counted by the firmware (2001h).
+    pub(crate) lost_events: [u32; LOST_EVENTS],
     lamps: [Lamp; LAMPS],
 }
 
@@ -61,6 +63,7 @@ impl Profile {
             flags: Flags::default(),
             stored: Stored::NOTHING,
             buffer: TransferBuffer::EMPTY,
+            lost_events: [0; LOST_EVENTS],
             lamps: [Lamp::default(); LAMPS],
         }
     }
@@ -107,7 +110,7 @@ impl Profile {
         self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
     }
 
-    fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
+    pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
         if let Ok(entry) = self.definition().dictionary.find(index, sub) {
             entry.field().set(image, bytes);
         }
@@ -115,6 +118,8 @@ impl Profile {
 }
 
 impl Application for Profile {
+    const CONDITIONS: &'static [Condition] = &Fault::CONDITIONS;
+
     fn initialise(&mut self, image: &mut [u8]) {
         let setup = &self.setup;
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
@@ -134,40 +139,43 @@ impl Application for Profile {
         }
         self.show_personality(image);
         self.show_flags(image);
+        self.show_lost_events(image);
         self.show_values(image);
     }
 
+    fn written(&mut self, _: &Entry, image: &mut [u8]) {
+        self.follow_output(image);
+    }
+
+    fn received(&mut self, _: u16, image: &mut [u8]) {
+        self.follow_output(image);
+    }
+
     fn stored(&self, group: Group) -> canopen::Stored<'_> {
-        // It is that of the pressure channel: what does not have one lets it be.
+        // A personality without the pressure channel leaves the calibration alone.
         let has_it = group != Group::Calibration || self.definition().is_calibrated();
-        self.stored.get(if has_it { group } else { Group::Volatile })
+        if has_it { self.stored.get(group) } else { canopen::Stored { packed: &[], is_sound: true } }
     }
 
     fn loaded(&mut self, group: Group, good: bool) {
-        let fault = match group {
-            Group::Communication => Fault::CommunicationData,
-            Group::Application => Fault::ApplicationData,
-            Group::Calibration => Fault::CalibrationData,
-            Group::Volatile => return,
-        };
-        self.flags.set(fault, !good);
+        self.flags.set_stored(group, !good);
     }
 
-    fn read_domain(&self, _number: u8) -> Result<&[u8], Abort> {
+    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
         self.buffer.read()
     }
 
-    fn write_domain(&mut self, _number: u8, part: Part<'_>) -> Result<(), Abort> {
+    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         self.buffer.write(part)
     }
 
-    fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         match self.definition() {
-            Definition { lift: Some(fields), .. } => fields.write(number, entry, bytes, image),
-            Definition { encoder: Some(fields), .. } if number >= encoder::FIRST_RULE => {
-                fields.write(number, entry, bytes, image)
+            Definition { lift: Some(fields), .. } => fields.write(entry, bytes, image),
+            Definition { pressure: Some(fields), .. } if fields.decides_on(entry) => {
+                fields.write(entry, bytes, image)
             }
-            Definition { pressure: Some(fields), .. } => fields.write(number, entry, bytes, image),
+            Definition { encoder: Some(fields), .. } => fields.write(entry, bytes, image),
             _ => Ok(()),
         }
     }

@@ -78,7 +78,6 @@ impl Stored {
             Group::Communication => self.communication.get(),
             Group::Application => self.application.get(),
             Group::Calibration => self.calibration.get(),
-            Group::Volatile => canopen::Stored { packed: &[], is_sound: true },
         }
     }
 }

@@ -3,6 +3,7 @@
 use canbus::Time;
 
 use crate::lane::Lane;
+use crate::loss::Loss;
 use crate::map::{self, Block, Unit};
 use crate::peripherals::BusFault;
 use crate::rcc::Rcc;
@@ -146,6 +147,7 @@ impl Stm32f4 {
             Unit::Iwdg => self.write_iwdg(offset, value, now),
             Unit::Crc => self.crc.write(offset, value),
             Unit::BackupRam if !self.pwr.backup_is_writable() => return Err(Refusal::Protected),
+            Unit::BackupRam if self.losses.take(Loss::BackupStore) => Some(()),
             Unit::BackupRam => self.backup_ram.write(offset, value),
             Unit::Signature | Unit::Absent => None,
         };

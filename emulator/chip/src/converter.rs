@@ -9,6 +9,7 @@ use canbus::Time;
 use crate::adc::{Sample, Trigger};
 use crate::clocks::times;
 use crate::dma::{Direction, Line, Stream, Transfer, line};
+use crate::loss::Loss;
 use crate::map::TIM3_UPDATE;
 use crate::peripherals::{BusFault, Effect, Memory};
 use crate::plant::front_end::quantise;
@@ -119,11 +120,17 @@ impl Stm32f4 {
         at: Time,
     ) -> Option<bool> {
         let transfer = self.dmas[controller].serves(request)?.next();
-        if transfer.direction != Direction::PeripheralToMemory {
+        if transfer.direction != Direction::PeripheralToMemory || self.is_lost(controller, request) {
             return None;
         }
         let moved = self.move_to_memory(transfer, at);
         Some(self.account(controller, request, moved))
+    }
+
+    /// Whether a test wants the request lost.
+    fn is_lost(&mut self, controller: usize, request: &[Line]) -> bool {
+        let stream = self.dmas[controller].line(request).map(|line| line.stream);
+        stream.is_some_and(|stream| self.losses.take(Loss::DmaRequest { controller: controller + 1, stream }))
     }
 
     fn move_to_memory(&mut self, transfer: Transfer, at: Time) -> Result<(), BusFault> {

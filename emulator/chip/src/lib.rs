@@ -9,6 +9,7 @@
 //! | `stm32f4`, `schedule`, `clock_and_reset` | the peripherals together: time, interrupt lines, clocks, resets |
 //! | `converter`, `pins` | what crosses peripherals: timer to ADC to DMA to memory; encoders and buttons to their pins |
 //! | one file or folder each | the peripherals, which know nothing of each other |
+//! | `loss` | events that a test has the chip lose |
 //! | `plant` | pressure, temperature, shaft, buttons, faults and the board's analogue front end |
 //!
 //! Nothing is stepped: a peripheral computes its state at the instant of an access from its state at the last one, and
@@ -34,6 +35,7 @@ mod flash;
 mod gpio;
 mod iwdg;
 mod lane;
+mod loss;
 mod map;
 mod peripherals;
 mod pins;
@@ -53,6 +55,7 @@ mod variant;
 pub use board::{Board, SsiFormat};
 pub use clocks::Clocks;
 pub use flash::Flash;
+pub use loss::Loss;
 pub use peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
 pub use stm32f4::Stm32f4;
 pub use unmodelled::{Direction, Reason, Unmodelled};

@@ -4,12 +4,17 @@ use canbus::Time;
 
 use crate::can::Lines;
 use crate::iwdg::Iwdg;
+use crate::loss::Loss;
 use crate::map::{ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS};
 use crate::peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
 use crate::rcc::Cause;
 use crate::spi::Far;
 use crate::stm32f4::Stm32f4;
 use crate::timer::Timer;
+
+/// Indexes into `TIMERS` and `SPIS`.
+const TIM2: usize = 0;
+const SPI2: usize = 1;
 
 impl Peripherals for Stm32f4 {
     fn read(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
@@ -94,7 +99,21 @@ impl Stm32f4 {
 
     pub(crate) fn run_timer(&mut self, index: usize, now: Time) {
         let position = self.encoder_position(index, now);
+        let before = self.timers[index].matches();
         self.timers[index].run(now, position);
+        if index == TIM2 {
+            self.lose_matches(before);
+        }
+    }
+
+    /// Takes back the matches of TIM2 that a test wants lost.
+    fn lose_matches(&mut self, before: u32) {
+        let fresh = self.timers[TIM2].matches() & !before;
+        for channel in (1..=4).filter(|channel| fresh >> channel & 1 != 0) {
+            if self.losses.take(Loss::Compare { channel }) {
+                self.timers[TIM2].forget_match(channel);
+            }
+        }
     }
 
     /// Ends the frames of an SPI that are due, and has DMA fetch what came.
@@ -103,6 +122,9 @@ impl Stm32f4 {
         let plant = &self.plant;
         self.spis[index].run(now, |at| plant.absolute(at).filter(|_| wired).map_or(open, Far::Position));
         let place = &SPIS[index];
+        if index == SPI2 && self.spis[index].asks_to_store() && self.losses.take(Loss::SpiByte) {
+            self.spis[index].lose();
+        }
         while self.spis[index].asks_to_store()
             && self.transfer_to_memory(place.dma, &place.receive, now).is_some()
         {}

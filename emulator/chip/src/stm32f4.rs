@@ -16,6 +16,7 @@ use crate::exti::Exti;
 use crate::flash::Flash;
 use crate::gpio::{Gpio, Outside};
 use crate::iwdg::Iwdg;
+use crate::loss::{Loss, Losses};
 use crate::map::{SPIS, TIMERS};
 use crate::peripherals::{Effect, IrqLines};
 use crate::plant::Plant;
@@ -58,6 +59,7 @@ pub struct Stm32f4 {
     pub(crate) clocks: Clocks,
     pub(crate) effects: VecDeque<Effect>,
     pub(crate) record: Record,
+    pub(crate) losses: Losses,
     /// The reset that the chip itself has asked for.
     pub(crate) asked: Option<Cause>,
     pub(crate) lines: IrqLines,
@@ -92,6 +94,7 @@ impl Stm32f4 {
             clocks,
             effects: VecDeque::new(),
             record: Record::default(),
+            losses: Losses::default(),
             asked: None,
             lines: IrqLines::default(),
             deadline: Time::NEVER,
@@ -104,6 +107,14 @@ impl Stm32f4 {
     /// Accesses so far that silicon would have answered differently, or not at all; one entry for each kind.
     pub fn unmodelled(&self) -> Vec<Unmodelled> {
         self.record.list()
+    }
+
+    /// Has the next events of a kind get lost.
+    pub fn lose(&mut self, loss: Loss, times: usize) {
+        match loss {
+            Loss::TransmitComplete => self.can.can1.transmitter.to_lose += times,
+            _ => self.losses.add(loss, times),
+        }
     }
 
     /// The clock tree as the program has set it.

@@ -288,7 +288,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     fn step(&mut self, until: Time) {
         let masks = engine::masks(&self.cpu);
         if self.loading && self.now() < self.stall {
-            return self.pass_to(self.stall.min(until));
+            return self.wait_for_flash(until);
         }
         self.loading = false;
         let core = self.cpu.get_data();
@@ -305,13 +305,19 @@ impl<P: Peripherals + 'static> Machine<P> {
             return self.enter(exception);
         }
         if self.stalls() {
-            return self.pass_to(self.stall.min(until));
+            return self.wait_for_flash(until);
         }
         self.run_code();
     }
 
     fn stalls(&self) -> bool {
         self.now() < self.stall && self.model.flash.contains(&self.pc())
+    }
+
+    /// The core waits for the flash, and only the core: what the chip does meanwhile it does at its own instants.
+    fn wait_for_flash(&mut self, until: Time) {
+        let next = self.cpu.get_data().deadline().min(until);
+        self.pass_to(self.stall.min(next));
     }
 
     /// Nothing runs until the next event.

@@ -83,29 +83,27 @@ impl NorFlash for Flash {
 extern "C" fn start(protocol: &mut Protocol, setup: &Setup, store: &mut Option<Store<Flash>>, now: u64) {
     *protocol = Protocol::new(setup);
     let Ok(mut view) = View::open(Flash, Pages::new(0, 16 * 1024)) else { return };
-    protocol.load(&mut view);
+    let _ = protocol.load(&mut view);
     *store = Store::prepare(view).ok();
-    let _ = protocol.prepare();
-    protocol.start(Instant(now), &mut Queue);
+    let _ = protocol.start(Instant(now), &mut Queue);
 }
 
 /// Everything that comes from the bus, and time.
 #[unsafe(no_mangle)]
 extern "C" fn communicate(protocol: &mut Protocol, frame: &Frame, now: u64, ids: &mut u32) {
     let now = Instant(now);
-    protocol.on_process_frame(frame, now, &mut Queue);
-    protocol.on_service_frame(frame, now, &mut Queue);
-    protocol.poll_process(now, &mut Queue);
-    protocol.poll_services(now, &mut Queue);
-    while protocol.take_request().is_some() {}
+    let _ = protocol.on_process_frame(frame, now, &mut Queue);
+    let _ = protocol.on_service_frame(frame, now, &mut Queue);
+    let _ = protocol.poll_process(now, &mut Queue);
+    while protocol.poll_services(now, &mut Queue).action.is_some() {}
     *ids = protocol.process_ids().chain(protocol.service_ids()).map(u32::from).sum();
 }
 
 /// Faults.
 #[unsafe(no_mangle)]
 extern "C" fn fail(protocol: &mut Protocol, fault: &Fault, event: &BusEvent, active: bool, now: u64) {
-    protocol.set_fault(*fault, active, Instant(now), &mut Queue);
-    protocol.bus_event(*event, Instant(now), &mut Queue);
+    let _ = protocol.set_fault(*fault, active, Instant(now));
+    let _ = protocol.bus_event(*event, Instant(now));
 }
 
 /// The measurement, and its way into the dictionary.
@@ -119,11 +117,9 @@ extern "C" fn measure(
     lit: &mut [bool; 2],
     now: u64,
 ) {
-    if let Some(parameters) = protocol.take_parameters() {
-        measurement.apply(&parameters);
-    }
+    measurement.apply(&protocol.parameters());
     let snapshot: Snapshot = measurement.sample(raw, encoder, *buttons);
-    protocol.publish(&snapshot, Instant(now), &mut Queue);
+    let _ = protocol.publish(&snapshot, Instant(now), &mut Queue);
     *lit = protocol.lamps();
 }
 
@@ -139,7 +135,7 @@ extern "C" fn power_cycle(measurement: &mut Measurement, personality: &Personali
 extern "C" fn keep(protocol: &mut Protocol, parcel: &mut Parcel, store: &mut Store<Flash>, now: u64) {
     if protocol.pack(parcel) {
         let result = parcel.deliver(store);
-        protocol.finish(parcel, result, Instant(now), &mut Queue);
+        let _ = protocol.finish(parcel, result, Instant(now), &mut Queue);
     }
 }
 

@@ -1,7 +1,6 @@
 //! A station: what the firmware's tasks are around a node, in one function.
 
-use canopen::{Frame, Instant, Transmit};
-use node::Request;
+use canopen::{Action, Frame, Instant, Transmit};
 
 use super::port::Port;
 
@@ -16,7 +15,7 @@ pub trait Unit {
     /// Does what is due and gives the instant of the next call.
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant;
     /// The next thing that only the firmware can do.
-    fn take_request(&mut self) -> Option<Request>;
+    fn take_action(&mut self) -> Option<Action>;
     /// Stores what it has asked to be stored.
     fn store(&mut self, _now: Instant, _out: &mut impl Transmit) {}
     /// Identifiers for FIFO 0.
@@ -84,15 +83,15 @@ impl<U: Unit> Station<U> {
     }
 
     fn fulfil(&mut self, now: Instant) {
-        while let Some(request) = self.unit.take_request() {
-            match request {
-                Request::ResetNode | Request::ResetCommunication => {
+        while let Some(action) = self.unit.take_action() {
+            match action {
+                Action::ResetNode | Action::ResetCommunication => {
                     self.port.clear();
                     self.unit.start(now, &mut self.port);
                     self.due = now;
                 }
-                Request::Filters => self.filters = [self.unit.process_ids(), self.unit.service_ids()],
-                Request::Store => self.unit.store(now, &mut self.port),
+                Action::Identifiers => self.filters = [self.unit.process_ids(), self.unit.service_ids()],
+                Action::Store(_) => self.unit.store(now, &mut self.port),
                 other => panic!("{other:?}: the network has one bit rate and no bootloader"),
             }
         }

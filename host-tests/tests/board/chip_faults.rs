@@ -23,23 +23,33 @@ const UNEXPECTED_RESET: u16 = 0x6101;
 /// RAM of the chip (RM0390, 2.3.1).
 const RAM: u32 = 0x2000_0000;
 const RAM_SIZE: usize = 128 * 1024;
-/// Control register 2 of the converter: 0 switches it off (RM0390, 13.13.3).
-const ADC1_CR2: u32 = 0x4001_2008;
+/// Clock enables of APB2 with the bit of the converter: without a clock it takes no writes (RM0390, 6.3.14).
+const RCC_APB2ENR: u32 = 0x4002_3844;
+const ADC1EN: u32 = 1 << 8;
+/// The interrupt of the task that stores parameters.
+const SDIO: u32 = 49;
 /// The parameter pages (memory.x).
 const PAGE: u32 = 0x0800_8000;
 const PAGE_SIZE: u32 = 0x4000;
 /// SDO abort code for a failure of the hardware (CiA 301, table 22).
 const HARDWARE: u32 = 0x0606_0000;
 
-fn poke(world: &mut World, register: u32, value: u32) {
+pub(crate) fn poke(world: &mut World, register: u32, value: u32) {
     let now = world.machine(0).now();
     world.machine(0).peripherals_mut().write(register, 4, value, now).unwrap();
 }
 
+pub(crate) fn peek(world: &mut World, register: u32) -> u32 {
+    let now = world.machine(0).now();
+    world.machine(0).peripherals_mut().read(register, 4, now).unwrap()
+}
+
+/// No restart brings it back.
 #[test]
 fn a_dead_converter_is_ended_by_the_watchdog() {
     let mut world = running();
-    poke(&mut world, ADC1_CR2, 0);
+    let clocks = peek(&mut world, RCC_APB2ENR);
+    poke(&mut world, RCC_APB2ENR, clocks & !ADC1EN);
     let log = comes_back(&mut world);
     assert!(log.contains("reset by independent watchdog"), "{log}");
 }
@@ -53,6 +63,15 @@ fn an_interrupt_without_end_is_ended_by_the_watchdog() {
     let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
     assert!(log.concat().contains("reset by independent watchdog"), "{log:?}");
     assert!(after.nodes[0].heard.boot_ups == 2 && after.nodes[0].heard.heartbeats > 1, "{after}");
+}
+
+/// The task of the lowest priority hangs: everybody else goes on, and parameters could not be stored any more.
+#[test]
+fn a_task_that_stores_for_ever_is_ended_by_the_watchdog() {
+    let mut world = running();
+    run_broken(&mut world, SDIO, BRANCH_TO_ITSELF);
+    let log = comes_back(&mut world);
+    assert!(log.contains("reset by independent watchdog"), "{log}");
 }
 
 /// Each of the tasks that run by themselves meets an undefined instruction: the crash record names the place.

@@ -9,49 +9,49 @@ use crate::support::{Master, SECOND, START_ALL, SYNC, read, run, world, write};
 /// TPDO 2, which carries the position with every SYNC.
 const TPDO2: u16 = 0x281;
 /// Steps in a revolution: of the incremental encoder, and of the absolute one.
-const COUNTS: f64 = 4096.0;
-const STEPS: f64 = 8192.0;
+pub(crate) const COUNTS: f64 = 4096.0;
+pub(crate) const STEPS: f64 = 8192.0;
 
-const POSITION: (u16, u8) = (0x6004, 0);
+pub(crate) const POSITION: (u16, u8) = (0x6004, 0);
 const OPERATING: (u16, u8) = (0x6000, 0);
 const PER_REVOLUTION: (u16, u8) = (0x6001, 0);
 const SPEED: (u16, u8) = (0x6030, 1);
 const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
 const FASTEST: (u16, u8) = (0x2104, 1);
-const SENSOR_STATE: (u16, u8) = (0x210B, 1);
+pub(crate) const SENSOR_STATE: (u16, u8) = (0x210B, 1);
 
 /// Codes of sensor types (object 1000h).
 const MULTI_TURN: u32 = 2;
 /// Operating parameters: the scaling works.
 const SCALING: u32 = 1 << 2;
 /// Sensor states.
-const NO_SIGNAL: u32 = 1 << 0;
+pub(crate) const NO_SIGNAL: u32 = 1 << 0;
 const IMPLAUSIBLE: u32 = 1 << 3;
 const UNREFERENCED: u32 = 1 << 5;
-const POSITION_ERROR: u32 = 1 << 7;
+pub(crate) const POSITION_ERROR: u32 = 1 << 7;
 
 /// A node with an encoder, a second after power-on.
-fn start(flags: &str) -> (World, Master) {
+pub(crate) fn start(flags: &str) -> (World, Master) {
     let mut world = world(&format!("--node 1:encoder --bitrate 1000 {flags}"));
     let master = Master::join(&mut world);
     world.run_until(SECOND);
     (world, master)
 }
 
-fn stimulate(world: &mut World, kind: &str, spec: &str) {
+pub(crate) fn stimulate(world: &mut World, kind: &str, spec: &str) {
     world.apply(&Stimulus::parse(kind, spec).unwrap()).unwrap();
 }
 
-fn wait(world: &mut World, millis: u64) {
+pub(crate) fn wait(world: &mut World, millis: u64) {
     world.run_until(world.now() + Time::from_millis(millis));
 }
 
 /// Where the shaft is, in steps.
-fn shaft(world: &mut World, at: Time, steps: f64) -> i64 {
+pub(crate) fn shaft(world: &mut World, at: Time, steps: f64) -> i64 {
     (world.machine(0).peripherals().plant().revolutions(at) * steps).floor() as i64
 }
 
-fn position(tpdo: &[u8]) -> i64 {
+pub(crate) fn position(tpdo: &[u8]) -> i64 {
     i64::from(u32::from_le_bytes(tpdo[..4].try_into().unwrap()))
 }
 
@@ -63,7 +63,13 @@ fn age(shaft: i64, position: i64, range: i64, per_second: f64) -> f64 {
 }
 
 /// The ages of the positions that a thousand SYNCs get, the least and the most.
-fn ages(world: &mut World, master: &Master, steps: f64, range: i64, per_second: f64) -> (f64, f64) {
+pub(crate) fn ages(
+    world: &mut World,
+    master: &Master,
+    steps: f64,
+    range: i64,
+    per_second: f64,
+) -> (f64, f64) {
     let (mut least, mut most) = (f64::MAX, f64::MIN);
     for _ in 0..1000 {
         // A SYNC lasts 44 to 56 us at 1 Mbit/s; what it samples is right when it has ended.
@@ -125,7 +131,7 @@ fn an_index_that_does_not_come_is_missed() {
 }
 
 /// Tells the node that its sensor is absolute.
-fn start_absolute(flags: &str) -> (World, Master) {
+pub(crate) fn start_absolute(flags: &str) -> (World, Master) {
     let (mut world, master) = start(flags);
     write(&mut world, &master, SENSOR_TYPE, 1, MULTI_TURN);
     write(&mut world, &master, FASTEST, 4, 1000);
@@ -174,7 +180,7 @@ fn faults_of_the_absolute_encoder_are_told() {
 }
 
 /// Switches the board off for a second, and on again.
-fn cycle_power(world: &mut World) {
+pub(crate) fn cycle_power(world: &mut World) {
     let now = world.now();
     world.machine(0).power_off();
     world.run_until(now + SECOND);

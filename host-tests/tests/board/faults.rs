@@ -1,9 +1,8 @@
 //! What must never happen, made to happen: the node comes back and says why.
 
-use canbus::Time;
-use chip::Peripherals;
-
+use crate::chip_faults::{peek, poke};
 use crate::support::{SECOND, comes_back, run, running};
+use canbus::Time;
 
 /// The first word of RAM, below which the stack must not grow, and a place that no image uses.
 const RAM: u32 = 0x2000_0000;
@@ -13,6 +12,9 @@ const APPLICATION: u32 = 0x0801_0200;
 const VECTORS: usize = 512;
 /// Control register 1 of the timer that starts the conversions.
 const TIM3_CR1: u32 = 0x4000_0400;
+/// Clock enables of APB1 with the bit of the timer that starts the conversions: without a clock it takes no writes (RM0390, 6.3.13).
+const RCC_APB1ENR: u32 = 0x4002_3840;
+const TIM3EN: u32 = 1 << 1;
 /// An interrupt that the node has no use for, its bit in word 1 of the NVIC, and that word of the registers that enable an
 /// interrupt and that set it pending (RM0390, table 38; PM0214, 4.3).
 const CAN2_TX: u32 = 63;
@@ -72,11 +74,13 @@ fn a_crash_is_told_once() {
     assert!(log.contains("reset by power on"), "{log}");
 }
 
+/// The timer stands still and takes no more orders.
 #[test]
 fn the_watchdog_restarts_a_node_that_no_longer_samples() {
     let mut world = running();
-    let now = world.machine(0).now();
-    world.machine(0).peripherals_mut().write(TIM3_CR1, 4, 0, now).unwrap();
+    let clocks = peek(&mut world, RCC_APB1ENR);
+    poke(&mut world, TIM3_CR1, 0);
+    poke(&mut world, RCC_APB1ENR, clocks & !TIM3EN);
     let log = comes_back(&mut world);
     assert!(log.contains("reset by independent watchdog"), "{log}");
     assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET), "{log}");

@@ -6,12 +6,11 @@ use std::rc::Rc;
 
 use canbus::{Stamped, Time};
 use canopen::sdo::Multiplexer;
-use canopen::{Duration, Frame, Instant};
+use canopen::{Action, Duration, Frame, Instant};
 use chip::plant::{Motion, Signal};
 use host_tests::bench::Queue;
 use host_tests::network::{Unit, from_bus, to_bus};
 use host_tests::sdo::{Channel, Client};
-use node::Request;
 use sim::stimuli::Stimulus;
 
 use crate::car::WIDTH;
@@ -67,8 +66,8 @@ impl Seat {
     }
 
     fn fulfil(&mut self) {
-        while let Some(request) = self.device.take_request() {
-            assert_eq!(request, Request::Filters, "nobody resets a virtual device");
+        while let Some(action) = self.device.take_action() {
+            assert_eq!(action, Action::Identifiers, "nobody resets a virtual device");
             self.filters = [self.device.process_ids(), self.device.service_ids()];
         }
     }

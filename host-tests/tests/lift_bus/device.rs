@@ -4,11 +4,10 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use canopen::dictionary::{Dictionary, Entry};
-use canopen::sdo::Abort;
-use canopen::{Action, Application, CanId, Device, Duration, Frame, Instant, NodeId, Transmit};
+use canopen::dictionary::Dictionary;
+use canopen::{Action, CanId, Device, Duration, Frame, Instant, NodeId, Transmit};
+use host_tests::asked::Asked;
 use host_tests::network::Unit;
-use node::Request;
 
 use crate::world::World;
 
@@ -30,8 +29,7 @@ pub(crate) struct Values<'a> {
 
 impl Values<'_> {
     pub(crate) fn get(&self, index: u16, sub: u8) -> u64 {
-        let bytes = self.dictionary.field(index, sub).get(self.image);
-        bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
+        number(self.dictionary.field(index, sub).get(self.image))
     }
 
     /// The value of an INTEGER32.
@@ -50,25 +48,14 @@ impl Values<'_> {
     }
 }
 
-/// The objects have no rules of their own.
-#[derive(Debug)]
-pub(crate) struct NoRules;
-
-impl Application for NoRules {
-    fn initialise(&mut self, _: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        Ok(())
-    }
-}
-
 /// The device.
 pub(crate) struct VirtualDevice {
-    device: Device<NoRules, SIZE>,
+    device: Device<(), SIZE>,
     dictionary: &'static Dictionary,
     behaviour: Box<dyn Behaviour>,
     world: Rc<RefCell<World>>,
     next_tick: Instant,
+    asked: Asked,
 }
 
 impl VirtualDevice {
@@ -80,55 +67,55 @@ impl VirtualDevice {
     ) -> VirtualDevice {
         assert!(dictionary.image_size() <= SIZE);
         VirtualDevice {
-            device: Device::new(dictionary, NodeId::new(node_id), NoRules),
+            device: Device::new(dictionary, NodeId::new(node_id), ()),
             dictionary,
             behaviour: Box::new(behaviour),
             world: Rc::clone(world),
             next_tick: Instant::NEVER,
+            asked: Asked::default(),
         }
     }
 
     /// A value of one of its objects.
-    pub(crate) fn value(&mut self, index: u16, sub: u8) -> u64 {
-        self.values().get(index, sub)
-    }
-
-    fn values(&mut self) -> Values<'_> {
-        Values { dictionary: self.dictionary, image: self.device.image_mut() }
+    pub(crate) fn value(&self, index: u16, sub: u8) -> u64 {
+        number(self.dictionary.field(index, sub).get(self.device.image()))
     }
 
     fn tick(&mut self, now: Instant, out: &mut impl Transmit) {
         self.next_tick = self.next_tick + TICK;
-        let mut values = Values { dictionary: self.dictionary, image: self.device.image_mut() };
-        self.behaviour.tick(&mut values, &mut self.world.borrow_mut());
-        self.device.changed(now, out);
+        let VirtualDevice { dictionary, behaviour, world, .. } = self;
+        let next = self.device.publish(now, out, |(), image| {
+            behaviour.tick(&mut Values { dictionary, image }, &mut world.borrow_mut());
+        });
+        self.asked.keep(next);
     }
 }
 
 impl Unit for VirtualDevice {
     fn start(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.device.start(now, out);
+        self.asked.keep(self.device.start(now, out));
         self.next_tick = now;
     }
 
     fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        self.device.on_process_frame(frame, now, out);
+        self.asked.keep(self.device.on_process_frame(frame, now, out));
     }
 
     fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        self.device.on_service_frame(frame, now, out);
+        self.asked.keep(self.device.on_service_frame(frame, now, out));
     }
 
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         if now >= self.next_tick {
             self.tick(now, out);
         }
-        let process = self.device.poll_process(now, out);
-        process.min(self.device.poll_services(now, out)).min(self.next_tick)
+        let next = self.device.poll(now, out);
+        self.asked.keep(next);
+        next.due().min(self.next_tick)
     }
 
-    fn take_request(&mut self) -> Option<Request> {
-        self.device.take_action().map(request)
+    fn take_action(&mut self) -> Option<Action> {
+        self.asked.take_action()
     }
 
     fn process_ids(&self) -> Vec<u16> {
@@ -140,14 +127,7 @@ impl Unit for VirtualDevice {
     }
 }
 
-/// As `node::Protocol` has it.
-pub(crate) fn request(action: Action) -> Request {
-    match action {
-        Action::ResetNode => Request::ResetNode,
-        Action::ResetCommunication => Request::ResetCommunication,
-        Action::Identifiers => Request::Filters,
-        Action::Bootloader => Request::Bootloader,
-        Action::BitRate(bit_rate) => Request::BitRate(bit_rate),
-        Action::Store(_) => Request::Store,
-    }
+/// The number in a value.
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
 }

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use canbus::Stamped;
 use canopen::sdo::Multiplexer;
-use canopen::{Duration, Frame, Instant, Transmit};
+use canopen::{Action, Duration, Frame, Instant, Transmit};
 use host_tests::network::{Network, Unit};
 use host_tests::sdo::Client;
 
@@ -51,8 +51,8 @@ impl Unit for Any {
         either!(self, unit => unit.poll(now, out))
     }
 
-    fn take_request(&mut self) -> Option<::node::Request> {
-        either!(self, unit => unit.take_request())
+    fn take_action(&mut self) -> Option<Action> {
+        either!(self, unit => unit.take_action())
     }
 
     fn store(&mut self, now: Instant, out: &mut impl Transmit) {

@@ -1,7 +1,7 @@
 //! The dictionaries of all devices of the small lift: a device has the PDOs that it produces and consumes and the objects
 //! that they map, as the catalogue says.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Type};
 use node::lift::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 
 /// Node-IDs.
@@ -17,13 +17,10 @@ const COMMUNICATION: &[Object] = &[
     Object::new(0x1000, 0, "Device type", Type::Unsigned32, Access::ReadOnly).value(0x01A1),
     Object::new(0x1001, 0, "Error register", Type::Unsigned8, Access::ReadOnly),
     Object::highest(0x1010, 1, "Store parameters"),
-    Object::new(0x1010, 1, "Save all", Type::Unsigned32, Access::ReadWrite).value(1).rule(Rule::Store),
+    Object::new(0x1010, 1, "Save all", Type::Unsigned32, Access::ReadWrite).value(1),
     Object::new(0x1014, 0, "COB-ID EMCY", Type::Unsigned32, Access::ReadWrite)
-        .default(DefaultValue::NodeId(0x80))
-        .rule(Rule::EmcyCobId),
-    Object::new(0x1017, 0, "Producer heartbeat time", Type::Unsigned16, Access::ReadWrite)
-        .value(1000)
-        .rule(Rule::HeartbeatTime),
+        .default(DefaultValue::NodeId(0x80)),
+    Object::new(0x1017, 0, "Producer heartbeat time", Type::Unsigned16, Access::ReadWrite).value(1000),
 ];
 
 const fn array(index: u16, highest: u8) -> Object {

@@ -113,15 +113,16 @@ fn pdo(mapping: Mapping) -> &'static str {
         Mapping::No => "",
         Mapping::Tpdo => "TPDO",
         Mapping::Rpdo => "RPDO",
+        Mapping::Both => "TPDO, RPDO",
     }
 }
 
-fn saved(group: Group) -> &'static str {
+fn saved(group: Option<Group>) -> &'static str {
     match group {
-        Group::Volatile => "",
-        Group::Communication => "communication",
-        Group::Application => "application",
-        Group::Calibration => "calibration",
+        None => "",
+        Some(Group::Communication) => "communication",
+        Some(Group::Application) => "application",
+        Some(Group::Calibration) => "calibration",
     }
 }
 
@@ -129,6 +130,10 @@ fn default(value: &Formula, data_type: DataType) -> String {
     match value {
         Formula::NodeId(base) => format!("ID + 0x{base:X}"),
         Formula::Constant(Value::Text(text)) => format!("\"{text}\""),
+        Formula::Constant(Value::Real(value)) if data_type.class() == Class::Real(32) => {
+            format!("{:?}", *value as f32)
+        }
+        Formula::Constant(Value::Real(value)) => format!("{value:?}"),
         Formula::Constant(_) => value.text(data_type),
     }
 }

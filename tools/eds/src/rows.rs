@@ -113,7 +113,7 @@ fn access(row: &Row) -> Access {
         (RowAccess::Const, _) => Access::Const,
         (RowAccess::ReadOnly, _) => Access::ReadOnly,
         (RowAccess::WriteOnly, _) => Access::WriteOnly,
-        (RowAccess::ReadWrite, Mapping::No) => Access::ReadWrite,
+        (RowAccess::ReadWrite, Mapping::No | Mapping::Both) => Access::ReadWrite,
         (RowAccess::ReadWrite, Mapping::Tpdo) => Access::ReadWriteInput,
         (RowAccess::ReadWrite, Mapping::Rpdo) => Access::ReadWriteOutput,
     }

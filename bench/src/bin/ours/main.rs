@@ -9,11 +9,11 @@ use bench_images::{Bits, Domain, Node, transmit};
 use core::hint::black_box;
 use core::mem::MaybeUninit;
 
-use canopen::dictionary::{Entry, Group};
-use canopen::emcy::Fault;
-use canopen::sdo::Abort;
+use canopen::dictionary::Group;
+use canopen::sdo::{Abort, Multiplexer};
 use canopen::{
-    Action, Application, CanId, Device, Frame, Instant, NodeId, Part, QueueFull, Stored, Transmit,
+    Action, Application, BusEvent, CanId, Condition, Device, Frame, Instant, Next, NodeId, Part, QueueFull,
+    Stored, Transmit,
 };
 use cortex_m_rt::entry;
 
@@ -24,22 +24,18 @@ const ID: u8 = 1;
 struct Keeper(Domain);
 
 impl Application for Keeper {
-    fn initialise(&mut self, _: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        Ok(())
-    }
+    const CONDITIONS: &'static [Condition] = &[Condition::new(0x1000)];
 
     fn stored(&self, _: Group) -> Stored<'_> {
         // The optimiser must not know that nothing is ever stored: reading it belongs to the size.
         Stored { packed: black_box(&[]), is_sound: black_box(true) }
     }
 
-    fn read_domain(&self, _: u8) -> Result<&[u8], Abort> {
+    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
         Ok(self.0.content())
     }
 
-    fn write_domain(&mut self, _: u8, part: Part<'_>) -> Result<(), Abort> {
+    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         let has_room = match part {
             Part::Begin(_) | Part::End(_) => true,
             Part::Data(offset, bytes) => self.0.write(offset, bytes),
@@ -90,33 +86,29 @@ impl Node for Ours {
     type Frame = Received;
 
     fn pass(&mut self, now: u64) {
-        self.device.poll_process(Instant(now), &mut self.driver);
-        self.device.poll_services(Instant(now), &mut self.driver);
-        while let Some(action) = self.device.take_action() {
-            self.fulfil(action, Instant(now));
+        let mut next = self.device.poll(Instant(now), &mut self.driver);
+        while let Some(action) = next.action {
+            next = self.fulfil(action, Instant(now));
         }
     }
 
     fn disturb(&mut self, now: u64) {
-        self.device.raise(Fault::RpdoDeadline(0), Instant(now));
-        self.device.image_mut().fill(0);
-        self.device.changed(Instant(now), &mut self.driver);
-        self.device.clear(Fault::RpdoDeadline(0), Instant(now));
+        let _ = self.device.set_condition(0, true, Instant(now));
+        let _ = self.device.on_bus(BusEvent::Overrun, Instant(now));
+        let _ = self.device.publish(Instant(now), &mut self.driver, |_, image| image.fill(0));
+        let _ = self.device.set_condition(0, false, Instant(now));
     }
 
     fn sort(&mut self, Received(frame): Received, now: u64) {
-        self.device.on_process_frame(&frame, Instant(now), &mut self.driver);
-        self.device.on_service_frame(&frame, Instant(now), &mut self.driver);
+        let _ = self.device.on_frame(&frame, Instant(now), &mut self.driver);
     }
 
     fn process(&mut self, Received(frame): Received, now: u64) {
-        self.device.on_process_frame(&frame, Instant(now), &mut self.driver);
-        self.device.poll_process(Instant(now), &mut self.driver);
+        black_box(self.device.on_process_frame(&frame, Instant(now), &mut self.driver));
     }
 
     fn serve(&mut self, Received(frame): Received, now: u64) {
-        self.device.on_service_frame(&frame, Instant(now), &mut self.driver);
-        self.device.poll_services(Instant(now), &mut self.driver);
+        black_box(self.device.on_service_frame(&frame, Instant(now), &mut self.driver));
     }
 }
 
@@ -129,16 +121,19 @@ impl Ours {
     }
 
     /// Does what the device leaves to its caller.
-    fn fulfil(&mut self, action: Action, now: Instant) {
+    fn fulfil(&mut self, action: Action, now: Instant) -> Next {
         match action {
-            Action::ResetNode | Action::ResetCommunication => self.device.start(now, &mut self.driver),
+            Action::ResetNode | Action::ResetCommunication => {
+                return self.device.start(now, &mut self.driver);
+            }
             Action::Identifiers => {
                 let ids = self.device.process_ids().chain(self.device.service_ids());
                 black_box(ids.map(CanId::get).fold(0, u16::wrapping_add));
             }
-            Action::Store(_) => self.device.finish(Ok(()), now, &mut self.driver),
+            Action::Store(_) => return self.device.finish(Ok(()), now, &mut self.driver),
             Action::BitRate(_) | Action::Bootloader => (),
         }
+        self.device.poll(now, &mut self.driver)
     }
 }
 
@@ -146,6 +141,6 @@ impl Ours {
 fn main() -> ! {
     static mut NODE: MaybeUninit<Ours> = MaybeUninit::uninit();
     let node = NODE.write(Ours::new());
-    node.device.start(Instant(0), &mut node.driver);
+    let _ = node.device.start(Instant(0), &mut node.driver);
     bench_images::run(node)
 }

@@ -10,16 +10,18 @@ use super::backup::BackupMemory;
 use super::can::Controller;
 use super::clock_tree;
 use super::digital::{Buttons, Lamps};
-use super::encoder::{self, Encoder};
+use super::encoder;
 use super::flash::Flash;
+use super::front_end::FrontEnd;
 use super::led::Led;
-use super::sampling::{Parts, Sampling};
+use super::sampling;
 use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
 use super::watchdog::StartUpWatchdog;
 use crate::bit_timing::APB1_HZ;
 use crate::kept::Found;
+use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
 /// The board's name, object 1009h.
@@ -33,7 +35,7 @@ pub const NAME: &str = "STM32F405/407";
 pub struct Board {
     /// Why the chip was reset.
     pub reset_cause: ResetCause,
-    /// Runs already, with the patience that the start-up needs.
+    /// Runs already, with the long time-out of the start-up.
     pub watchdog: StartUpWatchdog,
     /// The interrupt of the time base.
     pub time: TimeInterrupt,
@@ -45,15 +47,13 @@ pub struct Board {
     pub transmitter: Transmitter,
     /// The pages of the parameter store.
     pub parameters: ParameterFlash,
-    /// The front end, ready to start.
-    pub sampling: Sampling,
-    /// The incremental encoder; it is read along with the front end.
-    pub encoder: Encoder,
+    /// The analogue inputs and the incremental encoder, ready to start.
+    pub front_end: FrontEnd,
     /// The absolute encoder.
     pub ssi: Ssi,
-    /// What outlives a loss of power.
+    /// The backup SRAM.
     pub backup: BackupMemory,
-    /// What was in it.
+    /// What the backup SRAM held at the start.
     pub found: Found,
     /// The digital inputs.
     pub buttons: Buttons,
@@ -65,9 +65,9 @@ pub struct Board {
 
 impl Board {
     /// Starts everything but the bus and the sampling. The watchdog comes first: a crystal that does not start ends in a
-    /// reset too.
+    /// reset too. Events that the hardware loses later on are counted in `losses`.
     #[must_use]
-    pub fn start(device: Peripherals) -> Board {
+    pub fn start(device: Peripherals, losses: &'static Losses) -> Board {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
         let reset_cause = reset_cause(&device.RCC);
         keep_debugger(&device.DBGMCU);
@@ -77,7 +77,7 @@ impl Board {
         let gpiob = device.GPIOB.split(&mut rcc);
         let gpioc = device.GPIOC.split(&mut rcc);
         let (can, transmitter) = Controller::new(device.CAN1, gpiob.pb9, gpiob.pb8, &mut rcc);
-        let front_end = Parts {
+        let analogue = sampling::Parts {
             adc: device.ADC1,
             common: device.ADC_COMMON,
             dma: device.DMA2,
@@ -86,7 +86,6 @@ impl Board {
             supply: gpioa.pa1.into_analog(),
             thermistor: gpioc.pc2.into_analog(),
         };
-        let sampling = Sampling::new(front_end, &mut rcc);
         let streams = StreamsTuple::new(device.DMA1, &mut rcc);
         let counter = encoder::Parts {
             timer: device.TIM4,
@@ -96,7 +95,7 @@ impl Board {
             a: gpiob.pb6,
             b: gpiob.pb7,
         };
-        let encoder = Encoder::new(counter, sampling.scans(), &mut rcc);
+        let front_end = FrontEnd::new(analogue, counter, losses, &mut rcc);
         let absolute = ssi::Parts {
             spi: device.SPI2,
             receive: streams.3,
@@ -104,12 +103,12 @@ impl Board {
             clock: gpiob.pb13,
             data: gpiob.pb14,
         };
-        let ssi = Ssi::new(absolute, &mut rcc);
-        let (backup, found) = BackupMemory::open(device.PWR, device.CRC, &mut rcc);
+        let ssi = Ssi::new(absolute, losses, &mut rcc);
+        let (backup, found) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
         let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
         let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
         let led = Led::new(gpioa.pa5);
-        let parameters = ParameterFlash::new(Flash::new(device.FLASH));
+        let parameters = ParameterFlash::new(Flash::new(device.FLASH), losses);
         Board {
             reset_cause,
             watchdog,
@@ -118,8 +117,7 @@ impl Board {
             can,
             transmitter,
             parameters,
-            sampling,
-            encoder,
+            front_end,
             ssi,
             backup,
             found,

@@ -22,7 +22,9 @@ use stm32f4xx_hal::gpio::{Alternate, PB5, PB6, PB7};
 use stm32f4xx_hal::pac::{DMA1, TIM3, TIM4};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use super::sampling::{SCANS, Sums};
+use super::sampling::SCANS;
+use super::stream;
+use crate::losses::{Event, Losses};
 
 /// ICxF of all three inputs: eight equal samples at a quarter of 72 MHz, so pulses of less than 444 ns are noise (RM0390,
 /// 17.4.7). That leaves 10,000 lines at 6000 rpm. Index and phases are late by the same time.
@@ -42,12 +44,15 @@ pub struct Counted {
 }
 
 /// The input.
-pub struct Encoder {
+pub(super) struct Encoder {
+    timer: TIM4,
+    at_scan: Stream2<DMA1>,
     at_index: Stream5<DMA1>,
-    _parts: (TIM4, Stream2<DMA1>, PB5<Alternate<2>>, PB6<Alternate<2>>, PB7<Alternate<2>>),
+    losses: &'static Losses,
+    _pins: (PB5<Alternate<2>>, PB6<Alternate<2>>, PB7<Alternate<2>>),
 }
 
-/// What it is made of.
+/// The peripherals and pins of the input.
 pub(crate) struct Parts {
     pub(crate) timer: TIM4,
     pub(crate) at_scan: Stream2<DMA1>,
@@ -61,24 +66,52 @@ impl Encoder {
     /// Configures everything, while TIM3 (`scans`) is ready and does not run yet: the first count is that of the first scan.
     ///
     /// The pins have no pull-up resistors: they would not stand 5 V (STM32F446 datasheet, general operating conditions).
-    pub(crate) fn new(parts: Parts, scans: &TIM3, rcc: &mut Rcc) -> Encoder {
+    pub(super) fn new(parts: Parts, scans: &TIM3, losses: &'static Losses, rcc: &mut Rcc) -> Encoder {
         let Parts { timer, mut at_scan, mut at_index, index, a, b } = parts;
         prepare_counter(&timer, rcc);
         copy(&mut at_scan, &timer, &COUNTS);
-        copy(&mut at_index, &timer, core::slice::from_ref(&AT_INDEX));
+        copy_at_index(&mut at_index, &timer);
         prepare_events(scans);
-        let (index, a, b) = (index.into_alternate(), a.into_alternate(), b.into_alternate());
-        Encoder { at_index, _parts: (timer, at_scan, index, a, b) }
+        let pins = (index.into_alternate(), a.into_alternate(), b.into_alternate());
+        Encoder { timer, at_scan, at_index, losses, _pins: pins }
     }
 
-    /// What belongs to the millisecond of these sums.
-    pub fn take(&mut self, sums: &Sums) -> Counted {
-        let count = COUNTS.as_chunks::<SCANS>().0.get(sums.half).and_then(|half| half.last());
-        let counter = count.map_or(0, |count| count.load(Ordering::Relaxed));
-        Counted { counter, index: self.index() }
+    /// The copy that was made at the start of the last scan in this half of the buffers.
+    pub(super) fn at_last_scan(&self, half: usize) -> u16 {
+        let count = COUNTS.as_chunks::<SCANS>().0.get(half).and_then(|half| half.last());
+        count.map_or(0, |count| count.load(Ordering::Relaxed))
     }
 
-    fn index(&mut self) -> Option<u16> {
+    /// The count at this moment.
+    pub(super) fn now(&self) -> u16 {
+        self.timer.cnt().read().bits() as u16
+    }
+
+    /// Copies that are still to come in this round.
+    pub(super) fn copies_left(&self) -> usize {
+        self.at_scan.number_of_transfers().into()
+    }
+
+    /// No more copies at the starts of scans; a request that waits is dropped with its permission. The counting goes on.
+    pub(super) fn stop_copies(&mut self, scans: &TIM3) {
+        scans.dier().modify(|_, w| w.ude().clear_bit());
+        stream::stop(&mut self.at_scan);
+    }
+
+    /// The copies begin again with the first place of the buffer. TIM3 must stand still.
+    pub(super) fn start_copies(&mut self, scans: &TIM3) {
+        copy(&mut self.at_scan, &self.timer, &COUNTS);
+        scans.dier().modify(|_, w| w.ude().set_bit());
+    }
+
+    /// The count at the last index; `None` when none came since the last call.
+    pub(super) fn index(&mut self) -> Option<u16> {
+        if !self.at_index.is_enabled() {
+            self.losses.count(Event::Index);
+            stream::stop(&mut self.at_index);
+            copy_at_index(&mut self.at_index, &self.timer);
+            return None;
+        }
         if !self.at_index.is_transfer_complete() {
             return None;
         }
@@ -103,6 +136,11 @@ fn prepare_events(scans: &TIM3) {
     scans.ccmr1_input().write(|w| w.cc2s().ti2().ic2f().set(FILTER));
     scans.ccer().write(|w| w.cc2e().set_bit());
     scans.dier().write(|w| w.ude().set_bit().cc2de().set_bit());
+}
+
+/// The stream that copies the count at each index.
+fn copy_at_index(stream: &mut Stream5<DMA1>, timer: &TIM4) {
+    copy(stream, timer, core::slice::from_ref(&AT_INDEX));
 }
 
 /// A stream that copies the count to `target`, round and round. Both requests of TIM3 are on channel 5 (RM0390, table 28).

@@ -11,17 +11,23 @@ use crate::flash_area::FlashArea;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// The error flags of SR; writing 1 clears one.
 const ERRORS: u32 = 0b1_1111_0010;
+/// How often to read BSY before an operation is given up: programming a word for about 10 ms (the data sheet allows 100 us), an erase
+/// for about 2.5 s (the data sheet allows 2 s). Reads are counted because the time base does not run whenever the bootloader programs.
+const PROGRAM_POLLS: u32 = 1 << 17;
+const ERASE_POLLS: u32 = 1 << 25;
 
 /// The flash controller.
 pub struct Flash(FLASH);
 
-/// Why it did not do what it was told.
+/// Why an operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// Outside of the area, or not on a boundary.
+    /// The place is outside of the area, or not on a boundary.
     Place(NorFlashErrorKind),
-    /// The controller says so: its error flags (RM0390, 3.8.4).
+    /// The error flags of the controller (RM0390, 3.8.4).
     Flags(u32),
+    /// The controller is busy for longer than any operation takes.
+    Busy,
 }
 
 impl From<NorFlashErrorKind> for Error {
@@ -34,7 +40,7 @@ impl NorFlashError for Error {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
             Error::Place(kind) => *kind,
-            Error::Flags(_) => NorFlashErrorKind::Other,
+            Error::Flags(_) | Error::Busy => NorFlashErrorKind::Other,
         }
     }
 }
@@ -46,7 +52,7 @@ impl Flash {
         Flash(flash)
     }
 
-    /// Copies what is there.
+    /// Copies bytes out of the flash.
     pub(super) fn read(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
         // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
@@ -70,29 +76,30 @@ impl Flash {
     ///
     /// `address` must be in flash, outside of the program, and a multiple of four.
     fn program(&mut self, address: u32, word: u32) -> Result<(), Error> {
-        self.prepare();
+        self.prepare()?;
         self.0.cr().modify(|_, w| w.psize().psize32().pg().set_bit());
         // SAFETY: the callers give addresses of an area that holds no code and no value of this program.
         unsafe { (address as *mut u32).write_volatile(word) };
         cortex_m::asm::dsb();
-        self.wait();
+        self.wait(PROGRAM_POLLS)?;
         self.end()
     }
 
     /// Erases a sector and waits for it: 0.25 s for the smallest, 2 s at most.
     pub(super) fn erase(&mut self, sector: u8) -> Result<(), Error> {
-        self.start_erase(sector);
-        self.wait();
+        self.start_erase(sector)?;
+        self.wait(ERASE_POLLS)?;
         self.end()
     }
 
     /// Begins to erase a sector; [`Flash::end`] follows when the controller is no longer busy.
-    pub(super) fn start_erase(&mut self, sector: u8) {
-        self.prepare();
+    pub(super) fn start_erase(&mut self, sector: u8) -> Result<(), Error> {
+        self.prepare()?;
         // SAFETY: SNB takes any number of a sector.
         self.0.cr().modify(|_, w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
         self.0.cr().modify(|_, w| w.strt().set_bit());
         cortex_m::asm::dsb();
+        Ok(())
     }
 
     /// Whether an operation is going on.
@@ -101,8 +108,8 @@ impl Flash {
     }
 
     /// Forgets old errors and unlocks the controller for one operation.
-    fn prepare(&mut self) {
-        self.wait();
+    fn prepare(&mut self) -> Result<(), Error> {
+        self.wait(PROGRAM_POLLS)?;
         // SAFETY: SR takes 1 for flags to clear.
         self.0.sr().write(|w| unsafe { w.bits(ERRORS) });
         if self.0.cr().read().lock().bit_is_set() {
@@ -111,20 +118,27 @@ impl Flash {
                 self.0.keyr().write(|w| unsafe { w.bits(key) });
             }
         }
+        Ok(())
     }
 
-    /// After an operation: locks the controller, and says whether it has done what it was told.
+    /// After an operation: locks the controller, and returns the error flags as an error.
     pub(super) fn end(&mut self) -> Result<(), Error> {
         let flags = self.0.sr().read().bits() & ERRORS;
         self.0.cr().write(|w| w.lock().set_bit());
         if flags == 0 { Ok(()) } else { Err(Error::Flags(flags)) }
     }
 
-    fn wait(&self) {
-        while self.is_busy() {}
+    /// Waits for the end of the operation under way. An operation that does not end is an error. The controller is locked then; the
+    /// next operation waits for the same flag again.
+    fn wait(&self, polls: u32) -> Result<(), Error> {
+        if (0..polls).any(|_| !self.is_busy()) {
+            return Ok(());
+        }
+        self.0.cr().write(|w| w.lock().set_bit());
+        Err(Error::Busy)
     }
 
-    /// Drops what the data cache holds of the time before (RM0390, 3.4.2). It must be off for that.
+    /// Empties the data cache, which may hold words from before the operation (RM0390, 3.4.2). The cache must be off for that.
     pub(super) fn forget_cached(&mut self) {
         let was_on = self.0.acr().read().dcen().bit_is_set();
         self.0.acr().modify(|_, w| w.dcen().clear_bit());

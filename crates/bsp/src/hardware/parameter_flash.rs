@@ -5,18 +5,27 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNo
 use super::flash::{Error, Flash};
 use super::memory;
 use crate::flash_area::FlashArea;
+use crate::losses::{Event, Losses};
 use crate::sectors;
 
 /// The controller for those two sectors.
 pub struct ParameterFlash {
     flash: Flash,
     area: FlashArea,
+    losses: &'static Losses,
 }
 
 impl ParameterFlash {
-    pub(super) fn new(flash: Flash) -> ParameterFlash {
+    pub(super) fn new(flash: Flash, losses: &'static Losses) -> ParameterFlash {
         let pages = memory::parameters();
-        ParameterFlash { flash, area: FlashArea::new(pages.start, pages) }
+        ParameterFlash { flash, area: FlashArea::new(pages.start, pages), losses }
+    }
+
+    fn noted(&self, result: Result<(), Error>) -> Result<(), Error> {
+        if result == Err(Error::Busy) {
+            self.losses.count(Event::Flash);
+        }
+        result
     }
 }
 
@@ -45,13 +54,15 @@ impl NorFlash for ParameterFlash {
         let start = self.area.address(from, len as usize, memory::PARAMETER_PAGE)?;
         for address in (start..start + len).step_by(Self::ERASE_SIZE) {
             let sector = sectors::starting_at(address).ok_or(NorFlashErrorKind::NotAligned)?;
-            self.flash.erase(sector.number)?;
+            let erased = self.flash.erase(sector.number);
+            self.noted(erased)?;
         }
         self.flash.forget_cached();
         Ok(())
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
-        self.flash.write(&self.area, offset, bytes)
+        let written = self.flash.write(&self.area, offset, bytes);
+        self.noted(written)
     }
 }

@@ -46,7 +46,7 @@ impl update::Flash for ProgramFlash {
     fn start_erase(&mut self, offset: u32) -> Result<(), Error> {
         let address = self.area.address(offset, 0, 4)?;
         let sector = sectors::starting_at(address).ok_or(NorFlashErrorKind::NotAligned)?;
-        self.flash.start_erase(sector.number);
+        self.flash.start_erase(sector.number)?;
         self.erases = true;
         Ok(())
     }

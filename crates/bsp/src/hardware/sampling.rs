@@ -7,7 +7,7 @@ use stm32f4xx_hal::gpio::{Analog, PA0, PA1, PC2};
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, DMA2, TIM3};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use crate::losses::Losses;
+use crate::losses::{Event, Losses};
 pub(super) use crate::oversampling::SCANS;
 use crate::oversampling::{CHANNELS, WORDS, sums};
 
@@ -62,6 +62,9 @@ const _: () = {
     assert!(SCANS as u32 * PERIOD as u32 == 72_000, "the interrupt must come once a millisecond");
 };
 
+/// How often to look whether the stream has stopped: it ends the transfer that it is at, some ten clocks.
+const STOP_POLLS: u32 = 1_000;
+
 /// What the DMA controller writes and the core reads, two conversions in a word. Atomic, because two bus masters share it.
 static BUFFER: [AtomicU32; 2 * WORDS] = [const { AtomicU32::new(0) }; 2 * WORDS];
 
@@ -79,15 +82,16 @@ impl Sums {
     pub const COUNT: u16 = SCANS as u16;
 }
 
-/// The front end.
-pub struct Sampling {
+/// The ADC, the timer that starts its scans, and the DMA controller that collects them.
+pub(super) struct Sampling {
+    adc: ADC1,
     dma: DMA2,
     timer: TIM3,
-    lost: Losses,
-    _parts: (ADC1, PA0<Analog>, PA1<Analog>, PC2<Analog>),
+    losses: &'static Losses,
+    _pins: (PA0<Analog>, PA1<Analog>, PC2<Analog>),
 }
 
-/// What the front end is made of.
+/// The peripherals and pins of the analogue inputs.
 pub(crate) struct Parts {
     pub(crate) adc: ADC1,
     pub(crate) common: ADC_COMMON,
@@ -100,29 +104,44 @@ pub(crate) struct Parts {
 
 impl Sampling {
     /// Configures everything, in the order of the flow of data from its end: a trigger finds all of it ready.
-    pub(crate) fn new(parts: Parts, rcc: &mut Rcc) -> Sampling {
-        prepare_dma(&parts.dma, &parts.adc, rcc);
-        prepare_adc(&parts.adc, &parts.common, rcc);
-        prepare_timer(&parts.timer, rcc);
-        let Parts { adc, dma, timer, pressure, supply, thermistor, .. } = parts;
-        Sampling { dma, timer, lost: Losses::new(), _parts: (adc, pressure, supply, thermistor) }
+    pub(super) fn new(parts: Parts, losses: &'static Losses, rcc: &mut Rcc) -> Sampling {
+        let Parts { adc, common, dma, timer, pressure, supply, thermistor } = parts;
+        DMA2::enable(rcc);
+        DMA2::reset(rcc);
+        ADC1::enable(rcc);
+        ADC1::reset(rcc);
+        prepare_dma(&dma, &adc);
+        common.ccr().write(|w| w.adcpre().div4().tsvrefe().set_bit());
+        prepare_adc(&adc);
+        prepare_timer(&timer, rcc);
+        Sampling { adc, dma, timer, losses, _pins: (pressure, supply, thermistor) }
     }
 
-    /// What paces it, for those who have something to do at the same instants.
-    pub(crate) fn scans(&self) -> &TIM3 {
+    /// The timer that starts the scans, for the copies of the encoder's count at the same instants.
+    pub(super) fn scans(&self) -> &TIM3 {
         &self.timer
     }
 
-    /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this is
-    /// the last thing that an initialisation does.
-    pub fn start(&mut self) {
+    /// Begins to sample. The first interrupt comes a millisecond later.
+    pub(super) fn start(&mut self) {
         self.timer.cr1().write(|w| w.cen().set_bit());
     }
 
-    /// The sums of the millisecond that has just ended. `None` when there is none, as after an interrupt of an error.
-    pub fn take(&mut self) -> Option<Sums> {
+    /// Stops everything and sets it up anew, whatever has gone wrong: an overrun of the ADC, which then asks for nothing more
+    /// (RM0390, 13.8.1), a stream that a bus error has switched off, a lost request. [`Sampling::start`] follows.
+    pub(super) fn set_up_again(&mut self) {
+        self.timer.cr1().modify(|_, w| w.cen().clear_bit());
+        self.timer.cnt().reset();
+        self.adc.cr2().reset();
+        self.adc.sr().reset();
+        prepare_dma(&self.dma, &self.adc);
+        prepare_adc(&self.adc);
+    }
+
+    /// The sums of the millisecond that has just ended. `None` when there is none.
+    pub(super) fn take(&mut self) -> Option<Sums> {
         let flags = self.dma.lisr().read();
-        self.dma.lifcr().write(|w| w.chtif0().set_bit().ctcif0().set_bit().cteif0().set_bit());
+        forget_flags(&self.dma);
         let half = match (flags.htif0().bit(), flags.tcif0().bit()) {
             (false, false) => return None,
             (true, false) => 0,
@@ -133,24 +152,33 @@ impl Sampling {
         Some(Sums { channels: sums(words), half })
     }
 
-    /// Milliseconds that nobody collected in time, since the last call.
-    pub fn lost(&self) -> u32 {
-        self.lost.take()
-    }
-
     /// Both halves are complete: the older one is being overwritten, so it is given up.
     fn latest_of_two(&self) -> usize {
-        self.lost.count();
-        let remaining = usize::from(self.dma.st(0).ndtr().read().ndt().bits());
-        usize::from(remaining > HALF)
+        self.losses.count(Event::Millisecond);
+        usize::from(self.conversions_left() > HALF)
+    }
+
+    /// Conversions that are still to come in this round.
+    pub(super) fn conversions_left(&self) -> usize {
+        self.dma.st(0).ndtr().read().ndt().bits().into()
+    }
+
+    /// Whether the timer is in the second half of the time between two scans.
+    pub(super) fn second_half(&self) -> bool {
+        self.timer.cnt().read().bits() >= u32::from(PERIOD / 2)
     }
 }
 
+fn forget_flags(dma: &DMA2) {
+    dma.lifcr().write(|w| w.chtif0().set_bit().ctcif0().set_bit().cteif0().set_bit());
+}
+
 /// DMA2 stream 0, channel 0: ADC1 to the buffer, round and round, an interrupt at each half (RM0390, 9.3).
-fn prepare_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
-    DMA2::enable(rcc);
-    DMA2::reset(rcc);
+fn prepare_dma(dma: &DMA2, adc: &ADC1) {
     let stream = dma.st(0);
+    stream.cr().reset();
+    let _ = (0..STOP_POLLS).find(|_| stream.cr().read().en().bit_is_clear());
+    forget_flags(dma);
     let source = adc.dr().as_ptr() as u32;
     let target = BUFFER.as_ptr() as u32;
     // SAFETY: the transfer goes from the data register into BUFFER and never beyond its end, and both exist for ever.
@@ -167,10 +195,7 @@ fn prepare_dma(dma: &DMA2, adc: &ADC1, rcc: &mut Rcc) {
 }
 
 /// ADC1: scan on each trigger of TIM3, a DMA request for each conversion for ever (RM0390, 13.8.1).
-fn prepare_adc(adc: &ADC1, common: &ADC_COMMON, rcc: &mut Rcc) {
-    ADC1::enable(rcc);
-    ADC1::reset(rcc);
-    common.ccr().write(|w| w.adcpre().div4().tsvrefe().set_bit());
+fn prepare_adc(adc: &ADC1) {
     adc.cr1().write(|w| w.scan().set_bit());
     // SAFETY: any sampling time and any existing channel may be set.
     unsafe {

@@ -4,6 +4,19 @@
 //! The clock rests high, and its first edge latches the position. The encoder puts the next bit out at each rising edge,
 //! and the SPI takes one at the same edges, that is the bit of the clock before: a bit has a whole period for its way
 //! through the cable. The first one is the rest level.
+//!
+//! # What a save costs
+//!
+//! Nothing. The flash stops the core for 16 us with each word that it programs, longer than a byte lasts on the line; but no
+//! byte waits for the core. Both directions are moved by DMA1 between SPI2 and RAM, and neither way leads through the flash: the
+//! controller's port for peripherals is at the bridge of APB1, its port for memory has SRAM to itself while the core waits
+//! (RM0390, 2.1 and 9.3).
+//!
+//! # What a lost byte costs
+//!
+//! One reading. A word that is not whole a millisecond after its start will not come: it is counted ([`Event::SsiWord`]), both
+//! streams and the SPI are set up anew, and the next word is started in the same millisecond. A byte that is left over does
+//! the same, for it would be taken for the first one of the next word.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -14,7 +27,9 @@ use stm32f4xx_hal::gpio::{Alternate, PB13, PB14};
 use stm32f4xx_hal::pac::{DMA1, SPI2};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
+use super::stream;
 use crate::bit_timing::APB1_HZ;
+use crate::losses::{Event, Losses};
 use crate::ssi_word::{LONGEST, SsiWord, bytes, pack};
 
 /// BR: APB1 divided by 64. Half of it would be more than the 1 MHz that encoders stand at most.
@@ -35,14 +50,16 @@ static SENT: AtomicU8 = AtomicU8::new(0);
 
 /// The input.
 pub struct Ssi {
+    spi: SPI2,
     receive: Stream3<DMA1>,
     send: Stream4<DMA1>,
     /// Bytes of the word that was started; 0 without one.
     started: usize,
-    _parts: (SPI2, PB13<Alternate<5>>, PB14<Alternate<5>>),
+    losses: &'static Losses,
+    _pins: (PB13<Alternate<5>>, PB14<Alternate<5>>),
 }
 
-/// What it is made of.
+/// The peripherals and pins of the input.
 pub(crate) struct Parts {
     pub(crate) spi: SPI2,
     pub(crate) receive: Stream3<DMA1>,
@@ -52,19 +69,42 @@ pub(crate) struct Parts {
 }
 
 impl Ssi {
-    pub(crate) fn new(parts: Parts, rcc: &mut Rcc) -> Ssi {
-        let Parts { spi, mut receive, mut send, clock, data } = parts;
-        prepare_spi(&spi, rcc);
-        prepare(&mut receive, &spi, DmaDirection::PeripheralToMemory, &RECEIVED);
-        prepare(&mut send, &spi, DmaDirection::MemoryToPeripheral, core::slice::from_ref(&SENT));
-        let (clock, data) = (clock.into_alternate(), data.into_alternate());
-        Ssi { receive, send, started: 0, _parts: (spi, clock, data) }
+    pub(crate) fn new(parts: Parts, losses: &'static Losses, rcc: &mut Rcc) -> Ssi {
+        let Parts { spi, receive, send, clock, data } = parts;
+        SPI2::enable(rcc);
+        SPI2::reset(rcc);
+        let pins = (clock.into_alternate(), data.into_alternate());
+        let mut ssi = Ssi { spi, receive, send, started: 0, losses, _pins: pins };
+        ssi.set_up();
+        ssi
     }
 
-    /// Starts to clock in a word of `length` bits, 62 at most. It is there a millisecond later; before that nothing else is
-    /// started.
-    pub fn start(&mut self, length: u32) {
-        if self.receive.is_enabled() || self.send.is_enabled() {
+    /// To be called once a millisecond: gives the word of the last one, and starts to clock in the next, of `length` bits, 62 at
+    /// most; `None` starts nothing. There is no word where none was started, or not all of it came.
+    pub fn read(&mut self, length: Option<u32>) -> Option<SsiWord> {
+        let started = core::mem::take(&mut self.started);
+        let word = (started > 0 && self.is_whole()).then(|| received(started));
+        if started > 0 && word.is_none() {
+            self.losses.count(Event::SsiWord);
+            self.set_up();
+        }
+        if let Some(length) = length {
+            self.start(length);
+        }
+        word
+    }
+
+    /// The stream has stored all bytes, and the SPI has none to spare and clocks no more.
+    fn is_whole(&self) -> bool {
+        let status = self.spi.sr().read();
+        let is_at_rest =
+            status.bsy().bit_is_clear() && status.rxne().bit_is_clear() && status.ovr().bit_is_clear();
+        self.receive.is_transfer_complete() && is_at_rest
+    }
+
+    /// A word that is still on the line keeps the next one from starting: the encoder would take the clocks for its own.
+    fn start(&mut self, length: u32) {
+        if self.spi.sr().read().bsy().bit_is_set() {
             return;
         }
         self.started = bytes(length);
@@ -79,18 +119,25 @@ impl Ssi {
         }
     }
 
-    /// The word that was started before; `None` when there is none, or not all of it.
-    pub fn take(&mut self) -> Option<SsiWord> {
-        let started = core::mem::take(&mut self.started);
-        let is_there = started > 0 && self.receive.is_transfer_complete();
-        is_there.then(|| pack(RECEIVED.iter().take(started).map(|byte| byte.load(Ordering::Relaxed))))
+    /// Everything as it is to be between two words, whatever it was before.
+    fn set_up(&mut self) {
+        stream::stop(&mut self.send);
+        stream::stop(&mut self.receive);
+        prepare_spi(&self.spi);
+        prepare(&mut self.receive, &self.spi, DmaDirection::PeripheralToMemory, &RECEIVED);
+        prepare(&mut self.send, &self.spi, DmaDirection::MemoryToPeripheral, core::slice::from_ref(&SENT));
     }
 }
 
-/// SPI2 as a master with a clock that rests high, bytes with their highest bit first (RM0390, 26.3.5).
-fn prepare_spi(spi: &SPI2, rcc: &mut Rcc) {
-    SPI2::enable(rcc);
-    SPI2::reset(rcc);
+fn received(count: usize) -> SsiWord {
+    pack(RECEIVED.iter().take(count).map(|byte| byte.load(Ordering::Relaxed)))
+}
+
+/// SPI2 as a master with a clock that rests high, bytes with their highest bit first (RM0390, 26.3.5). What has come and was not
+/// fetched is dropped: to read DR and then SR clears RXNE and OVR (26.3.10).
+fn prepare_spi(spi: &SPI2) {
+    let _ = spi.dr().read();
+    let _ = spi.sr().read();
     spi.cr2().write(|w| w.rxdmaen().set_bit().txdmaen().set_bit());
     spi.cr1().write(|w| {
         w.mstr().set_bit().ssm().set_bit().ssi().set_bit();

@@ -12,6 +12,10 @@ static EXTENSION: Extension = Extension::new();
 /// Half a period: no alarm is set further ahead, so that a compare value means one instant only.
 const FARTHEST: Duration = Duration(1 << 31);
 
+/// Microseconds after its time, from which on an alarm without a flag has lost its flag. The interrupt is late by a few microseconds
+/// at most.
+const MISSED: u32 = 500;
+
 /// Clock of the timers at APB1: twice that of the bus, which is divided (RM0390, 6.2).
 const TIMER_MHZ: u32 = 2 * APB1_HZ / 1_000_000;
 
@@ -35,7 +39,7 @@ pub(crate) fn start(_tim2: TIM2, rcc: &mut Rcc) -> (TimeInterrupt, [Alarm; 2]) {
     tim2.sr().reset();
     tim2.dier().write(|w| w.uie().set_bit().cc1ie().set_bit().cc2ie().set_bit().cc3ie().set_bit());
     tim2.cr1().write(|w| w.cen().set_bit());
-    (TimeInterrupt(()), [Alarm(Compare::First), Alarm(Compare::Second)])
+    (TimeInterrupt { told: [0; 2] }, [Alarm(Compare::First), Alarm(Compare::Second)])
 }
 
 /// Time since start-up.
@@ -63,11 +67,12 @@ enum Compare {
 }
 
 impl Alarm {
-    /// Raises the timer's interrupt at `deadline`, at once when that is past, and in any case within half a period, when
-    /// whoever set it must look again.
+    /// Raises the interrupt of the timer at `deadline`, or at once when the deadline is past. An alarm further ahead than half a period
+    /// of the counter comes after half a period: the caller then sets the alarm again.
     #[expect(clippy::cast_possible_truncation, reason = "the hardware compares the low half")]
     pub fn set(&mut self, deadline: Instant) {
-        let deadline = deadline.min(Clock::now() + FARTHEST);
+        let now = Clock::now();
+        let deadline = deadline.max(now).min(now + FARTHEST);
         registers().ccr(self.0 as usize).write(|w| w.ccr().set(deadline.0 as u32));
         // The counter may have passed the value before it was written: then no match comes for 71 minutes.
         if Clock::now() >= deadline {
@@ -78,15 +83,52 @@ impl Alarm {
 
 /// The timer's interrupt.
 #[derive(Debug)]
-pub struct TimeInterrupt(());
+pub struct TimeInterrupt {
+    /// For each alarm, the value of the compare register for which [`TimeInterrupt::acknowledge`] has reported the alarm.
+    told: [u32; 2],
+}
+
+/// What became of an alarm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ring {
+    /// Its time has not come, or was reported before.
+    No,
+    /// It has just gone off.
+    Yes,
+    /// Its time has passed, and its interrupt never came.
+    Missed,
+}
 
 impl TimeInterrupt {
-    /// Acknowledges it and keeps the extension up to date. Tells which alarms went off.
-    pub fn acknowledge(&mut self) -> [bool; 2] {
+    /// Acknowledges the interrupt, keeps the extension up to date, and tells which alarms have gone off. An alarm whose flag was lost is
+    /// found by the time: a caller that comes by every millisecond without an interrupt finds such an alarm a millisecond late.
+    pub fn acknowledge(&mut self) -> [Ring; 2] {
+        // In this order: an alarm whose time had come before has its flag.
+        let now = registers().cnt().read().cnt().bits();
         let flags = registers().sr().read();
         // SAFETY: every bit of SR is cleared by writing 0 and left alone by writing 1, reserved bits included.
         registers().sr().write(|w| unsafe { w.bits(!flags.bits()) });
         EXTENSION.follow(registers().cnt().read().cnt().bits());
-        [flags.cc1if().bit(), flags.cc2if().bit()]
+        let [first, second] = &mut self.told;
+        [
+            ring(Compare::First, first, flags.cc1if().bit(), now),
+            ring(Compare::Second, second, flags.cc2if().bit(), now),
+        ]
+    }
+}
+
+/// The state of one alarm. No alarm is set further ahead than half a period, so a compare value that seems to lie further ahead has
+/// passed.
+fn ring(alarm: Compare, told: &mut u32, has_flag: bool, now: u32) -> Ring {
+    let due = registers().ccr(alarm as usize).read().ccr().bits();
+    let is_late = (MISSED..1 << 31).contains(&now.wrapping_sub(due));
+    let is_told = *told == due;
+    if has_flag || is_late {
+        *told = due;
+    }
+    match has_flag {
+        true => Ring::Yes,
+        false if is_late && !is_told => Ring::Missed,
+        false => Ring::No,
     }
 }

@@ -1,6 +1,7 @@
 //! The transmit mailboxes of CAN1 (RM0390, 30.7.1).
 //!
-//! bxcan's own transmission is not used: it panics at a number of a mailbox and a length that a register could hold.
+//! The transmission of the crate bxcan is not used: bxcan panics at a mailbox number or a length that only a broken register could
+//! hold.
 
 use canopen::Frame;
 use stm32f4xx_hal::pac::can1::TX;
@@ -18,19 +19,37 @@ const TXRQ: u32 = 1 << 0;
 const TXOK: u32 = 1 << 1;
 const ABRQ: u32 = 1 << 7;
 
+/// How often to look whether a frame is taken back: a matter of a few clocks, unless its transmission has just begun.
+const ABORT_POLLS: u32 = 100;
+
 /// The transmit mailboxes.
-pub struct Transmitter(());
+pub struct Transmitter {
+    /// A frame that was to be taken back, and the number of its mailbox. The transmission of the frame had just begun, so the end of
+    /// the transmission decides whether the frame was sent.
+    aborted: Option<(u32, Frame)>,
+}
 
 impl Transmitter {
-    /// There is one.
+    /// The only one.
     pub(super) fn new() -> Transmitter {
-        Transmitter(())
+        Transmitter { aborted: None }
     }
 
     /// Acknowledges the transmit interrupt. To be called before the queue is pumped: a mailbox that becomes free later
     /// interrupts again.
     pub fn acknowledge(&mut self) {
+        self.settle();
         registers().tsr().write(|w| w.rqcp0().set_bit().rqcp1().set_bit().rqcp2().set_bit());
+    }
+
+    /// Looks whether the transmission of the aborted frame has ended. A frame that was not sent goes back into its mailbox.
+    fn settle(&mut self) {
+        if let Some((number, frame)) = self.aborted.filter(|(number, _)| !is_aborting(*number)) {
+            self.aborted = None;
+            if let Some(mailbox) = registers().tx_iter().nth(number as usize).filter(|_| !is_sent(number)) {
+                load(mailbox, &frame);
+            }
+        }
     }
 
     /// Whether all mailboxes are empty: everything that was sent is on the wire.
@@ -53,7 +72,10 @@ impl Mailboxes for Transmitter {
     /// Among equal identifiers the hardware prefers the mailbox of the lower number, not the frame that came first, so a
     /// frame waits for those of its own identifier.
     fn offer(&mut self, frame: &Frame) -> Offer {
-        if would_wait() || pending().any(|(_, other)| order(other) <= identifier(frame)) {
+        if self.aborted.is_some()
+            || would_wait()
+            || pending().any(|(_, other)| order(other) <= identifier(frame))
+        {
             return Offer::Refused;
         }
         if let Some(free) = registers().tx_iter().find(|mailbox| !is_pending(mailbox)) {
@@ -63,7 +85,13 @@ impl Mailboxes for Transmitter {
         let Some((number, last)) = pending().max_by_key(|(_, mailbox)| order(mailbox)) else {
             return Offer::Refused;
         };
-        let replaced = take_back(number, last);
+        let replaced = content(last);
+        abort(number);
+        if is_aborting(number) {
+            self.aborted = replaced.map(|replaced| (number, replaced));
+            return Offer::Refused;
+        }
+        let replaced = replaced.filter(|_| !is_sent(number));
         load(last, frame);
         replaced.map_or(Offer::Taken, Offer::Replaced)
     }
@@ -78,7 +106,7 @@ fn is_pending(mailbox: &TX) -> bool {
     mailbox.tir().read().txrq().bit_is_set()
 }
 
-/// What the arbitration goes by, lowest first.
+/// The key of the arbitration: identifier and RTR. The lowest key wins.
 fn order(mailbox: &TX) -> u32 {
     mailbox.tir().read().bits() & !TXRQ
 }
@@ -87,27 +115,44 @@ fn identifier(frame: &Frame) -> u32 {
     u32::from(frame.id()) << STID | if frame.is_remote() { REMOTE } else { 0 }
 }
 
-/// With all mailboxes full a frame that waits is taken back, and when that frame is on the wire, it takes up to its end: 13 ms
-/// at 10 kbit/s. So nothing is taken back while the controller transmits; the interrupt at the end comes soon.
+/// Whether taking back a frame would mean waiting. A frame leaves its mailbox at once while it waits, and at the end of its
+/// transmission once it is on the wire: after up to 13 ms at 10 kbit/s. So no frame is taken back while the controller transmits;
+/// the interrupt at the end of the transmission comes soon.
 fn would_wait() -> bool {
     let full = registers().tx_iter().all(is_pending);
     full && registers().msr().read().txm().bit_is_set()
 }
 
-/// Takes a frame out of its mailbox; `None` when it was sent meanwhile.
-fn take_back(number: u32, mailbox: &TX) -> Option<Frame> {
-    let flags = 8 * number;
-    // SAFETY: the other bits of TSR are cleared by writing 1, so 0 leaves them.
-    registers().tsr().write(|w| unsafe { w.bits(ABRQ << flags) });
-    while registers().tsr().read().bits() & ABRQ << flags != 0 {}
-    let is_sent = registers().tsr().read().bits() & TXOK << flags != 0;
+/// The frame in a mailbox.
+fn content(mailbox: &TX) -> Option<Frame> {
     let content = Mailbox {
         rir: mailbox.tir().read().bits(),
         rdtr: mailbox.tdtr().read().bits(),
         rdlr: mailbox.tdlr().read().bits(),
         rdhr: mailbox.tdhr().read().bits(),
     };
-    if is_sent { None } else { content.frame() }
+    content.frame()
+}
+
+/// Asks for the frame in a mailbox to be given up. The mailbox is empty some clocks later, or at the end of a transmission that has
+/// just begun: see [`is_aborting`].
+fn abort(number: u32) {
+    // SAFETY: the other bits of TSR are cleared by writing 1, so 0 leaves them.
+    registers().tsr().write(|w| unsafe { w.bits(ABRQ << flags_of(number)) });
+    let _ = (0..ABORT_POLLS).find(|_| !is_aborting(number));
+}
+
+fn is_aborting(number: u32) -> bool {
+    registers().tsr().read().bits() & ABRQ << flags_of(number) != 0
+}
+
+fn is_sent(number: u32) -> bool {
+    registers().tsr().read().bits() & TXOK << flags_of(number) != 0
+}
+
+/// Where the flags of a mailbox are in TSR.
+fn flags_of(number: u32) -> u32 {
+    8 * (number % 3)
 }
 
 fn load(mailbox: &TX, frame: &Frame) {

@@ -2,23 +2,62 @@
 
 use super::Stored;
 use crate::dictionary::{Entry, Group};
-use crate::sdo::Abort;
+use crate::emcy::{Condition, Fault};
+use crate::nmt::State;
+use crate::sdo::{Abort, Multiplexer};
 
-/// The part of a personality that is code: rules of its own objects.
+/// The part of a device that is the product's own code: what its objects mean. Every method has a default that does
+/// nothing, so an application implements what it needs.
+///
+/// `image` is the memory of all values of the dictionary; a [`Field`](crate::dictionary::Field) reads and writes one of
+/// them. A value that a method changes is sent as any other change is.
 pub trait Application {
     /// A device without PDO, SYNC, EMCY, heartbeat consumer, stored parameters and block upload, such as a bootloader. Its
     /// dictionary has none of their objects, and the code for them is left out of the image.
     const SERVICES_ONLY: bool = false;
 
-    /// Fills in what no table can know (identity, versions), after every reset.
-    fn initialise(&mut self, image: &mut [u8]);
+    /// The faults of the application itself, at most 32. [`Fault::Application`] names one by its place here.
+    const CONDITIONS: &'static [Condition] = &[];
 
-    /// Decides on an SDO download to an entry with [`Rule::Application`](crate::dictionary::Rule::Application) of
-    /// this number; type and limits are checked already. It may change other values. The device stores the bytes.
+    /// Fills in what no table can know (identity, versions, the last measured values), after every reset.
+    fn initialise(&mut self, _image: &mut [u8]) {}
+
+    /// Decides on a write to an entry that is [`handled`](crate::dictionary::Object::handled), by SDO or by an RPDO; type
+    /// and limits are checked already. The method may change other values. The device stores the bytes.
     ///
     /// # Errors
-    /// The reason to refuse it; nothing is stored then.
-    fn write(&mut self, number: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort>;
+    /// The reason to refuse the write; nothing is stored then.
+    fn write(&mut self, _entry: &Entry, _bytes: &[u8], _image: &mut [u8]) -> Result<(), Abort> {
+        Ok(())
+    }
+
+    /// An SDO client has written this entry.
+    fn written(&mut self, _entry: &Entry, _image: &mut [u8]) {}
+
+    /// An RPDO has been written into the image. `rpdo` is its number, 1 to 512. A synchronous RPDO is written with the next
+    /// SYNC.
+    fn received(&mut self, _rpdo: u16, _image: &mut [u8]) {}
+
+    /// A SYNC has come in the state Operational. The synchronous RPDOs are in the image, and the synchronous TPDOs are
+    /// sent when the method returns. `counter` is `None` where 1019h asks for no counter.
+    fn synchronised(&mut self, _counter: Option<u8>, _image: &mut [u8]) {}
+
+    /// The NMT state is another one.
+    fn state(&mut self, _state: State, _image: &mut [u8]) {}
+
+    /// A fault has come (`active`) or has gone.
+    fn fault(&mut self, _fault: Fault, _active: bool, _image: &mut [u8]) {}
+
+    /// An error of this class has happened: a missing heartbeat and bus-off are [`ErrorClass::COMMUNICATION`]. The device
+    /// then changes its NMT state as object 1029h says.
+    fn error(&mut self, _class: ErrorClass, _image: &mut [u8]) {}
+
+    /// Whether each frame of a TPDO is an event of its own, such as a call of a lift: no newer frame may take the place of
+    /// one that waits for the bus. The frames of other TPDOs tell how things are, and only the newest needs to wait. `tpdo` is
+    /// the number of the TPDO, 1 to 512. Asked whenever the communication parameters or the mapping of the TPDO change.
+    fn sends_events(&self, _tpdo: u16) -> bool {
+        false
+    }
 
     /// What is stored of a group, for every reset that covers it.
     fn stored(&self, _group: Group) -> Stored<'_> {
@@ -29,11 +68,11 @@ pub trait Application {
     /// defaults.
     fn loaded(&mut self, _group: Group, _good: bool) {}
 
-    /// The content of the domain with the rule of this number.
+    /// The content of a domain.
     ///
     /// # Errors
-    /// The reason why it cannot be read.
-    fn read_domain(&self, _number: u8) -> Result<&[u8], Abort> {
+    /// The reason why the domain cannot be read.
+    fn read_domain(&self, _at: Multiplexer) -> Result<&[u8], Abort> {
         Err(Abort::Access)
     }
 
@@ -42,18 +81,32 @@ pub trait Application {
     ///
     /// # Errors
     /// The reason to refuse the part and with it the download.
-    fn write_domain(&mut self, _number: u8, _part: Part<'_>) -> Result<(), Abort> {
+    fn write_domain(&mut self, _at: Multiplexer, _part: Part<'_>) -> Result<(), Abort> {
         Err(Abort::Access)
     }
+}
+
+/// An application that only holds values.
+impl Application for () {}
+
+/// A class of errors: a sub-index of object 1029h, which says how the NMT state changes (CiA 301, 7.5.2.33).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorClass(pub u8);
+
+impl ErrorClass {
+    /// Communication errors, sub-index 1.
+    pub const COMMUNICATION: ErrorClass = ErrorClass(1);
+    /// Errors of the device itself: sub-index 2, the first that a device profile or the manufacturer defines.
+    pub const DEVICE: ErrorClass = ErrorClass(2);
 }
 
 /// A part of a download to a domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part<'a> {
-    /// It begins; so many bytes will come, where the client says so.
+    /// The download begins; so many bytes will come, where the client says so.
     Begin(Option<usize>),
-    /// Bytes and the place of the first of them.
+    /// Bytes, and the place of the first of them in the domain.
     Data(usize, &'a [u8]),
-    /// It is complete, with so many bytes.
+    /// The download is complete, with so many bytes.
     End(usize),
 }

@@ -1,7 +1,7 @@
 //! Multiplexed PDOs in the device: which objects the producer watches, and where a received one goes.
 
 use super::{Application, Core};
-use crate::dictionary::{Entry, Mapping};
+use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
 use crate::sdo::Multiplexer;
@@ -14,7 +14,9 @@ const DISPATCHING_LIST: u16 = 0x1FD0;
 /// The longest value that such a PDO carries.
 const LONGEST: u8 = 4;
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// Gives the producer its settings and its objects, after any change that may concern it.
     pub(super) fn configure_scanner(&mut self, settings: Option<ScannerSettings>) {
         self.scanner.configure(settings);
@@ -51,7 +53,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     fn watch_entry(&mut self, entry: &Entry) {
-        if entry.attributes.mapping == Mapping::Tpdo && entry.field.size <= LONGEST {
+        if entry.attributes.mapping.allows_tpdo() && entry.field.size <= LONGEST {
             let at = Multiplexer { index: entry.index(), sub: entry.sub() };
             self.scanner.watch(Watched::new(at, entry.field));
         }
@@ -84,10 +86,10 @@ impl<A: Application, const N: usize> Core<A, N> {
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
         let entry = self.dictionary.find(at.index, at.sub).ok();
         let entry =
-            entry.filter(|entry| entry.attributes.mapping == Mapping::Rpdo && entry.field.size <= LONGEST);
-        if let Some(entry) = entry {
+            entry.filter(|entry| entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST);
+        if let Some(entry) = &entry {
             let bytes = data.get(..usize::from(entry.field.size)).unwrap_or(&data);
-            entry.field.set(&mut self.image, bytes);
+            self.store_process_value(entry, bytes);
         }
         entry.is_some()
     }

@@ -2,12 +2,14 @@
 
 use super::pdos::low_half;
 use super::{Application, Core, Job, Part, STALE};
-use crate::dictionary::{Entry, Field, Group, Rule, Type, little_endian};
+use crate::dictionary::{Entry, Field, Rule, Type, little_endian};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Instant, emcy, sync};
 
-impl<A: Application, const N: usize> Objects for Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> Objects
+    for Core<A, N, T, R, W, M>
+{
     const IS_SMALL: bool = A::SERVICES_ONLY;
 
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
@@ -16,7 +18,7 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
             return Err(Abort::WriteOnly);
         }
         match (entry.attributes.kind, entry.rule()) {
-            (Type::Domain, Rule::Application(number)) => self.application.read_domain(number),
+            (Type::Domain, _) => self.application.read_domain(at),
             (Type::VisibleString(_), _) => Ok(text(entry.field.get(&self.image))),
             _ if A::SERVICES_ONLY => Ok(entry.field.get(&self.image)),
             (_, Rule::ErrorCount) => Ok(core::slice::from_ref(self.emcy.history().count())),
@@ -33,7 +35,7 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
-        Ok(stream_of(&entry).map_or(Writable::Value(entry.field.size.into()), Writable::Stream))
+        Ok(if entry.is_domain() { Writable::Stream } else { Writable::Value(entry.field.size.into()) })
     }
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
@@ -43,8 +45,8 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
-        if let Some(stream) = stream_of(entry) {
-            return self.write_domain(stream, bytes);
+        if entry.is_domain() {
+            return self.write_domain(at, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
@@ -53,7 +55,10 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
             Rule::Plain => entry.field.set(&mut self.image, bytes),
             _ => self.write_by_rule(entry, value, bytes, now)?,
         }
-        self.pending.parameters |= matches!(entry.attributes.group, Group::Application | Group::Calibration);
+        if entry.is_parameter() {
+            self.pending.parameters_changed();
+        }
+        self.application.written(entry, &mut self.image);
         Ok(())
     }
 
@@ -61,16 +66,18 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
         self.jobs.take_deferred()
     }
 
-    fn stream(&mut self, stream: u8, part: Part<'_>) -> Result<(), Abort> {
-        self.application.write_domain(stream, part)
+    fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
+        self.application.write_domain(at, part)
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
-    fn write_domain(&mut self, stream: u8, bytes: &[u8]) -> Result<(), Abort> {
-        self.stream(stream, Part::Begin(Some(bytes.len())))?;
-        self.stream(stream, Part::Data(0, bytes))?;
-        self.stream(stream, Part::End(bytes.len()))
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
+    fn write_domain(&mut self, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
+        self.stream(at, Part::Begin(Some(bytes.len())))?;
+        self.stream(at, Part::Data(0, bytes))?;
+        self.stream(at, Part::End(bytes.len()))
     }
 
     pub(super) fn is_initialising(&self) -> bool {
@@ -110,7 +117,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// Whether the rule of the entry allows the value.
     fn admit(&mut self, entry: &Entry, value: u32, bytes: &[u8]) -> Result<(), Abort> {
         match entry.rule() {
-            Rule::Application(number) => self.application.write(number, entry, bytes, &mut self.image),
+            Rule::Application => self.application.write(entry, bytes, &mut self.image),
             _ if A::SERVICES_ONLY => Ok(()),
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
             Rule::SyncCobId => sync::check_cob_id(value),
@@ -119,7 +126,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
             Rule::Store | Rule::Restore => self.admit_store(entry, value),
             Rule::StoreCalibration => self.admit_store_calibration(value),
-            Rule::Setting => self.begin_deferred(Job::Set(value.to_le_bytes()[0])),
+            Rule::Setting => self.begin_deferred(Job::Setting(value.to_le_bytes()[0])),
             Rule::ProgramControl => self.admit_program_control(value),
             Rule::HeartbeatWatch => self.admit_watch(entry, value),
             Rule::PdoCobId
@@ -136,7 +143,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// What follows from a new value.
     fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
-            Rule::Application(_) => self.pending.parameters = true,
+            Rule::Application => self.pending.parameters_changed(),
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             _ if A::SERVICES_ONLY => (),
             Rule::ErrorCount => self.emcy.clear_history(),
@@ -156,10 +163,12 @@ impl<A: Application, const N: usize> Core<A, N> {
             | Rule::PdoSyncStart => self.configure_pdo(entry, now),
             _ => (),
         }
-        self.pending.identifiers |= matches!(
+        if matches!(
             entry.rule(),
             Rule::SyncCobId | Rule::PdoCobId | Rule::PdoPredefined | Rule::HeartbeatWatch
-        );
+        ) {
+            self.pending.identifiers_changed();
+        }
         (self.process_due, self.services_due) = (STALE, STALE);
     }
 }
@@ -167,12 +176,4 @@ impl<A: Application, const N: usize> Core<A, N> {
 /// A string as an upload gives it: it ends where its zeros begin.
 fn text(value: &[u8]) -> &[u8] {
     value.split(|&byte| byte == 0).next().unwrap_or(value)
-}
-
-/// The number of the stream that a domain is: the application's.
-fn stream_of(entry: &Entry) -> Option<u8> {
-    match (entry.attributes.kind, entry.rule()) {
-        (Type::Domain, Rule::Application(number)) => Some(number),
-        _ => None,
-    }
 }

@@ -1,63 +1,108 @@
 //! Process data: NMT commands, SYNC, PDOs.
 
-use super::{Application, Core, Device, STALE};
+use super::{Application, Core, Device, Next, STALE};
 use crate::nmt::Command;
-use crate::pdo::{PdoSet, Rpdo, Tpdo};
+use crate::pdo::{Chain, Direction, Rpdo, Tpdo};
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
-impl<A: Application, const N: usize> Device<A, N> {
-    /// A frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
-    pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
+    /// Takes a frame, whatever half it is for.
+    pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        let _ = self.on_process_frame(frame, now, out);
+        self.on_service_frame(frame, now, out)
+    }
+
+    /// Sends what is due in both halves.
+    pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        let _ = self.poll_process(now, out);
+        self.poll_services(now, out)
+    }
+
+    /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
+    pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.turn(now, out);
         if frame.id() == CanId::NMT.get() {
-            self.on_nmt(frame, turn);
+            self.on_nmt(frame);
         } else if self.core.state.has_pdos() && !A::SERVICES_ONLY {
             self.core.on_pdo_frame(frame, turn);
         }
+        self.send_process(turn);
+        self.process_next()
     }
 
     #[inline(never)]
-    fn on_nmt(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
+    fn on_nmt(&mut self, frame: &Frame) {
         let own = self.core.node_id.filter(|_| !self.core.is_initialising());
         let Some(command) = own.and_then(|own| Command::parse(frame.data(), own)) else { return };
         self.command(command);
-        self.send_process(turn);
     }
 
-    /// Sends what is due. Returns the instant of the next call.
-    pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+    /// Sends what is due of process data.
+    pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.turn(now, out);
-        self.send_process(turn)
+        self.send_process(turn);
+        self.process_next()
     }
 
-    pub(super) fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
+    pub(super) fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let core = &mut self.core;
         if A::SERVICES_ONLY {
-            return Instant::NEVER;
+            core.process_due = Instant::NEVER;
+            return;
         }
         if turn.now >= core.process_due {
             core.poll_sync(turn.now);
             let mut due = core.poll_rpdos(turn.now);
-            core.each_tpdo(core.valid_tpdos, |tpdo, image| {
+            core.each_tpdo(Chain::Valid, |tpdo, image| {
                 tpdo.poll(image, turn);
                 due = due.min(tpdo.due());
             });
             core.scanner.poll(&core.image, turn);
             core.process_due = due.min(core.scanner.due()).min(core.sync.due());
         }
-        core.process_due
     }
 
-    /// The application has updated values in the image: sends what a change triggers.
-    pub fn changed(&mut self, now: Instant, out: &mut impl Transmit) {
+    /// Lets the application update values in the image, and sends what their change triggers. The first call after a start
+    /// is the one with which a device that starts by itself (1F80h) becomes operational.
+    pub fn publish(
+        &mut self,
+        now: Instant,
+        out: &mut impl Transmit,
+        update: impl FnOnce(&mut A, &mut [u8]),
+    ) -> Next {
+        self.show(update);
+        self.send_changes(now, out);
+        self.process_next()
+    }
+
+    /// Sends a TPDO of type 254 or 255 now, or as soon as its inhibit time is over: an event that the application has
+    /// found. `tpdo` is the number, 1 to 512; one that is not valid, or of another type, is not sent.
+    pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
+        let turn = &mut self.turn(now, out);
+        let mut numbers = self.core.dictionary.pdos(Direction::Transmit).map(|index| (index & 0x1FF) + 1);
+        let place = numbers.position(|number| number == tpdo);
+        if self.core.state.has_pdos()
+            && let Some(tpdo) = place.and_then(|place| self.core.tpdos.get_mut(place))
+        {
+            tpdo.on_event();
+            self.core.process_due = STALE;
+        }
+        self.send_process(turn);
+        self.process_next()
+    }
+
+    fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
         let turn = &mut self.turn(now, out);
         self.start_by_itself(turn);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
-            self.core.each_tpdo(self.core.valid_tpdos, |tpdo, image| tpdo.on_change(image, turn));
+            self.core.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, turn));
             self.core.scanner.on_change(&self.core.image, turn);
             self.core.process_due = self.core.process_due.min(self.core.scanner.due());
         }
+        self.send_process(turn);
     }
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
@@ -68,12 +113,14 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     fn on_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         if self.sync.accepts(frame) {
             self.on_sync(frame, turn);
         } else if frame.is_remote() {
-            self.each_tpdo(self.valid_tpdos, |tpdo, image| {
+            self.each_tpdo(Chain::Valid, |tpdo, image| {
                 if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
                     tpdo.on_remote(image, turn);
                 }
@@ -83,14 +130,15 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    /// Visits some TPDOs. What one of them could not send at once moves the next deadline.
-    pub(super) fn each_tpdo(&mut self, tpdos: PdoSet, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
-        for number in tpdos.iter() {
-            let Some(tpdo) = self.tpdos.get_mut(usize::from(number)) else { return };
+    /// Visits the TPDOs of a chain. What one of them could not send at once moves the next deadline.
+    pub(super) fn each_tpdo(&mut self, chain: Chain, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
+        let mut links = self.first_tpdos;
+        while let Some(tpdo) = self.tpdos.get_mut(links.next(chain)) {
             visit(tpdo, &self.image);
             if tpdo.is_pending() {
                 self.process_due = STALE;
             }
+            links = tpdo.links;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Services: SDO, heartbeat, EMCY and LSS.
 
-use super::{Application, Device};
+use super::{Application, Device, Next};
 use crate::lss;
 use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Frame, Instant, Transmit};
@@ -12,9 +12,11 @@ const ERROR_CONTROL: u16 = 0x700;
 /// Frames for which a block upload leaves room in the queue: all PDOs of a SYNC, a heartbeat, an EMCY.
 const RESERVED_ROOM: usize = 10;
 
-impl<A: Application, const N: usize> Device<A, N> {
-    /// A frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
-    pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
+    /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
+    pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         if frame.id() == self.core.service(SDO_REQUEST).get() {
             self.on_sdo(frame, now, out);
         } else if frame.id() == lss::REQUEST.get() {
@@ -22,6 +24,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         } else if frame.id() & 0x780 == ERROR_CONTROL && !A::SERVICES_ONLY {
             self.core.on_heartbeat(frame, now);
         }
+        self.poll_services(now, out)
     }
 
     /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
@@ -78,12 +81,12 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
     }
 
-    /// Sends what is due. Returns the instant of the next call.
-    pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+    /// Sends what is due of the services, and hands over what is left to the caller.
+    pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.core.services_due {
             self.send_services(now, out);
         }
-        self.core.services_due
+        self.services_next()
     }
 
     #[inline(never)]

@@ -1,33 +1,14 @@
 //! NMT state, resets, and the reactions to errors.
 
 use super::pdos::low_half;
-use super::{Application, Core, Device, Job, STALE};
+use super::{Action, Application, Core, Device, Next, STALE};
 use crate::dictionary::{Entry, Group};
-use crate::emcy::Fault;
-use crate::lss::BitRate;
 use crate::nmt::{Command, State};
 use crate::transmit::Turn;
 use crate::{CanId, Instant, NodeId, Transmit};
 
 /// 1F80h: the one value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
-
-/// Something that is left to the caller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// NMT reset node: restart everything, or at least call [`Device::start`].
-    ResetNode,
-    /// NMT reset communication: discard frames that still wait to be sent, then call [`Device::start`].
-    ResetCommunication,
-    /// The sets of identifiers to receive have changed.
-    Identifiers,
-    /// Run the bus at this bit rate from now on.
-    BitRate(BitRate),
-    /// Go to the bootloader; the request for it is not answered.
-    Bootloader,
-    /// Store something, then call [`Device::finish`].
-    Store(Job),
-}
 
 /// What [`Device::start`] has to initialise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +31,7 @@ impl Scope {
         match self {
             Scope::Everything => true,
             Scope::Communication => entry.index() < 0x2000,
-            Scope::Group(group) => entry.attributes.group == group,
+            Scope::Group(group) => entry.attributes.group == Some(group),
         }
     }
 }
@@ -58,20 +39,23 @@ impl Scope {
 /// What waits for the caller.
 #[derive(Debug)]
 pub(super) struct Pending {
+    /// Something of the following is there to be handed over.
+    is_waiting: bool,
     /// What the next start covers; told to the caller once.
     reset: Reset,
     reset_untold: bool,
-    pub(super) identifiers: bool,
-    pub(super) parameters: bool,
+    identifiers: bool,
+    parameters: bool,
     /// The state to which the first values lead, where 1F80h asks for it: no PDO carries what nobody has measured.
     with_values: Option<State>,
     /// Of LSS or of program control.
-    pub(super) request: Option<Action>,
+    request: Option<Action>,
 }
 
 impl Pending {
     pub(super) const fn new() -> Pending {
         Pending {
+            is_waiting: false,
             reset: Reset::Node,
             reset_untold: false,
             identifiers: false,
@@ -80,26 +64,49 @@ impl Pending {
             request: None,
         }
     }
+
+    fn has_action(&self) -> bool {
+        self.reset_untold || self.identifiers || self.request.is_some()
+    }
+
+    /// Asks the caller for something.
+    pub(super) fn ask(&mut self, action: Action) {
+        (self.request, self.is_waiting) = (Some(action), true);
+    }
+
+    /// A job waits to be handed over.
+    pub(super) fn has_job(&mut self) {
+        self.is_waiting = true;
+    }
+
+    pub(super) fn identifiers_changed(&mut self) {
+        (self.identifiers, self.is_waiting) = (true, true);
+    }
+
+    pub(super) fn parameters_changed(&mut self) {
+        (self.parameters, self.is_waiting) = (true, true);
+    }
 }
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// Initialises what the last reset covers (at first everything) and boots up; if 1F80h says so, the device starts by
-    /// itself with the next [`changed`](Device::changed). A node-ID that LSS has configured is taken now; without one, the
+    /// itself with the next [`publish`](Device::publish). A node-ID that LSS has configured is taken now; without one, the
     /// device waits for LSS.
-    pub fn start(&mut self, now: Instant, out: &mut impl Transmit) {
+    pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         self.forget_transfer();
         self.lss.reset();
         self.core.enter(State::Initialising);
         self.core.node_id = self.lss.pending().node_id;
         self.core.load();
-        if self.core.node_id.is_none() {
-            return;
+        if self.core.node_id.is_some() {
+            self.core.configure(now);
+            self.core.enter(State::PreOperational);
+            let starts = !A::SERVICES_ONLY && self.core.number(0x1F80, 0) == SELF_START;
+            self.core.pending.with_values = starts.then_some(State::Operational);
         }
-        self.core.configure(now);
-        self.core.enter(State::PreOperational);
-        let starts = !A::SERVICES_ONLY && self.core.number(0x1F80, 0) == SELF_START;
-        self.core.pending.with_values = starts.then_some(State::Operational);
-        self.poll_services(now, out);
+        self.poll_services(now, out)
     }
 
     /// There are values now. A device with an error, or one that its master has already told a state, does not start.
@@ -112,12 +119,36 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     /// Takes the values that [`start`](Device::start) will begin with: for parameters that are needed before there is a bus.
-    pub fn prepare(&mut self) {
+    pub fn load(&mut self) {
         self.core.load();
     }
 
+    /// What follows from a call of the process half.
+    pub(super) fn process_next(&self) -> Next {
+        let Core { process_due, services_due, .. } = self.core;
+        Next { process: process_due, services: services_due, action: None, parameters: false }
+    }
+
+    /// What follows from a call of the services half.
+    pub(super) fn services_next(&mut self) -> Next {
+        let next = self.process_next();
+        if self.core.pending.is_waiting { self.hand_over() } else { next }
+    }
+
+    #[inline(never)]
+    fn hand_over(&mut self) -> Next {
+        let parameters = core::mem::take(&mut self.core.pending.parameters);
+        let action = self.take_action();
+        let is_waiting = self.core.pending.has_action() || self.core.jobs.is_untold();
+        self.core.pending.is_waiting = is_waiting;
+        if is_waiting {
+            self.core.services_due = STALE;
+        }
+        Next { action, parameters, ..self.process_next() }
+    }
+
     /// The next thing that is left to the caller.
-    pub fn take_action(&mut self) -> Option<Action> {
+    fn take_action(&mut self) -> Option<Action> {
         let pending = &mut self.core.pending;
         if core::mem::take(&mut pending.reset_untold) {
             return Some(match pending.reset {
@@ -132,11 +163,6 @@ impl<A: Application, const N: usize> Device<A, N> {
             return Some(Action::Identifiers);
         }
         self.core.jobs.take_untold().map(Action::Store)
-    }
-
-    /// Whether application parameters have changed since the last call; they have after a start.
-    pub fn take_parameters_changed(&mut self) -> bool {
-        core::mem::take(&mut self.core.pending.parameters)
     }
 
     pub(super) fn command(&mut self, command: Command) {
@@ -162,29 +188,11 @@ impl<A: Application, const N: usize> Device<A, N> {
         self.server.reset();
         (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
     }
-
-    /// Sets a fault. It is signalled once, until it is cleared.
-    pub fn raise(&mut self, fault: Fault, now: Instant) {
-        self.core.raise(fault, now);
-    }
-
-    /// Clears a fault.
-    pub fn clear(&mut self, fault: Fault, now: Instant) {
-        self.core.clear(fault, now);
-    }
-
-    /// Reacts to an error as object 1029h says under `sub`: 1 for communication errors, 2 and up for the profile's own.
-    pub fn apply_error_behaviour(&mut self, sub: u8) {
-        match self.core.number(0x1029, sub) {
-            0 if self.core.state == State::Operational => self.core.enter(State::PreOperational),
-            2 if self.core.state.has_services() => self.core.enter(State::Stopped),
-            _ => (),
-        }
-        self.silence_services();
-    }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// A device that had no node-ID has got one. Whoever calls the device starts it again.
     pub(super) fn begin_join(&mut self) {
         self.begin_reset(Reset::Communication);
@@ -197,7 +205,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     fn begin_reset(&mut self, reset: Reset) {
         self.enter(State::Initialising);
-        (self.pending.reset, self.pending.reset_untold) = (reset, true);
+        (self.pending.reset, self.pending.reset_untold, self.pending.is_waiting) = (reset, true, true);
     }
 
     pub(super) fn enter(&mut self, state: State) {
@@ -209,6 +217,7 @@ impl<A: Application, const N: usize> Core<A, N> {
         if !A::SERVICES_ONLY {
             self.enter_process(state);
         }
+        self.application.state(state, &mut self.image);
     }
 
     fn enter_process(&mut self, state: State) {
@@ -234,7 +243,7 @@ impl<A: Application, const N: usize> Core<A, N> {
             self.load_parameters();
         }
         self.application.initialise(&mut self.image);
-        self.pending = Pending { identifiers: true, parameters: true, ..Pending::new() };
+        self.pending = Pending { identifiers: true, parameters: true, is_waiting: true, ..Pending::new() };
     }
 
     fn load_parameters(&mut self) {
@@ -275,28 +284,6 @@ impl<A: Application, const N: usize> Core<A, N> {
         self.emcy.restart(now);
         self.report_stored(now);
         self.update_error_register();
-    }
-
-    // Called from many places that are in no hurry.
-    #[inline(never)]
-    pub(super) fn raise(&mut self, fault: Fault, now: Instant) {
-        if self.emcy.raise(fault, now) {
-            self.update_error_register();
-            self.services_due = STALE;
-        }
-    }
-
-    #[inline(never)]
-    pub(super) fn clear(&mut self, fault: Fault, now: Instant) {
-        self.emcy.clear(fault, now);
-        self.update_error_register();
-        self.services_due = STALE;
-    }
-
-    fn update_error_register(&mut self) {
-        if let Ok(entry) = self.dictionary.find(0x1001, 0) {
-            entry.field.store(&mut self.image, [self.emcy.register()]);
-        }
     }
 }
 

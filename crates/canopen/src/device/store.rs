@@ -3,8 +3,8 @@
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
 use super::state::Scope;
-use super::{Action, Application, Core, Device};
-use crate::dictionary::{Entry, Group, Rule};
+use super::{Action, Application, Core, Device, Next, STALE};
+use crate::dictionary::{Entry, Group, Groups, Rule};
 use crate::emcy::Fault;
 use crate::lss::{self, Configuration, Slave};
 use crate::sdo::Abort;
@@ -19,52 +19,18 @@ const STOP_PROGRAM: u32 = 0;
 const START_PROGRAM: u32 = 1;
 const RESET_PROGRAM: u32 = 2;
 
-/// Storage groups, by the sub-index of 1010h or 1011h.
+/// Something to be stored or restored. The job is done when [`Device::finish`] says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Selection {
-    /// Sub-index 1: communication and application.
-    All,
-    /// Sub-index 2.
-    Communication,
-    /// Sub-index 3.
-    Application,
-    /// None of 1010h: what [`Rule::StoreCalibration`] stores.
-    Calibration,
-}
-
-impl Selection {
-    fn of_sub(sub: u8) -> Option<Selection> {
-        Some(match sub {
-            1 => Selection::All,
-            2 => Selection::Communication,
-            3 => Selection::Application,
-            _ => return None,
-        })
-    }
-
-    /// Whether the group is one of them.
-    #[must_use]
-    pub fn contains(self, group: Group) -> bool {
-        match self {
-            Selection::All => matches!(group, Group::Communication | Group::Application),
-            Selection::Communication => group == Group::Communication,
-            Selection::Application => group == Group::Application,
-            Selection::Calibration => group == Group::Calibration,
-        }
-    }
-}
-
-/// Something to be stored. It is done when [`Device::finish`] says so.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Job {
     /// Store the present values of these groups.
-    Save(Selection),
-    /// Forget what is stored of these groups.
-    Restore(Selection),
+    Store(Groups),
+    /// Restore the defaults of these groups with the next reset: forget what is stored of them.
+    Restore(Groups),
     /// Store node-ID and bit rate.
     Configure(Configuration),
-    /// Store the value of the entry with [`Rule::Setting`].
-    Set(u8),
+    /// Store the value of the entry that is a [`setting`](crate::dictionary::Object::setting).
+    Setting(u8),
 }
 
 /// What is stored of a group.
@@ -102,6 +68,11 @@ impl Jobs {
         Ok(())
     }
 
+    /// Whether the caller has not been told of the job.
+    pub(super) fn is_untold(&self) -> bool {
+        self.running.is_some() && self.is_untold
+    }
+
     /// The job, once.
     pub(super) fn take_untold(&mut self) -> Option<Job> {
         self.running.filter(|_| core::mem::take(&mut self.is_untold))
@@ -113,9 +84,11 @@ impl Jobs {
     }
 }
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// The job is done, or cannot be: whoever waits for it is answered.
-    pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) {
+    pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
         let turn = &mut self.turn(now, out);
         if lss_waits {
@@ -124,6 +97,8 @@ impl<A: Application, const N: usize> Device<A, N> {
         if self.server.release(result, now) {
             self.respond(turn);
         }
+        self.core.services_due = STALE;
+        self.process_next()
     }
 }
 
@@ -133,13 +108,15 @@ impl Default for Jobs {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// Begins the job that a write to 1010h or 1011h asks for.
     pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
-        let selection = Selection::of_sub(entry.sub()).ok_or(Abort::Access)?;
+        let groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;
         let job = match (entry.rule(), value) {
-            (Rule::Store, SAVE) => Job::Save(selection),
-            (Rule::Restore, LOAD) => Job::Restore(selection),
+            (Rule::Store, SAVE) => Job::Store(groups),
+            (Rule::Restore, LOAD) => Job::Restore(groups),
             _ => return Err(Abort::NotStored),
         };
         self.begin_deferred(job)
@@ -147,7 +124,7 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// The same for the calibration. There is no way back to the defaults: they are those of no device.
     pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
-        let job = Job::Save(Selection::Calibration);
+        let job = Job::Store(Groups::one(Group::Calibration));
         if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
     }
 
@@ -155,6 +132,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn store_configuration(&mut self, configuration: Configuration) -> Option<lss::Response> {
         let is_begun = !A::SERVICES_ONLY && self.jobs.begin(Job::Configure(configuration)).is_ok();
         self.jobs.lss_waits |= is_begun;
+        self.pending.has_job();
         (!is_begun).then_some(Slave::stored(false))
     }
 
@@ -162,6 +140,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn begin_deferred(&mut self, job: Job) -> Result<(), Abort> {
         self.jobs.begin(job)?;
         self.jobs.is_deferred = true;
+        self.pending.has_job();
         Ok(())
     }
 
@@ -169,7 +148,7 @@ impl<A: Application, const N: usize> Core<A, N> {
     pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
         match value {
             STOP_PROGRAM | RESET_PROGRAM => {
-                self.pending.request = Some(Action::Bootloader);
+                self.pending.ask(Action::Bootloader);
                 self.jobs.is_deferred = true;
                 Ok(())
             }
@@ -195,41 +174,9 @@ impl<A: Application, const N: usize> Core<A, N> {
 
     /// Says on the bus what could not be loaded.
     pub(super) fn report_stored(&mut self, now: Instant) {
-        let faults = [
-            (Group::Communication, Fault::CommunicationData),
-            (Group::Application, Fault::ApplicationData),
-            (Group::Calibration, Fault::CalibrationData),
-        ];
-        for (group, fault) in faults {
-            if self.unsound.get(group) { self.raise(fault, now) } else { self.clear(fault, now) }
-        }
-    }
-}
-
-/// The groups whose stored values were not loaded as they should.
-#[derive(Debug, Default)]
-pub(super) struct Unsound {
-    communication: bool,
-    application: bool,
-    calibration: bool,
-}
-
-impl Unsound {
-    fn set(&mut self, group: Group, is_unsound: bool) {
-        match group {
-            Group::Communication => self.communication = is_unsound,
-            Group::Application => self.application = is_unsound,
-            Group::Calibration => self.calibration = is_unsound,
-            Group::Volatile => (),
-        }
-    }
-
-    fn get(&self, group: Group) -> bool {
-        match group {
-            Group::Communication => self.communication,
-            Group::Application => self.application,
-            Group::Calibration => self.calibration,
-            Group::Volatile => false,
+        for group in Group::ALL {
+            let fault = Fault::StoredData(group);
+            if self.unsound.contains(group) { self.raise(fault, now) } else { self.clear(fault, now) }
         }
     }
 }

@@ -1,17 +1,17 @@
 //! The heartbeats of other nodes: object 1016h and what follows when one is missing.
 
-use super::{Application, Core, Device};
+use super::{Application, Core, Device, ErrorClass};
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
-use crate::heartbeat::{Change, WATCHES, Watch};
+use crate::heartbeat::{Change, Watch};
 use crate::sdo::Abort;
 use crate::{Frame, Instant};
 
 const CONSUMER_TIME: u16 = 0x1016;
-/// Sub-index of 1029h for communication errors.
-const COMMUNICATION_ERROR: u8 = 1;
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// Looks for heartbeats that are missing.
     pub(super) fn poll_watches(&mut self, now: Instant) {
         if self.core.is_initialising() {
@@ -19,12 +19,14 @@ impl<A: Application, const N: usize> Device<A, N> {
         }
         while let Some(change) = self.core.watches.expire(now) {
             self.core.on_watch(change, now);
-            self.apply_error_behaviour(COMMUNICATION_ERROR);
+            self.apply_error(ErrorClass::COMMUNICATION);
         }
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     #[inline(never)]
     pub(super) fn on_heartbeat(&mut self, frame: &Frame, now: Instant) {
         if self.is_initialising() {
@@ -61,13 +63,14 @@ impl<A: Application, const N: usize> Core<A, N> {
     /// A new watch knows of no fault yet.
     pub(super) fn configure_watch(&mut self, sub: u8, now: Instant) {
         let number = sub.saturating_sub(1);
-        self.watches.configure(number.into(), self.watch(sub));
-        self.clear(Fault::Heartbeat(number), now);
+        if self.watches.configure(number.into(), self.watch(sub)) {
+            self.clear(Fault::Heartbeat(number), now);
+        }
     }
 
     pub(super) fn configure_watches(&mut self, now: Instant) {
-        for number in 0..WATCHES {
-            self.configure_watch(number + 1, now);
+        for sub in (1..=u8::MAX).take(W) {
+            self.configure_watch(sub, now);
         }
     }
 }

@@ -1,24 +1,19 @@
 //! What must be true of a table, so that everything at run time can rely on it. The panics here are compile errors.
 
 use super::compile::{effective_limits, event_timer};
-use super::{Access, DefaultValue, Group, Mapping, Object, Rule, Type, image_size};
-use crate::device::PDOS;
-use crate::pdo::WATCHED;
+use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};
 use crate::sdo::BUFFER;
 
 /// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
-/// are others, attributes that fit together, no more PDOs than a device has room for.
+/// are others, attributes that fit together.
 ///
 /// # Panics
 /// During compilation, when a row is wrong.
 pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    assert!(pdos(rows, 0x1400) <= PDOS, "more RPDOs than a device has");
-    assert!(pdos(rows, 0x1800) <= PDOS, "more TPDOs than a device has");
-    let (mut i, mut sent) = (0, 0);
+    let mut i = 0;
     while i < rows.len() {
         check_row(&rows[i]);
-        sent += matches!(rows[i].mapping, Mapping::Tpdo) as usize;
         if i > 0 {
             assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
         }
@@ -37,17 +32,6 @@ pub const fn check(rows: &[Object]) {
         }
         i += 1;
     }
-    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
-}
-
-/// PDOs with communication objects among the 512 indexes from `first` on.
-const fn pdos(rows: &[Object], first: u16) -> usize {
-    let (mut total, mut i) = (0, 0);
-    while i < rows.len() {
-        let is_one = rows[i].index & 0xFE00 == first && rows[i].sub == 1;
-        (total, i) = (total + is_one as usize, i + 1);
-    }
-    total
 }
 
 const fn has(rows: &[Object], key: u32) -> bool {
@@ -76,26 +60,23 @@ const fn check_row(row: &Object) {
             assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
         }
         (DefaultValue::NodeId(_), Type::Unsigned32) => (),
-        (DefaultValue::None, Type::Domain) => {
-            assert!(matches!(row.rule, Rule::Application(_)), "a domain belongs to the application");
-        }
+        (DefaultValue::None, Type::Domain) => (),
         _ => panic!("the default is of another type"),
     }
     let mappable = !matches!(row.mapping, Mapping::No);
     let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
     assert!(!mappable || fits, "a mapped object has no place in a PDO");
     assert!(!mappable || row.stored_size() > 0, "a mapped object has no place in the image");
-    let saved = !matches!(row.group, Group::Volatile);
-    assert!(!saved || matches!(row.access, Access::ReadWrite), "only a parameter can be saved");
-    let tpdo = matches!(row.mapping, Mapping::Tpdo);
-    assert!(!tpdo || row.access.is_readable(), "a TPDO sends what can be read");
-    let rpdo = matches!(row.mapping, Mapping::Rpdo);
-    // An RPDO writes without a check, so what it writes must have none: any value of an integer type.
-    let takes_any = matches!(row.rule, Rule::Plain) && row.limits.is_none() && row.kind.range().is_some();
-    assert!(!rpdo || (row.access.is_writable() && takes_any), "an RPDO writes what takes any value");
-    let is_byte = matches!(row.kind, Type::Unsigned8);
-    assert!(!matches!(row.rule, Rule::Setting) || is_byte, "a setting is a number of eight bits");
-    let is_time = matches!(row.kind, Type::Unsigned16) && matches!(row.group, Group::Volatile);
+    assert!(row.group.is_none() || matches!(row.access, Access::ReadWrite), "only a parameter can be stored");
+    assert!(!row.mapping.allows_tpdo() || row.access.is_readable(), "a TPDO sends what can be read");
+    assert!(!row.mapping.allows_rpdo() || row.access.is_writable(), "an RPDO writes what can be written");
+    let takes_values = matches!(row.rule, Rule::Plain | Rule::Application);
+    assert!(!row.mapping.allows_rpdo() || takes_values, "an RPDO writes no object of the protocol");
+    match row.rule.size() {
+        Some(size) => assert!(row.kind.size() == size, "the object has another type"),
+        None => (),
+    }
+    let is_time = matches!(row.kind, Type::Unsigned16) && row.group.is_none();
     assert!(
         !matches!(row.rule, Rule::EventTimerOf(_)) || is_time,
         "an event timer is saved under its own index"

@@ -11,7 +11,7 @@ pub(crate) struct Attributes {
     pub(crate) kind: Type,
     pub(crate) access: Access,
     pub(crate) mapping: Mapping,
-    pub(crate) group: Group,
+    pub(crate) group: Option<Group>,
     pub(crate) rule: Rule,
     /// The default value counts from the node-ID.
     pub(crate) node_relative: bool,
@@ -47,6 +47,23 @@ impl Entry {
 
     pub(crate) const fn rule(&self) -> Rule {
         self.attributes.rule
+    }
+
+    /// Whether any value of its size will do: then a PDO is copied to its place without a look.
+    pub(crate) const fn takes_any(&self) -> bool {
+        matches!(self.attributes.rule, Rule::Plain)
+            && self.attributes.limits.is_none(self.field.size)
+            && !matches!(self.attributes.kind, Type::Real32)
+    }
+
+    /// Whether the content is the application's, of any length.
+    pub(crate) const fn is_domain(&self) -> bool {
+        matches!(self.attributes.kind, Type::Domain)
+    }
+
+    /// Whether the value is a parameter of the application.
+    pub(crate) const fn is_parameter(&self) -> bool {
+        matches!(self.attributes.group, Some(Group::Application | Group::Calibration))
     }
 
     pub(crate) const fn is_writable(&self) -> bool {

@@ -5,19 +5,21 @@ use super::compile::{effective_limits, event_timer, object_len, series_len};
 use super::entry::Attributes;
 use super::limits::Limits;
 use super::tables::{Place, Series};
-use super::{Counts, DefaultValue, Object, Rule, image_size};
+use super::{Counts, DefaultValue, Group, Object, Rule, image_size};
 
 /// Room for tables, and how much of it is filled.
 pub(super) struct Filling {
     pub(super) series: [Series; MOST],
     pub(super) places: [Place; MOST],
     pub(super) attributes: [Attributes; MOST_ATTRIBUTES],
-    pub(super) defaults: [u8; 4 * MOST],
+    pub(super) defaults: [u8; MOST_DEFAULTS],
     pub(super) filled: Counts,
 }
 
 /// More series or places than these do not compile.
 const MOST: usize = 1024;
+/// As large as the largest image.
+const MOST_DEFAULTS: usize = 1 << 16;
 /// A place names its attributes in a byte.
 const MOST_ATTRIBUTES: usize = 256;
 
@@ -29,7 +31,7 @@ impl Filling {
                 MOST],
             places: [Place { sub: 0, attributes: 0, offset: 0 }; MOST],
             attributes: [attributes(&all[0][0]); MOST_ATTRIBUTES],
-            defaults: [0; 4 * MOST],
+            defaults: [0; MOST_DEFAULTS],
             filled: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
         };
         let mut i = 0;
@@ -158,8 +160,16 @@ pub(super) const fn is_same(a: &Attributes, b: &Attributes) -> bool {
         && a.rule.code() == b.rule.code()
         && a.access as u8 == b.access as u8
         && a.mapping as u8 == b.mapping as u8
-        && a.group as u8 == b.group as u8
+        && group_code(a.group) == group_code(b.group)
         && a.node_relative == b.node_relative
+}
+
+/// A number for a group, as constant functions cannot compare groups.
+pub(super) const fn group_code(group: Option<Group>) -> u8 {
+    match group {
+        None => u8::MAX,
+        Some(group) => group as u8,
+    }
 }
 
 pub(super) const fn attributes(row: &Object) -> Attributes {

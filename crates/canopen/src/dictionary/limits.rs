@@ -27,6 +27,11 @@ impl Limits {
         Limits { low, span: high.wrapping_sub(low) }
     }
 
+    /// Whether any value of this size is within them.
+    pub(super) const fn is_none(self, size: u8) -> bool {
+        self.span == u32::MAX || self.span == shifted(size, u32::MAX)
+    }
+
     pub(super) const fn is_same(self, other: Limits) -> bool {
         self.low == other.low && self.span == other.span
     }

@@ -1,6 +1,6 @@
 //! One row of a dictionary table: everything there is to say about an entry, documentation included.
 
-use super::Type;
+use super::{Group, Rule, Type};
 
 /// Access by SDO (CiA 306).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,19 +38,22 @@ pub enum Mapping {
     Tpdo,
     /// RPDOs only.
     Rpdo,
+    /// PDOs of both directions.
+    Both,
 }
 
-/// With which parameters an entry is saved and restored (objects 1010h, 1011h).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
-    /// Not saved.
-    Volatile,
-    /// Communication parameters, sub-index 2.
-    Communication,
-    /// Application parameters, sub-index 3.
-    Application,
-    /// Calibration, saved by [`Rule::StoreCalibration`]: 1010h and 1011h do not touch it.
-    Calibration,
+impl Mapping {
+    /// Whether a TPDO can carry the entry.
+    #[must_use]
+    pub const fn allows_tpdo(self) -> bool {
+        matches!(self, Mapping::Tpdo | Mapping::Both)
+    }
+
+    /// Whether an RPDO can write the entry.
+    #[must_use]
+    pub const fn allows_rpdo(self) -> bool {
+        matches!(self, Mapping::Rpdo | Mapping::Both)
+    }
 }
 
 /// The value after a reset with nothing saved.
@@ -66,123 +69,6 @@ pub enum DefaultValue {
     NodeId(u32),
     /// Of DOMAIN: the application's.
     None,
-}
-
-/// What an entry does beyond holding a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// Nothing.
-    Plain,
-    /// 1003h:0, number of errors; writing 0 clears the list.
-    ErrorCount,
-    /// 1003h:1 and up, an error of the list.
-    ErrorEntry,
-    /// 1005h, COB-ID of SYNC.
-    SyncCobId,
-    /// 1006h, communication cycle period.
-    SyncPeriod,
-    /// 1007h, synchronous window length.
-    SyncWindow,
-    /// 1010h:1 and up, store parameters.
-    Store,
-    /// 1011h:1 and up, restore default parameters.
-    Restore,
-    /// 1014h, COB-ID of EMCY.
-    EmcyCobId,
-    /// 1015h, inhibit time of EMCY.
-    EmcyInhibit,
-    /// 1016h:1 and up, a node whose heartbeat is watched.
-    HeartbeatWatch,
-    /// 1017h, heartbeat producer time.
-    HeartbeatTime,
-    /// 1019h, synchronous counter overflow value.
-    SyncOverflow,
-    /// 1F51h:1, program control of a program that runs (CiA 302-3).
-    ProgramControl,
-    /// 1F80h, NMT start-up.
-    StartUp,
-    /// 1400h.., 1800h..:1, COB-ID of a PDO.
-    PdoCobId,
-    /// The same of a PDO to which a profile has given its CAN-ID: only the flags change. The profile may have chosen a
-    /// CAN-ID that CiA 301 restricts, as CiA 417 does with 180h.
-    PdoPredefined,
-    /// 1400h.., 1800h..:2, transmission type.
-    PdoType,
-    /// 1800h..:3, inhibit time.
-    PdoInhibit,
-    /// 1400h.., 1800h..:5, event timer.
-    PdoEventTimer,
-    /// 1800h..:6, SYNC start value.
-    PdoSyncStart,
-    /// Another name of 1800h..:5, the event timer of this TPDO, from 0: the cyclic timer of a device profile. Both have
-    /// one place in the image.
-    EventTimerOf(u8),
-    /// 1600h.., 1A00h..:0, number of mapped objects.
-    PdoCount,
-    /// 1600h.., 1A00h..:1 and up, a mapped object.
-    PdoSlot,
-    /// 1FA0h:1 and up, a line of the object scanner list.
-    ScannerLine,
-    /// Stores the calibration, as 1010h does the other parameters.
-    StoreCalibration,
-    /// A setting that is stored at once: a write is answered when it is, and the application then shows it.
-    Setting,
-    /// The application decides, by this number.
-    Application(u8),
-}
-
-impl Rule {
-    /// Whether what is written is a command: the value that is read stays.
-    pub(crate) const fn is_command(self) -> bool {
-        matches!(
-            self,
-            Rule::Store | Rule::Restore | Rule::StoreCalibration | Rule::ProgramControl | Rule::Setting
-        )
-    }
-
-    /// A number of its own, as constant functions cannot compare rules.
-    pub(super) const fn code(self) -> u16 {
-        match self {
-            Rule::Plain => 0,
-            Rule::ErrorCount => 1,
-            Rule::ErrorEntry => 2,
-            Rule::SyncCobId => 3,
-            Rule::SyncPeriod => 4,
-            Rule::SyncWindow => 5,
-            Rule::Store => 6,
-            Rule::Restore => 7,
-            Rule::EmcyCobId => 8,
-            Rule::EmcyInhibit => 9,
-            Rule::HeartbeatWatch => 10,
-            Rule::HeartbeatTime => 11,
-            Rule::SyncOverflow => 12,
-            Rule::ProgramControl => 13,
-            Rule::StartUp => 14,
-            Rule::PdoCobId => 15,
-            Rule::PdoPredefined => 16,
-            Rule::PdoType => 17,
-            Rule::PdoInhibit => 18,
-            Rule::PdoEventTimer => 19,
-            Rule::PdoSyncStart => 20,
-            Rule::PdoCount => 21,
-            Rule::PdoSlot => 22,
-            Rule::ScannerLine => 23,
-            Rule::StoreCalibration => 24,
-            Rule::Setting => 25,
-            Rule::EventTimerOf(number) => 0x100 | number as u16,
-            Rule::Application(number) => 0x200 | number as u16,
-        }
-    }
-
-    /// Whether the value has a place of its own in the image.
-    pub(crate) const fn has_place(self) -> bool {
-        !matches!(self, Rule::ErrorCount | Rule::ErrorEntry | Rule::EventTimerOf(_))
-    }
-
-    /// Whether the value lives outside the image.
-    pub(crate) const fn is_computed(self) -> bool {
-        matches!(self, Rule::ErrorCount | Rule::ErrorEntry)
-    }
 }
 
 /// One row: an entry with all its attributes.
@@ -204,16 +90,16 @@ pub struct Object {
     pub limits: Option<(i64, i64)>,
     /// Value after a reset.
     pub default: DefaultValue,
-    /// Storage group.
-    pub group: Group,
+    /// The group with which the value is stored; `None` for a value that no job stores.
+    pub group: Option<Group>,
     /// Physical unit, for documents; empty where there is none.
     pub unit: &'static str,
-    /// Special behaviour.
+    /// What the entry does beyond holding a value.
     pub rule: Rule,
 }
 
 impl Object {
-    /// A row with default 0 and no special attribute.
+    /// A row with default 0 and no special attribute. The rule of an object of CiA 301 follows from its index.
     #[must_use]
     pub const fn new(index: u16, sub: u8, name: &'static str, kind: Type, access: Access) -> Object {
         let default = match kind {
@@ -222,7 +108,7 @@ impl Object {
             Type::Domain => DefaultValue::None,
             _ => DefaultValue::Integer(0),
         };
-        let (mapping, group, rule) = (Mapping::No, Group::Volatile, Rule::Plain);
+        let (mapping, group, rule) = (Mapping::No, None, Rule::of(index, sub));
         Object { index, sub, name, kind, access, mapping, limits: None, default, group, unit: "", rule }
     }
 
@@ -258,10 +144,10 @@ impl Object {
         self
     }
 
-    /// Sets the storage group.
+    /// Makes it a parameter that is stored with a group.
     #[must_use]
-    pub const fn saved(mut self, group: Group) -> Object {
-        self.group = group;
+    pub const fn stored(mut self, group: Group) -> Object {
+        self.group = Some(group);
         self
     }
 
@@ -279,9 +165,44 @@ impl Object {
         self
     }
 
-    /// Sets the special behaviour.
+    /// Lets the application decide on each write ([`Application::write`](crate::Application::write)).
     #[must_use]
-    pub const fn rule(mut self, rule: Rule) -> Object {
+    pub const fn handled(self) -> Object {
+        self.with(Rule::Application)
+    }
+
+    /// Fixes the CAN-ID of a PDO to the default: only the flags of the COB-ID change. A device profile pre-defines such a
+    /// PDO, and may choose a CAN-ID that CiA 301 restricts, as CiA 417 does with 180h.
+    ///
+    /// # Panics
+    /// During compilation, for an entry that is no COB-ID of a PDO.
+    #[must_use]
+    pub const fn predefined(self) -> Object {
+        assert!(matches!(self.rule, Rule::PdoCobId), "only the COB-ID of a PDO is pre-defined");
+        self.with(Rule::PdoPredefined)
+    }
+
+    /// Makes the entry another name of the event timer of a TPDO (1800h + `tpdo`, sub-index 5), as the cyclic timer of
+    /// CiA 406 is. Both names have one place in the image.
+    #[must_use]
+    pub const fn event_timer_of(self, tpdo: u8) -> Object {
+        self.with(Rule::EventTimerOf(tpdo))
+    }
+
+    /// Makes the entry a setting of eight bits that is stored at once: a write is answered when the value is stored
+    /// ([`Job::Setting`](crate::Job::Setting)), and the application then shows the value.
+    #[must_use]
+    pub const fn setting(self) -> Object {
+        self.with(Rule::Setting)
+    }
+
+    /// Makes the entry the command that stores the calibration, as 1010h stores the other groups.
+    #[must_use]
+    pub const fn stores_calibration(self) -> Object {
+        self.with(Rule::StoreCalibration)
+    }
+
+    const fn with(mut self, rule: Rule) -> Object {
         self.rule = rule;
         self
     }

@@ -15,6 +15,7 @@
 use super::entry::little_endian;
 use super::{DefaultValue, Dictionary, Entry, Group, Object};
 use crate::NodeId;
+use crate::copy::copy;
 use crate::sdo::Abort;
 
 /// Bytes before the values of a run.
@@ -23,6 +24,14 @@ const HEAD: usize = 5;
 /// The buffer had no room for all values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferFull;
+
+impl core::fmt::Display for BufferFull {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the buffer has no room for all values of the group")
+    }
+}
+
+impl core::error::Error for BufferFull {}
 
 /// The most bytes that the group of a table takes when packed.
 #[must_use]
@@ -40,7 +49,7 @@ pub const fn packed_size(rows: &[Object], group: Group) -> usize {
 }
 
 const fn is_of(row: &Object, group: Group) -> bool {
-    row.group as u8 == group as u8
+    matches!(row.group, Some(own) if own as u8 == group as u8)
 }
 
 const fn is_next(a: &Object, b: &Object) -> bool {
@@ -49,8 +58,8 @@ const fn is_next(a: &Object, b: &Object) -> bool {
 }
 
 impl Dictionary {
-    /// Appends the values of a group to `out`. A COB-ID that is still the default of this node-ID is left out: it goes
-    /// on following the node-ID.
+    /// Writes the values of a group to the beginning of `out`; how many bytes that takes. A COB-ID that is still the default of
+    /// this node-ID is left out: it goes on following the node-ID.
     ///
     /// # Errors
     /// `BufferFull`; what is in `out` then is of no use.
@@ -59,24 +68,26 @@ impl Dictionary {
         group: Group,
         node_id: Option<NodeId>,
         image: &[u8],
-        out: &mut heapless::VecView<u8>,
-    ) -> Result<(), BufferFull> {
-        let is_kept =
-            |entry: &Entry| entry.attributes.group == group && !self.follows_node_id(entry, node_id, image);
+        out: &mut [u8],
+    ) -> Result<usize, BufferFull> {
+        let is_kept = |entry: &Entry| {
+            entry.attributes.group == Some(group) && !self.follows_node_id(entry, node_id, image)
+        };
+        let mut writer = Writer { out, len: 0 };
         let mut last: Option<(Entry, usize)> = None;
         for entry in self.entries().filter(is_kept) {
             let head = match last.filter(|(last, _)| last.is_followed_by(&entry)) {
                 Some((_, head)) => head,
-                None => begin(&entry, out)?,
+                None => writer.begin(&entry)?,
             };
             // The count is the fourth byte of the head; a run has at most as many values as there are sub-indexes.
-            if let Some(count) = out.get_mut(head + 3) {
+            if let Some(count) = writer.out.get_mut(head + 3) {
                 *count = count.wrapping_add(1);
             }
-            out.extend_from_slice(entry.field.get(image)).map_err(|_| BufferFull)?;
+            writer.append(entry.field.get(image))?;
             last = Some((entry, head));
         }
-        Ok(())
+        Ok(writer.len)
     }
 
     /// Takes the values of a packed group into the image.
@@ -103,7 +114,7 @@ impl Dictionary {
         image: &mut [u8],
     ) -> Result<(), Abort> {
         let entry = self.find(index, sub)?;
-        if entry.attributes.group != group || value.len() != usize::from(entry.field.size) {
+        if entry.attributes.group != Some(group) || value.len() != usize::from(entry.field.size) {
             return Err(Abort::Length);
         }
         entry.check_value(little_endian(value))?;
@@ -124,12 +135,27 @@ impl Entry {
     }
 }
 
-/// Begins a run of no values yet; returns the place of its head.
-fn begin(entry: &Entry, out: &mut heapless::VecView<u8>) -> Result<usize, BufferFull> {
-    let at = out.len();
-    let [low, high] = entry.index().to_le_bytes();
-    out.extend_from_slice(&[low, high, entry.sub(), 0, entry.field.size]).map_err(|_| BufferFull)?;
-    Ok(at)
+/// The buffer, and how much of it is written.
+struct Writer<'a> {
+    out: &'a mut [u8],
+    len: usize,
+}
+
+impl Writer<'_> {
+    /// Begins a run of no values yet; returns the place of its head.
+    fn begin(&mut self, entry: &Entry) -> Result<usize, BufferFull> {
+        let at = self.len;
+        let [low, high] = entry.index().to_le_bytes();
+        self.append(&[low, high, entry.sub(), 0, entry.field.size])?;
+        Ok(at)
+    }
+
+    fn append(&mut self, bytes: &[u8]) -> Result<(), BufferFull> {
+        let end = self.len + bytes.len();
+        copy(self.out.get_mut(self.len..end).ok_or(BufferFull)?, bytes);
+        self.len = end;
+        Ok(())
+    }
 }
 
 struct Run<'a> {

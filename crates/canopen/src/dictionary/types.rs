@@ -3,6 +3,8 @@
 /// A data type that an entry can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
+    /// BOOLEAN, a byte of 0 or 1. A PDO carries it as eight bits.
+    Boolean,
     /// INTEGER8
     Integer8,
     /// INTEGER16
@@ -32,7 +34,7 @@ impl Type {
     #[must_use]
     pub const fn size(self) -> u8 {
         match self {
-            Type::Integer8 | Type::Unsigned8 => 1,
+            Type::Boolean | Type::Integer8 | Type::Unsigned8 => 1,
             Type::Integer16 | Type::Unsigned16 => 2,
             Type::Integer32 | Type::Unsigned32 | Type::Real32 => 4,
             Type::Unsigned48 => 6,
@@ -46,6 +48,7 @@ impl Type {
     #[must_use]
     pub const fn code(self) -> u16 {
         match self {
+            Type::Boolean => 0x01,
             Type::Integer8 => 0x02,
             Type::Integer16 => 0x03,
             Type::Integer32 => 0x04,
@@ -64,6 +67,7 @@ impl Type {
     #[must_use]
     pub const fn range(self) -> Option<(i64, i64)> {
         match self {
+            Type::Boolean => Some((0, 1)),
             Type::Integer8 => Some((i8::MIN as i64, i8::MAX as i64)),
             Type::Integer16 => Some((i16::MIN as i64, i16::MAX as i64)),
             Type::Integer32 => Some((i32::MIN as i64, i32::MAX as i64)),

@@ -1,185 +1,97 @@
-//! Everything that the node can signal as a fault.
+//! Faults: those of communication, which the device finds itself, and those of the application.
 
-/// A fault. Each is set and cleared on its own, also those that exist several times.
+use crate::dictionary::Group;
+
+/// A fault that the device signals by EMCY.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Fault {
-    /// The clock of the sensor.
-    SensorClock,
-    /// The sensor did not start.
-    SensorBoot,
-    /// The sensor's signal is outside what an intact sensor can give.
-    SensorBreak,
-    /// The sensor's memory is corrupt.
-    SensorMemory,
-    /// The temperature input is at a rail of the converter.
-    TemperatureRail,
-    /// The pressure input is at a rail of the converter.
-    PressureRail,
-    /// An encoder does not answer, or not as one.
-    EncoderBreak,
-    /// The encoders take too much current.
-    InputCurrent,
-    /// The supply of the encoders is out of its limits.
-    InputVoltage,
-    /// A memory of the hardware is damaged.
-    HardwareMemory,
-    /// A module did not initialise.
-    ModuleInitialisation,
-    /// The image does not fit the hardware.
-    HardwareIdentification,
-    /// The parameter store cannot be used.
-    ParameterStore,
-    /// The node restarted without having been told to.
-    UnexpectedReset,
-    /// Node-ID and bit rate could not be loaded.
-    BootData,
-    /// Communication parameters could not be loaded.
-    CommunicationData,
-    /// Application parameters could not be loaded.
-    ApplicationData,
-    /// The calibration could not be loaded.
-    CalibrationData,
-    /// A received frame was lost.
+    /// A received frame was lost (8110h).
     Overrun,
-    /// The CAN controller is error passive.
+    /// The CAN controller is error passive (8120h).
     ErrorPassive,
-    /// The CAN controller was off the bus and is back.
+    /// The CAN controller was off the bus and is back (8140h).
     BusOffRecovered,
-    /// SYNC does not come in its period.
+    /// SYNC does not come in its period (8100h).
     SyncMissing,
-    /// A SYNC of another length than 1019h asks for.
+    /// A SYNC had another length than 1019h asks for (8240h).
     SyncLength,
-    /// A multiplexed PDO for this node names an object that takes none.
+    /// A multiplexed PDO for this node names an object that takes none (8230h).
     MpdoNotTaken,
-    /// The heartbeat of a node is missing: entry of 1016h, from 0.
+    /// The heartbeat of a node is missing (8130h): entry of 1016h, from 0.
     Heartbeat(u8),
-    /// An RPDO, counted from 0 among those of the dictionary, was shorter than its mapping and is not processed.
-    RpdoTooShort(u8),
-    /// An RPDO, counted the same way, was longer than its mapping.
-    RpdoTooLong(u8),
-    /// An RPDO, counted the same way, did not come in time.
-    RpdoDeadline(u8),
+    /// An RPDO, counted from 0 among those of the dictionary, was shorter than its mapping and is not processed (8210h).
+    RpdoTooShort(u16),
+    /// An RPDO, counted the same way, was longer than its mapping (8220h).
+    RpdoTooLong(u16),
+    /// An RPDO, counted the same way, did not come in time (8250h).
+    RpdoDeadline(u16),
+    /// The stored values of a group could not be loaded (6302h, 6303h; 6300h for the calibration).
+    StoredData(Group),
+    /// A condition of the application, by its place in
+    /// [`Application::CONDITIONS`](crate::Application::CONDITIONS).
+    Application(u8),
 }
 
-/// The first bit of communication faults in a set of faults: from here on, all are.
-const COMMUNICATION: u8 = 18;
+/// What a fault of the application looks like on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Condition {
+    /// Emergency error code (CiA 301, table 26, and the device profile).
+    pub code: u16,
+    /// Bits of the error register (1001h) that belong to it. Bit 0, the generic error, is always set.
+    pub register: u8,
+    /// Manufacturer-specific error field of the EMCY.
+    pub detail: [u8; 5],
+}
+
+impl Condition {
+    /// A condition of this error code, with the generic error as its only bit of the error register.
+    #[must_use]
+    pub const fn new(code: u16) -> Condition {
+        Condition { code, register: 0, detail: [0; 5] }
+    }
+}
+
+/// The error register: any fault, and communication.
+const GENERIC: u8 = 1;
+const COMMUNICATION: u8 = 1 << 4;
 
 impl Fault {
-    /// Those that exist once, in the order of their bits.
-    const SINGLE: [Fault; 24] = [
-        Fault::SensorClock,
-        Fault::SensorBoot,
-        Fault::SensorBreak,
-        Fault::SensorMemory,
-        Fault::TemperatureRail,
-        Fault::PressureRail,
-        Fault::EncoderBreak,
-        Fault::InputCurrent,
-        Fault::InputVoltage,
-        Fault::HardwareMemory,
-        Fault::ModuleInitialisation,
-        Fault::HardwareIdentification,
-        Fault::ParameterStore,
-        Fault::UnexpectedReset,
-        Fault::BootData,
-        Fault::CommunicationData,
-        Fault::ApplicationData,
-        Fault::CalibrationData,
+    /// The communication faults that exist once, in the order of their bits, and those of the storage groups.
+    const SINGLE: [Fault; 9] = [
         Fault::Overrun,
         Fault::ErrorPassive,
         Fault::BusOffRecovered,
         Fault::SyncMissing,
         Fault::SyncLength,
         Fault::MpdoNotTaken,
+        Fault::StoredData(Group::Communication),
+        Fault::StoredData(Group::Application),
+        Fault::StoredData(Group::Calibration),
     ];
+    /// Bits of the communication faults among them.
+    const OF_COMMUNICATION: u16 = 0x3F;
 
-    /// Every fault that there is.
-    pub fn all() -> impl Iterator<Item = Fault> {
-        (0..u8::MAX).map_while(Fault::of_bit)
-    }
-
-    /// The fault of a bit in a set of faults.
-    fn of_bit(bit: u8) -> Option<Fault> {
-        Some(match bit {
-            24..28 => Fault::Heartbeat(bit - 24),
-            28..36 => Fault::RpdoTooShort(bit - 28),
-            36..44 => Fault::RpdoTooLong(bit - 36),
-            44..52 => Fault::RpdoDeadline(bit - 44),
-            _ => return Fault::SINGLE.get(usize::from(bit)).copied(),
-        })
-    }
-
-    /// Its bit in a set of faults; of those that exist several times that of the first.
-    const fn first_bit(self) -> u8 {
+    /// The bit of a fault that exists once; `None` for one of many.
+    const fn bit(self) -> Option<u8> {
         match self {
-            Fault::SensorClock => 0,
-            Fault::SensorBoot => 1,
-            Fault::SensorBreak => 2,
-            Fault::SensorMemory => 3,
-            Fault::TemperatureRail => 4,
-            Fault::PressureRail => 5,
-            Fault::EncoderBreak => 6,
-            Fault::InputCurrent => 7,
-            Fault::InputVoltage => 8,
-            Fault::HardwareMemory => 9,
-            Fault::ModuleInitialisation => 10,
-            Fault::HardwareIdentification => 11,
-            Fault::ParameterStore => 12,
-            Fault::UnexpectedReset => 13,
-            Fault::BootData => 14,
-            Fault::CommunicationData => 15,
-            Fault::ApplicationData => 16,
-            Fault::CalibrationData => 17,
-            Fault::Overrun => 18,
-            Fault::ErrorPassive => 19,
-            Fault::BusOffRecovered => 20,
-            Fault::SyncMissing => 21,
-            Fault::SyncLength => 22,
-            Fault::MpdoNotTaken => 23,
-            Fault::Heartbeat(_) => 24,
-            Fault::RpdoTooShort(_) => 28,
-            Fault::RpdoTooLong(_) => 36,
-            Fault::RpdoDeadline(_) => 44,
+            Fault::Overrun => Some(0),
+            Fault::ErrorPassive => Some(1),
+            Fault::BusOffRecovered => Some(2),
+            Fault::SyncMissing => Some(3),
+            Fault::SyncLength => Some(4),
+            Fault::MpdoNotTaken => Some(5),
+            Fault::StoredData(group) => Some(6 + group as u8),
+            _ => None,
         }
     }
 
-    /// Which one of those that exist several times, from 0.
-    const fn instance(self) -> u8 {
-        match self {
-            Fault::Heartbeat(number) => number & 3,
-            Fault::RpdoTooShort(number) | Fault::RpdoTooLong(number) | Fault::RpdoDeadline(number) => {
-                number & 7
-            }
-            _ => 0,
-        }
-    }
-
-    const fn bit(self) -> u8 {
-        self.first_bit() + self.instance()
-    }
-
-    /// Emergency error code: CiA 301, table 26, CiA 406, 5.1, and the codes of the classes 50xxh, 61xxh, 63xxh and 80xxh
-    /// that are the manufacturer's.
+    /// How the fault looks on the bus. Of faults that exist several times the error field says which one it is, from 1,
+    /// in its first two bytes. `conditions` are those of the application.
     #[must_use]
-    pub const fn code(self) -> u16 {
-        match self {
-            Fault::SensorClock => 0x5004,
-            Fault::SensorBoot => 0x5005,
-            Fault::SensorBreak | Fault::EncoderBreak => 0x5006,
-            Fault::SensorMemory => 0x5007,
-            Fault::TemperatureRail => 0x8001,
-            Fault::PressureRail => 0x8002,
-            Fault::InputCurrent => 0x2110,
-            Fault::InputVoltage => 0x3110,
-            Fault::HardwareMemory => 0x5100,
-            Fault::ModuleInitialisation => 0x5001,
-            Fault::HardwareIdentification => 0x5002,
-            Fault::ParameterStore => 0x5003,
-            Fault::UnexpectedReset => 0x6101,
-            Fault::BootData => 0x6301,
-            Fault::CommunicationData => 0x6302,
-            Fault::ApplicationData => 0x6303,
-            Fault::CalibrationData => 0x6300,
+    pub fn condition(self, conditions: &[Condition]) -> Condition {
+        let code = match self {
             Fault::Overrun => 0x8110,
             Fault::ErrorPassive => 0x8120,
             Fault::BusOffRecovered => 0x8140,
@@ -190,64 +102,91 @@ impl Fault {
             Fault::RpdoTooShort(_) => 0x8210,
             Fault::RpdoTooLong(_) => 0x8220,
             Fault::RpdoDeadline(_) => 0x8250,
-        }
+            Fault::StoredData(Group::Communication) => 0x6302,
+            Fault::StoredData(Group::Application) => 0x6303,
+            Fault::StoredData(Group::Calibration) => 0x6300,
+            Fault::Application(number) => {
+                return conditions.get(usize::from(number)).copied().unwrap_or(Condition::new(0x1000));
+            }
+        };
+        let [low, high] = self.instance().to_le_bytes();
+        let register = if code >> 8 == 0x63 { 0 } else { COMMUNICATION };
+        Condition { code, register, detail: [low, high, 0, 0, 0] }
     }
 
-    /// Manufacturer-specific error field: which one, from 1, of those that exist several times; 1 for the encoder's
-    /// sensor, whose code is that of the pressure sensor.
-    #[must_use]
-    pub const fn detail(self) -> [u8; 5] {
+    /// Which one of those that exist several times, from 1; 0 for the others.
+    const fn instance(self) -> u16 {
         match self {
-            Fault::Heartbeat(number)
-            | Fault::RpdoTooShort(number)
-            | Fault::RpdoTooLong(number)
-            | Fault::RpdoDeadline(number) => [number.saturating_add(1), 0, 0, 0, 0],
-            Fault::EncoderBreak => [1, 0, 0, 0, 0],
-            _ => [0; 5],
+            Fault::Heartbeat(number) => number as u16 + 1,
+            Fault::RpdoTooShort(number) | Fault::RpdoTooLong(number) | Fault::RpdoDeadline(number) => {
+                number.saturating_add(1)
+            }
+            _ => 0,
         }
     }
 }
 
-/// A set of faults.
+/// The faults that are active. Of those that exist several times only the number is kept: whoever finds them knows which
+/// of them are active.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct FaultSet(u64);
+pub(crate) struct FaultSet {
+    single: u16,
+    application: u32,
+    several: u16,
+}
 
 impl FaultSet {
-    pub(crate) const EMPTY: FaultSet = FaultSet(0);
+    pub(crate) const EMPTY: FaultSet = FaultSet { single: 0, application: 0, several: 0 };
 
-    /// Whether it is new.
+    /// Whether the fault is new.
     pub(crate) fn insert(&mut self, fault: Fault) -> bool {
-        let before = self.0;
-        self.0 |= 1 << fault.bit();
-        self.0 != before
+        let before = *self;
+        match (fault, fault.bit()) {
+            (Fault::Application(number), _) => self.application |= application_bit(number),
+            (_, Some(bit)) => self.single |= 1 << bit,
+            (_, None) => self.several = self.several.saturating_add(1),
+        }
+        *self != before
     }
 
-    /// Whether it was there.
+    /// Whether the fault was active.
     pub(crate) fn remove(&mut self, fault: Fault) -> bool {
-        let before = self.0;
-        self.0 &= !(1 << fault.bit());
-        self.0 != before
+        let before = *self;
+        match (fault, fault.bit()) {
+            (Fault::Application(number), _) => self.application &= !application_bit(number),
+            (_, Some(bit)) => self.single &= !(1 << bit),
+            (_, None) => self.several = self.several.saturating_sub(1),
+        }
+        *self != before
     }
 
     pub(crate) fn is_empty(self) -> bool {
-        self.0 == 0
+        self == FaultSet::EMPTY
     }
 
-    pub(crate) fn iter(self) -> impl Iterator<Item = Fault> {
-        Fault::all().filter(move |fault| self.contains(*fault))
+    /// The faults that exist once.
+    pub(crate) fn singles(self) -> impl Iterator<Item = Fault> {
+        let single = (0..).zip(Fault::SINGLE).filter(move |(bit, _)| self.single & 1 << bit != 0);
+        let application = (0..32).filter(move |number| self.application & application_bit(*number) != 0);
+        single.map(|(_, fault): (u16, Fault)| fault).chain(application.map(Fault::Application))
     }
 
-    /// The error register (1001h): bit 0 for any fault, bits 1 and 2 for current and voltage, bit 4 for communication.
-    pub(crate) fn register(self) -> u8 {
-        u8::from(self.0 != 0)
-            | u8::from(self.contains(Fault::InputCurrent)) << 1
-            | u8::from(self.contains(Fault::InputVoltage)) << 2
-            | u8::from(self.0 >> COMMUNICATION != 0) << 4
+    /// The error register (1001h).
+    pub(crate) fn register(self, conditions: &[Condition]) -> u8 {
+        if self.is_empty() {
+            return 0;
+        }
+        let is_communication = self.single & Fault::OF_COMMUNICATION != 0 || self.several != 0;
+        let active =
+            (0..).zip(conditions).filter(|(number, _)| self.application & application_bit(*number) != 0);
+        let own = active.fold(0, |register, (_, condition)| register | condition.register);
+        own | GENERIC | if is_communication { COMMUNICATION } else { 0 }
     }
+}
 
-    fn contains(self, fault: Fault) -> bool {
-        self.0 & 1 << fault.bit() != 0
-    }
+/// The bit of a condition of the application; 0 for one beyond the 32 that there can be.
+fn application_bit(number: u8) -> u32 {
+    1_u32.checked_shl(number.into()).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -256,23 +195,34 @@ mod tests {
 
     #[test]
     fn every_fault_has_its_own_bit() {
+        let all = || Fault::SINGLE.into_iter().chain((0..32).map(Fault::Application));
         let mut set = FaultSet::default();
-        assert!(Fault::all().all(|fault| set.insert(fault)));
-        assert!(set.iter().eq(Fault::all()));
-        assert!(Fault::all().all(|fault| set.remove(fault)));
+        assert!(all().all(|fault| set.insert(fault)));
+        assert!(set.singles().eq(all()));
+        assert!(all().all(|fault| set.remove(fault)));
         assert!(set.is_empty());
     }
 
     #[test]
     fn the_register_tells_communication_from_the_rest() {
-        let mut set = FaultSet::default();
-        assert_eq!(set.register(), 0);
-        set.insert(Fault::SensorBreak);
-        assert_eq!(set.register(), 0x01);
-        for fault in Fault::all().filter(|fault| fault.code() >= 0x8100) {
+        let conditions = [Condition { code: 0x3110, register: 0b100, detail: [0; 5] }];
+        let of = |fault| {
             let mut set = FaultSet::default();
             set.insert(fault);
-            assert_eq!(set.register(), 0x11, "{fault:?}");
+            set.register(&conditions)
+        };
+        assert_eq!(FaultSet::default().register(&conditions), 0);
+        assert_eq!(of(Fault::Application(0)), 0b101);
+        assert_eq!(of(Fault::StoredData(Group::Application)), 0x01);
+        for fault in [Fault::Overrun, Fault::MpdoNotTaken, Fault::Heartbeat(126), Fault::RpdoDeadline(511)] {
+            assert_eq!(of(fault), 0x11, "{fault:?}");
         }
+    }
+
+    #[test]
+    fn one_of_many_is_named_by_two_bytes() {
+        let condition = Fault::RpdoTooShort(511).condition(&[]);
+        assert_eq!((condition.code, condition.detail), (0x8210, [0x00, 0x02, 0, 0, 0]));
+        assert_eq!(Fault::Heartbeat(0).condition(&[]).detail, [1, 0, 0, 0, 0]);
     }
 }

@@ -5,7 +5,7 @@ mod history;
 mod message;
 mod producer;
 
-pub use fault::Fault;
 use fault::FaultSet;
+pub use fault::{Condition, Fault};
 pub use message::Message;
 pub(crate) use producer::{Producer, check_cob_id};

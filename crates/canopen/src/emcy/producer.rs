@@ -1,7 +1,7 @@
 //! The EMCY producer: keeps the set of faults, sends what changes.
 
 use super::history::History;
-use super::{Fault, FaultSet, Message};
+use super::{Condition, Fault, FaultSet, Message};
 use crate::sdo::Abort;
 use crate::transmit::{RETRY, Turn};
 use crate::{CobId, Duration, Frame, Instant, Transmit};
@@ -14,6 +14,8 @@ const WAITING: usize = 8;
 /// Faults, their history and the messages about them.
 #[derive(Debug)]
 pub(crate) struct Producer {
+    /// Those of the application.
+    conditions: &'static [Condition],
     /// 1014h; `None` while bit 31 says that there is no EMCY.
     id: Option<CobId>,
     active: FaultSet,
@@ -27,8 +29,9 @@ pub(crate) struct Producer {
 }
 
 impl Producer {
-    pub(crate) const fn new() -> Producer {
+    pub(crate) const fn new(conditions: &'static [Condition]) -> Producer {
         Producer {
+            conditions,
             id: None,
             active: FaultSet::EMPTY,
             history: History::new(),
@@ -55,7 +58,7 @@ impl Producer {
         self.waiting.clear();
         self.due = Instant::NEVER;
         let active = core::mem::take(&mut self.active);
-        for fault in active.iter() {
+        for fault in active.singles() {
             self.raise(fault, now);
         }
     }
@@ -64,17 +67,20 @@ impl Producer {
     pub(crate) fn raise(&mut self, fault: Fault, now: Instant) -> bool {
         let is_new = self.active.insert(fault);
         if is_new {
-            self.history.push(fault.code());
-            self.report(fault.code(), fault.detail(), now);
+            let Condition { code, detail, .. } = fault.condition(self.conditions);
+            self.history.push(code);
+            self.report(code, detail, now);
         }
         is_new
     }
 
-    /// Code 0000h is sent when the last fault is gone.
-    pub(crate) fn clear(&mut self, fault: Fault, now: Instant) {
-        if self.active.remove(fault) && self.active.is_empty() {
+    /// Whether it was active. Code 0000h is sent when the last fault is gone.
+    pub(crate) fn clear(&mut self, fault: Fault, now: Instant) -> bool {
+        let was_active = self.active.remove(fault);
+        if was_active && self.active.is_empty() {
             self.report(0, [0; 5], now);
         }
+        was_active
     }
 
     fn report(&mut self, code: u16, detail: [u8; 5], now: Instant) {
@@ -91,7 +97,7 @@ impl Producer {
     /// The error register, object 1001h.
     #[inline(never)]
     pub(crate) fn register(&self) -> u8 {
-        self.active.register()
+        self.active.register(self.conditions)
     }
 
     pub(crate) fn history(&self) -> &History {

@@ -1,7 +1,7 @@
 //! PDO mapping: from mapping entries to places in the image, resolved once, when the mapping is enabled.
 
 use super::Addressing;
-use crate::dictionary::{Dictionary, Field, Mapping};
+use crate::dictionary::{Dictionary, Field};
 use crate::sdo::Abort;
 
 /// A mapping entry (1600h.., 1A00h..): index, sub-index and length in bits.
@@ -32,7 +32,7 @@ impl MappedObject {
 
     /// Bytes of a dummy entry: a data type (0002h to 0007h) as index, for parts of an RPDO that the node skips
     /// (CiA 301, 7.4.7.1).
-    const fn dummy_size(self) -> Option<u8> {
+    pub(crate) const fn dummy_size(self) -> Option<u8> {
         match (self.index, self.sub) {
             (0x0002 | 0x0005, 0) => Some(1),
             (0x0003 | 0x0006, 0) => Some(2),
@@ -52,24 +52,37 @@ pub(crate) enum Direction {
 /// A place outside every image: reads as zero, takes no write.
 const NOWHERE: u16 = u16::MAX;
 
-/// The place that a mapping entry names.
+/// The place that a mapping entry names, and whether that takes any value.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Located {
+    pub(crate) field: Field,
+    pub(crate) takes_any: bool,
+}
+
+/// Finds the place that a mapping entry names.
 ///
 /// `NoObject` where there is none, `NotMappable` where it cannot go into such a PDO or the length is not its own.
 pub(crate) fn locate(
     dictionary: &Dictionary,
     mapped: MappedObject,
     direction: Direction,
-) -> Result<Field, Abort> {
-    let (field, fits) = match mapped.dummy_size() {
-        Some(size) if direction == Direction::Receive => (Field { offset: NOWHERE, size }, true),
+) -> Result<Located, Abort> {
+    let (located, fits) = match mapped.dummy_size() {
+        Some(size) if direction == Direction::Receive => {
+            (Located { field: Field { offset: NOWHERE, size }, takes_any: true }, true)
+        }
         _ => {
             let entry = dictionary.find(mapped.index, mapped.sub).map_err(|_| Abort::NoObject)?;
-            let needed = if direction == Direction::Transmit { Mapping::Tpdo } else { Mapping::Rpdo };
-            (entry.field, entry.attributes.mapping == needed)
+            let mapping = entry.attributes.mapping;
+            let fits = match direction {
+                Direction::Transmit => mapping.allows_tpdo(),
+                Direction::Receive => mapping.allows_rpdo(),
+            };
+            (Located { field: entry.field, takes_any: entry.takes_any() }, fits)
         }
     };
-    let same_length = u16::from(mapped.bits) == u16::from(field.size) * 8;
-    if fits && same_length { Ok(field) } else { Err(Abort::NotMappable) }
+    let same_length = u16::from(mapped.bits) == u16::from(located.field.size) * 8;
+    if fits && same_length { Ok(located) } else { Err(Abort::NotMappable) }
 }
 
 /// What a PDO carries.
@@ -88,12 +101,15 @@ pub(crate) struct Layout {
     /// Bytes of the PDO.
     len: u8,
     count: u8,
+    /// A value must be checked before it is taken: its object has limits or a rule.
+    is_checked: bool,
     places: [Field; 8],
 }
 
 impl Layout {
     /// Appends a mapped object; `PdoLength` when the PDO would grow beyond eight bytes.
-    pub(crate) fn push(&mut self, field: Field) -> Result<(), Abort> {
+    pub(crate) fn push(&mut self, Located { field, takes_any }: Located) -> Result<(), Abort> {
+        self.is_checked |= !takes_any;
         let len = self.len.saturating_add(field.size);
         if len > 8 {
             return Err(Abort::PdoLength);
@@ -107,6 +123,11 @@ impl Layout {
         }
         self.len = len;
         Ok(())
+    }
+
+    /// Whether a received value must be checked before it is taken.
+    pub(crate) fn is_checked(&self) -> bool {
+        self.is_checked
     }
 
     fn places(&self) -> &[Field] {

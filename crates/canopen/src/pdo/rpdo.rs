@@ -3,7 +3,7 @@
 //! The types 0 to 240 take it with the next SYNC, the types 254 and 255 at once. With an event timer, it must come
 //! again within that time.
 
-use super::{Addressing, Content, Transmission};
+use super::{Addressing, Content, Layout, Links, Transmission};
 use crate::{CanId, Duration, Frame, Instant};
 
 /// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
@@ -30,11 +30,6 @@ impl RpdoSettings {
 }
 
 impl RpdoSettings {
-    /// Whether its data waits for the SYNC.
-    pub(crate) fn is_synchronous(&self) -> bool {
-        self.is_synchronous
-    }
-
     /// Bytes that it must have.
     fn len(&self) -> usize {
         match &self.content {
@@ -57,19 +52,37 @@ pub(crate) enum Reception {
     Multiplexed(Addressing),
 }
 
+/// What can be wrong with the reception of an RPDO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum RpdoFault {
+    TooShort,
+    TooLong,
+    Deadline,
+}
+
 /// An RPDO. Without settings it does not exist.
 #[derive(Debug)]
 pub(crate) struct Rpdo {
+    /// The PDOs that follow in the chains.
+    pub(crate) links: Links,
     settings: Option<RpdoSettings>,
     /// Data that waits for SYNC, the newest.
     waiting: Option<[u8; 8]>,
     /// When the deadline passes; `NEVER` before the first reception.
     due: Instant,
+    /// The faults that it has, a bit for each [`RpdoFault`].
+    faults: u8,
 }
 
 impl Rpdo {
     pub(crate) const fn new() -> Rpdo {
-        Rpdo { settings: None, waiting: None, due: Instant::NEVER }
+        Rpdo { links: Links::END, settings: None, waiting: None, due: Instant::NEVER, faults: 0 }
+    }
+
+    /// Whether its data waits for the SYNC.
+    pub(crate) fn is_synchronous(&self) -> bool {
+        self.settings.as_ref().is_some_and(|settings| settings.is_synchronous)
     }
 
     /// Takes new settings and starts afresh.
@@ -88,41 +101,59 @@ impl Rpdo {
         self.settings.as_ref().map(|settings| settings.id)
     }
 
-    /// Takes a data frame if it is this PDO's. `late` is true when the synchronous window is over: a synchronous PDO is
-    /// then ignored.
+    /// Takes a data frame if it is this PDO's: how its length compares, and the data if it is valid at once. `late` is true
+    /// when the synchronous window is over: a synchronous PDO is then ignored.
     pub(crate) fn take(
         &mut self,
         frame: &Frame,
-        image: &mut [u8],
         now: Instant,
         late: bool,
-    ) -> Option<Reception> {
+    ) -> Option<(Reception, Option<[u8; 8]>)> {
         let settings = self.settings.as_ref().filter(|settings| settings.id.get() == frame.id())?;
         let mapped = settings.len();
         if frame.len() < mapped {
-            return Some(Reception::TooShort);
+            return Some((Reception::TooShort, None));
         }
         self.due = match settings.deadline {
             0 => Instant::NEVER,
             deadline => now + Duration::from_millis(deadline.into()),
         };
+        let reception = if frame.len() == mapped { Reception::Complete } else { Reception::TooLong };
         match (&settings.content, settings.is_synchronous) {
-            (Content::Multiplexed(addressing), _) => return Some(Reception::Multiplexed(*addressing)),
-            (Content::Objects(layout), false) => layout.scatter(frame.bytes(), image),
-            (Content::Objects(_), true) if late => (),
-            (Content::Objects(_), true) => self.waiting = Some(frame.bytes()),
+            (Content::Multiplexed(addressing), _) => Some((Reception::Multiplexed(*addressing), None)),
+            (Content::Objects(_), false) => Some((reception, Some(frame.bytes()))),
+            (Content::Objects(_), true) => {
+                if !late {
+                    self.waiting = Some(frame.bytes());
+                }
+                Some((reception, None))
+            }
         }
-        Some(if frame.len() == mapped { Reception::Complete } else { Reception::TooLong })
     }
 
     /// A SYNC arrived: what waits becomes valid.
-    pub(crate) fn on_sync(&mut self, image: &mut [u8]) {
-        let data = self.waiting.take();
-        if let (Some(RpdoSettings { content: Content::Objects(layout), .. }), Some(data)) =
-            (&self.settings, data)
-        {
-            layout.scatter(data, image);
+    pub(crate) fn take_waiting(&mut self) -> Option<[u8; 8]> {
+        self.waiting.take()
+    }
+
+    /// Where the data goes.
+    pub(crate) fn layout(&self) -> Option<&Layout> {
+        match &self.settings.as_ref()?.content {
+            Content::Objects(layout) => Some(layout),
+            Content::Multiplexed(_) => None,
         }
+    }
+
+    /// Takes note of a fault; whether that is a change.
+    pub(crate) fn set_fault(&mut self, kind: RpdoFault, active: bool) -> bool {
+        let (before, bit) = (self.faults, 1 << kind as u8);
+        self.faults = if active { before | bit } else { before & !bit };
+        self.faults != before
+    }
+
+    /// Whether it has any fault.
+    pub(crate) fn has_faults(&self) -> bool {
+        self.faults != 0
     }
 
     /// The next instant at which a reception is missing.

@@ -13,8 +13,8 @@ pub(crate) const BUFFER: usize = 112;
 pub(crate) enum Writable {
     /// As a whole, of at most this many bytes.
     Value(usize),
-    /// Piece by piece: the stream of this number, which is a domain.
-    Stream(u8),
+    /// Piece by piece: a domain.
+    Stream,
 }
 
 /// The dictionary with its values and rules.
@@ -31,8 +31,8 @@ pub(crate) trait Objects {
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort>;
     /// Whether the response to the write just made has to wait for [`Server::release`](super::Server::release); once.
     fn take_deferred(&mut self) -> bool;
-    /// Hands over a part of a stream.
-    fn stream(&mut self, stream: u8, part: Part<'_>) -> Result<(), Abort>;
+    /// Hands over a part of a domain.
+    fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort>;
 }
 
 /// Where an upload comes from. A value that fits the buffer is a snapshot: it cannot change under way. A longer one
@@ -115,8 +115,8 @@ impl Sink {
                 return Err(Abort::TooLong);
             }
             Writable::Value(limit) => limit,
-            Writable::Stream(stream) => {
-                objects.stream(stream, Part::Begin(announced))?;
+            Writable::Stream => {
+                objects.stream(at, Part::Begin(announced))?;
                 usize::MAX
             }
         };
@@ -181,12 +181,14 @@ impl Sink {
         buffer: &[u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        let Writable::Stream(stream) = self.kind else { return Ok(()) };
+        if self.kind != Writable::Stream {
+            return Ok(());
+        }
         self.crc = self.crc(buffer);
         let part = Part::Data(self.gone, self.held(buffer));
         (self.gone, self.held) = (self.len(), 0);
         self.brim = self.limit.saturating_sub(self.gone).min(BUFFER);
-        objects.stream(stream, part)
+        objects.stream(self.at, part)
     }
 
     fn held<'a>(&self, buffer: &'a [u8; BUFFER]) -> &'a [u8] {
@@ -209,7 +211,7 @@ impl Sink {
         }
         self.hand_over(buffer, objects)?;
         match self.kind {
-            Writable::Stream(stream) => objects.stream(stream, Part::End(self.gone)),
+            Writable::Stream => objects.stream(self.at, Part::End(self.gone)),
             Writable::Value(_) => objects.write(self.at, self.held(buffer), now),
         }
     }

@@ -1,107 +1,114 @@
 //! A device with a small dictionary, a queue that records, and a client that talks to it.
 
-use canopen::dictionary::{
-    self, Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Rule, Type,
-};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Type};
+use canopen::nmt::State;
 use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response, Segment};
-use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Stored, Transmit};
+use canopen::{
+    Action, Application, BusEvent, Condition, Device, Duration, ErrorClass, Fault, Frame, Instant, Next,
+    NodeId, Part, QueueFull, Stored, Transmit,
+};
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
+use std::collections::VecDeque;
 
 const fn parameter(index: u16, sub: u8, kind: Type) -> Object {
-    Object::new(index, sub, "", kind, Access::ReadWrite).saved(Group::Communication)
+    Object::new(index, sub, "", kind, Access::ReadWrite).stored(Group::Communication)
 }
 
 const fn value(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadOnly).mappable(Mapping::Tpdo)
 }
 
-const fn command(index: u16, sub: u8, rule: Rule) -> Object {
-    Object::new(index, sub, "", Type::Unsigned32, Access::ReadWrite).value(1).rule(rule)
+const fn command(index: u16, sub: u8) -> Object {
+    Object::new(index, sub, "", Type::Unsigned32, Access::ReadWrite).value(1)
 }
 
 const ROWS: &[Object] = &[
     Object::new(0x1000, 0, "", Type::Unsigned32, Access::ReadOnly).value(0x0002_0194),
     Object::new(0x1001, 0, "", Type::Unsigned8, Access::ReadOnly),
-    Object::new(0x1003, 0, "", Type::Unsigned8, Access::ReadWrite).rule(Rule::ErrorCount),
-    Object::new(0x1003, 1, "", Type::Unsigned32, Access::ReadOnly).rule(Rule::ErrorEntry),
-    Object::new(0x1003, 2, "", Type::Unsigned32, Access::ReadOnly).rule(Rule::ErrorEntry),
-    parameter(0x1005, 0, Type::Unsigned32).value(0x80).rule(Rule::SyncCobId),
-    parameter(0x1006, 0, Type::Unsigned32).rule(Rule::SyncPeriod),
-    parameter(0x1007, 0, Type::Unsigned32).rule(Rule::SyncWindow),
+    Object::new(0x1003, 0, "", Type::Unsigned8, Access::ReadWrite),
+    Object::new(0x1003, 1, "", Type::Unsigned32, Access::ReadOnly),
+    Object::new(0x1003, 2, "", Type::Unsigned32, Access::ReadOnly),
+    parameter(0x1005, 0, Type::Unsigned32).value(0x80),
+    parameter(0x1006, 0, Type::Unsigned32),
+    parameter(0x1007, 0, Type::Unsigned32),
     Object::new(0x1008, 0, "", Type::VisibleString(32), Access::Const)
         .default(DefaultValue::Text("a name of twenty-six chars")),
     Object::highest(0x1010, 3, ""),
-    command(0x1010, 1, Rule::Store),
-    command(0x1010, 2, Rule::Store),
-    command(0x1010, 3, Rule::Store),
+    command(0x1010, 1),
+    command(0x1010, 2),
+    command(0x1010, 3),
     Object::highest(0x1011, 3, ""),
-    command(0x1011, 1, Rule::Restore),
-    command(0x1011, 2, Rule::Restore),
-    command(0x1011, 3, Rule::Restore),
-    parameter(0x1014, 0, Type::Unsigned32).default(DefaultValue::NodeId(0x80)).rule(Rule::EmcyCobId),
-    parameter(0x1015, 0, Type::Unsigned16).rule(Rule::EmcyInhibit),
+    command(0x1011, 1),
+    command(0x1011, 2),
+    command(0x1011, 3),
+    parameter(0x1014, 0, Type::Unsigned32).default(DefaultValue::NodeId(0x80)),
+    parameter(0x1015, 0, Type::Unsigned16),
     Object::highest(0x1016, 4, ""),
-    parameter(0x1016, 1, Type::Unsigned32).rule(Rule::HeartbeatWatch),
-    parameter(0x1016, 2, Type::Unsigned32).rule(Rule::HeartbeatWatch),
-    parameter(0x1016, 3, Type::Unsigned32).rule(Rule::HeartbeatWatch),
-    parameter(0x1016, 4, Type::Unsigned32).rule(Rule::HeartbeatWatch),
-    parameter(0x1017, 0, Type::Unsigned16).value(1000).rule(Rule::HeartbeatTime),
+    parameter(0x1016, 1, Type::Unsigned32),
+    parameter(0x1016, 2, Type::Unsigned32),
+    parameter(0x1016, 3, Type::Unsigned32),
+    parameter(0x1016, 4, Type::Unsigned32),
+    parameter(0x1017, 0, Type::Unsigned16).value(1000),
     Object::highest(0x1018, 4, ""),
     Object::new(0x1018, 1, "", Type::Unsigned32, Access::ReadOnly).value(0x1A),
     Object::new(0x1018, 2, "", Type::Unsigned32, Access::ReadOnly).value(0x2B),
     Object::new(0x1018, 3, "", Type::Unsigned32, Access::ReadOnly).value(0x0001_0002),
     Object::new(0x1018, 4, "", Type::Unsigned32, Access::ReadOnly).value(0x8000_0005),
-    parameter(0x1019, 0, Type::Unsigned8).limits(0, 240).rule(Rule::SyncOverflow),
+    parameter(0x1019, 0, Type::Unsigned8).limits(0, 240),
     Object::highest(0x1029, 2, ""),
     parameter(0x1029, 1, Type::Unsigned8).limits(0, 254),
     parameter(0x1029, 2, Type::Unsigned8).limits(0, 2),
     Object::highest(0x1400, 5, ""),
-    parameter(0x1400, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x8000_0200)).rule(Rule::PdoCobId),
-    parameter(0x1400, 2, Type::Unsigned8).value(255).rule(Rule::PdoType),
-    parameter(0x1400, 5, Type::Unsigned16).rule(Rule::PdoEventTimer),
+    parameter(0x1400, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x8000_0200)),
+    parameter(0x1400, 2, Type::Unsigned8).value(255),
+    parameter(0x1400, 5, Type::Unsigned16),
     Object::highest(0x1401, 5, ""),
-    parameter(0x1401, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x8000_0300)).rule(Rule::PdoCobId),
-    parameter(0x1401, 2, Type::Unsigned8).value(1).rule(Rule::PdoType),
-    parameter(0x1401, 5, Type::Unsigned16).rule(Rule::PdoEventTimer),
-    parameter(0x1600, 0, Type::Unsigned8).rule(Rule::PdoCount),
-    parameter(0x1600, 1, Type::Unsigned32).rule(Rule::PdoSlot),
-    parameter(0x1600, 2, Type::Unsigned32).rule(Rule::PdoSlot),
-    parameter(0x1601, 0, Type::Unsigned8).limits(0, 2).value(1).rule(Rule::PdoCount),
-    parameter(0x1601, 1, Type::Unsigned32).value(0x6200_0010).rule(Rule::PdoSlot),
-    parameter(0x1601, 2, Type::Unsigned32).rule(Rule::PdoSlot),
+    parameter(0x1401, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x8000_0300)),
+    parameter(0x1401, 2, Type::Unsigned8).value(1),
+    parameter(0x1401, 5, Type::Unsigned16),
+    parameter(0x1600, 0, Type::Unsigned8),
+    parameter(0x1600, 1, Type::Unsigned32),
+    parameter(0x1600, 2, Type::Unsigned32),
+    parameter(0x1601, 0, Type::Unsigned8).limits(0, 2).value(1),
+    parameter(0x1601, 1, Type::Unsigned32).value(0x6200_0010),
+    parameter(0x1601, 2, Type::Unsigned32),
     Object::highest(0x1800, 6, ""),
-    parameter(0x1800, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x180)).rule(Rule::PdoCobId),
-    parameter(0x1800, 2, Type::Unsigned8).value(255).rule(Rule::PdoType),
-    parameter(0x1800, 3, Type::Unsigned16).rule(Rule::PdoInhibit),
-    parameter(0x1800, 5, Type::Unsigned16).value(100).rule(Rule::PdoEventTimer),
-    parameter(0x1800, 6, Type::Unsigned8).limits(0, 240).rule(Rule::PdoSyncStart),
-    parameter(0x1A00, 0, Type::Unsigned8).value(1).rule(Rule::PdoCount),
-    parameter(0x1A00, 1, Type::Unsigned32).value(0x6000_0120).rule(Rule::PdoSlot),
-    parameter(0x1A00, 2, Type::Unsigned32).rule(Rule::PdoSlot),
-    parameter(0x1A00, 3, Type::Unsigned32).rule(Rule::PdoSlot),
-    parameter(0x1A00, 4, Type::Unsigned32).rule(Rule::PdoSlot),
-    parameter(0x1F80, 0, Type::Unsigned32).rule(Rule::StartUp),
+    parameter(0x1800, 1, Type::Unsigned32).default(DefaultValue::NodeId(0x180)),
+    parameter(0x1800, 2, Type::Unsigned8).value(255),
+    parameter(0x1800, 3, Type::Unsigned16),
+    parameter(0x1800, 5, Type::Unsigned16).value(100),
+    parameter(0x1800, 6, Type::Unsigned8).limits(0, 240),
+    parameter(0x1A00, 0, Type::Unsigned8).value(1),
+    parameter(0x1A00, 1, Type::Unsigned32).value(0x6000_0120),
+    parameter(0x1A00, 2, Type::Unsigned32),
+    parameter(0x1A00, 3, Type::Unsigned32),
+    parameter(0x1A00, 4, Type::Unsigned32),
+    parameter(0x1F80, 0, Type::Unsigned32),
     parameter(0x1FA0, 0, Type::Unsigned8).limits(0, 2),
-    parameter(0x1FA0, 1, Type::Unsigned32).rule(Rule::ScannerLine),
-    parameter(0x1FA0, 2, Type::Unsigned32).rule(Rule::ScannerLine),
+    parameter(0x1FA0, 1, Type::Unsigned32),
+    parameter(0x1FA0, 2, Type::Unsigned32),
     parameter(0x1FD0, 0, Type::Unsigned8).limits(0, 2),
     parameter(0x1FD0, 1, Type::Unsigned64),
     parameter(0x1FD0, 2, Type::Unsigned64),
-    Object::new(0x5F00, 0, "", Type::Unsigned8, Access::ReadWrite).limits(0, 2).rule(Rule::Setting),
+    Object::new(0x5F00, 0, "", Type::Unsigned8, Access::ReadWrite).limits(0, 2).setting(),
     Object::highest(0x6000, 3, ""),
     value(0x6000, 1, Type::Integer32),
     value(0x6000, 2, Type::Integer16),
     value(0x6000, 3, Type::Integer32),
-    Object::new(0x6100, 0, "", Type::Integer16, Access::ReadWrite).limits(-5, 5).saved(Group::Application),
-    Object::new(0x6101, 0, "", Type::Real32, Access::ReadWrite).saved(Group::Application),
-    Object::new(0x6102, 0, "", Type::Unsigned32, Access::WriteOnly).rule(Rule::Application(7)),
-    Object::new(0x6103, 0, "", Type::VisibleString(20), Access::ReadWrite).saved(Group::Application),
-    Object::new(0x6104, 0, "", Type::Domain, Access::ReadWrite).rule(Rule::Application(8)),
-    Object::new(0x6105, 0, "", Type::Unsigned16, Access::ReadWrite).rule(Rule::EventTimerOf(0)),
-    Object::new(0x6106, 0, "", Type::Real32, Access::ReadWrite).saved(Group::Calibration),
-    Object::new(0x6107, 0, "", Type::Unsigned32, Access::ReadWrite).value(1).rule(Rule::StoreCalibration),
+    Object::new(0x6100, 0, "", Type::Integer16, Access::ReadWrite).limits(-5, 5).stored(Group::Application),
+    Object::new(0x6101, 0, "", Type::Real32, Access::ReadWrite).stored(Group::Application),
+    Object::new(0x6102, 0, "", Type::Unsigned32, Access::WriteOnly).handled(),
+    Object::new(0x6103, 0, "", Type::VisibleString(20), Access::ReadWrite).stored(Group::Application),
+    Object::new(0x6104, 0, "", Type::Domain, Access::ReadWrite).handled(),
+    Object::new(0x6105, 0, "", Type::Unsigned16, Access::ReadWrite).event_timer_of(0),
+    Object::new(0x6106, 0, "", Type::Real32, Access::ReadWrite).stored(Group::Calibration),
+    Object::new(0x6107, 0, "", Type::Unsigned32, Access::ReadWrite).value(1).stores_calibration(),
     Object::new(0x6200, 0, "", Type::Unsigned16, Access::ReadWrite).mappable(Mapping::Rpdo),
+    Object::new(0x6201, 0, "", Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo).handled(),
+    Object::new(0x6202, 0, "", Type::Boolean, Access::ReadWrite).mappable(Mapping::Rpdo),
+    Object::new(0x6203, 0, "", Type::Integer16, Access::ReadWrite).limits(-5, 5).mappable(Mapping::Rpdo),
+    Object::new(0x6204, 0, "", Type::Unsigned64, Access::ReadWrite).mappable(Mapping::Both),
 ];
 
 const SIZE: usize = dictionary::image_size(ROWS);
@@ -113,7 +120,24 @@ pub(crate) fn rows() -> impl Iterator<Item = (&'static Object, Entry)> {
     ROWS.iter().zip(DICTIONARY.entries())
 }
 
-/// Takes 4711 and nothing else at its rule 7, and keeps a domain of up to 5000 bytes at rule 8.
+/// The conditions of the application.
+pub(crate) const SENSOR_BREAK: u8 = 0;
+pub(crate) const PRESSURE_RAIL: u8 = 1;
+pub(crate) const TEMPERATURE_RAIL: u8 = 2;
+pub(crate) const UNEXPECTED_RESET: u8 = 3;
+
+/// What the device told its application.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Told {
+    Written(u16, u8),
+    Received(u16),
+    Sync(Option<u8>),
+    State(State),
+    Fault(Fault, bool),
+    Error(ErrorClass),
+}
+
+/// Takes 4711 and nothing else at 6102h, and keeps a domain of up to 5000 bytes.
 #[derive(Default)]
 pub(crate) struct Numbers {
     /// 1F80h, as if it came from a store.
@@ -125,16 +149,29 @@ pub(crate) struct Numbers {
     pub(crate) is_damaged: bool,
     /// What the device said of the groups that it loaded.
     pub(crate) loaded: Vec<(Group, bool)>,
+    pub(crate) told: Vec<Told>,
+    /// The TPDO whose frames are events; 0 for none.
+    pub(crate) event_tpdo: u16,
 }
 
 impl Application for Numbers {
+    const CONDITIONS: &'static [Condition] =
+        &[Condition::new(0x5006), Condition::new(0x8002), Condition::new(0x8001), Condition::new(0x6101)];
+
     fn initialise(&mut self, image: &mut [u8]) {
         DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);
     }
 
-    fn write(&mut self, number: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        assert_eq!(number, 7);
+    fn write(&mut self, entry: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        if entry.index() == 0x6201 {
+            return if bytes == [13] { Err(Abort::InvalidValue) } else { Ok(()) };
+        }
+        assert_eq!((entry.index(), entry.sub()), (0x6102, 0));
         if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+
+    fn sends_events(&self, tpdo: u16) -> bool {
+        tpdo == self.event_tpdo
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {
@@ -143,7 +180,6 @@ impl Application for Numbers {
             Group::Communication => communication,
             Group::Application => application,
             Group::Calibration => calibration,
-            Group::Volatile => &[],
         };
         Stored { packed, is_sound: !self.is_damaged }
     }
@@ -152,13 +188,37 @@ impl Application for Numbers {
         self.loaded.push((group, good));
     }
 
-    fn read_domain(&self, number: u8) -> Result<&[u8], Abort> {
-        assert_eq!(number, 8);
+    fn written(&mut self, entry: &Entry, _: &mut [u8]) {
+        self.told.push(Told::Written(entry.index(), entry.sub()));
+    }
+
+    fn received(&mut self, rpdo: u16, _: &mut [u8]) {
+        self.told.push(Told::Received(rpdo));
+    }
+
+    fn synchronised(&mut self, counter: Option<u8>, _: &mut [u8]) {
+        self.told.push(Told::Sync(counter));
+    }
+
+    fn state(&mut self, state: State, _: &mut [u8]) {
+        self.told.push(Told::State(state));
+    }
+
+    fn fault(&mut self, fault: Fault, active: bool, _: &mut [u8]) {
+        self.told.push(Told::Fault(fault, active));
+    }
+
+    fn error(&mut self, class: ErrorClass, _: &mut [u8]) {
+        self.told.push(Told::Error(class));
+    }
+
+    fn read_domain(&self, at: Multiplexer) -> Result<&[u8], Abort> {
+        assert_eq!(at, DOMAIN);
         Ok(&self.domain)
     }
 
-    fn write_domain(&mut self, number: u8, part: Part<'_>) -> Result<(), Abort> {
-        assert_eq!(number, 8);
+    fn write_domain(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
+        assert_eq!(at, DOMAIN);
         match part {
             Part::Begin(_) => self.domain.clear(),
             Part::Data(offset, bytes) => {
@@ -200,6 +260,8 @@ impl Transmit for Queue {
     }
 }
 
+const DOMAIN: Multiplexer = Multiplexer { index: 0x6104, sub: 0 };
+
 /// Node-ID of the device under test.
 pub(crate) const ID: u8 = 5;
 
@@ -208,6 +270,9 @@ pub(crate) struct Bench {
     pub(crate) device: Device<Numbers, SIZE>,
     pub(crate) out: Queue,
     pub(crate) now: Instant,
+    /// What the device left to its caller.
+    actions: VecDeque<Action>,
+    parameters: bool,
 }
 
 impl Bench {
@@ -243,11 +308,66 @@ impl Bench {
             device,
             out: Queue { frames: vec![], states: vec![], room: usize::MAX },
             now: Instant(1_000_000),
+            actions: VecDeque::new(),
+            parameters: false,
         }
     }
 
     pub(crate) fn start(&mut self) {
-        self.device.start(self.now, &mut self.out);
+        let next = self.device.start(self.now, &mut self.out);
+        self.follow(next);
+    }
+
+    /// Keeps what follows from a call. What waits is handed over by the next one.
+    fn follow(&mut self, next: Next) -> Instant {
+        self.parameters |= next.parameters;
+        match next.action {
+            Some(action) => {
+                self.actions.push_back(action);
+                self.poll()
+            }
+            None => next.due(),
+        }
+    }
+
+    /// The next thing that was left to the caller.
+    pub(crate) fn take_action(&mut self) -> Option<Action> {
+        self.poll();
+        self.actions.pop_front()
+    }
+
+    pub(crate) fn take_parameters(&mut self) -> bool {
+        self.poll();
+        std::mem::take(&mut self.parameters)
+    }
+
+    pub(crate) fn raise(&mut self, condition: u8) {
+        let _ = self.device.set_condition(condition, true, self.now);
+    }
+
+    pub(crate) fn clear(&mut self, condition: u8) {
+        let _ = self.device.set_condition(condition, false, self.now);
+    }
+
+    pub(crate) fn bus(&mut self, event: BusEvent) {
+        let next = self.device.on_bus(event, self.now);
+        self.follow(next);
+        self.poll();
+    }
+
+    pub(crate) fn error(&mut self, class: ErrorClass) {
+        let next = self.device.error(class);
+        self.follow(next);
+    }
+
+    pub(crate) fn finish(&mut self, result: Result<(), Abort>) {
+        let next = self.device.finish(result, self.now, &mut self.out);
+        self.follow(next);
+    }
+
+    /// What the application was told since the last call.
+    pub(crate) fn told(&mut self) -> Vec<Told> {
+        std::mem::take(&mut self.device.application_mut().told)
     }
 
     /// All frames sent since the last call.
@@ -262,14 +382,14 @@ impl Bench {
 
     /// Hands a frame to both halves, as filters would not.
     pub(crate) fn receive(&mut self, frame: Frame) {
-        self.device.on_process_frame(&frame, self.now, &mut self.out);
-        self.device.on_service_frame(&frame, self.now, &mut self.out);
+        let next = self.device.on_frame(&frame, self.now, &mut self.out);
+        self.follow(next);
         self.poll();
     }
 
     pub(crate) fn poll(&mut self) -> Instant {
-        let process = self.device.poll_process(self.now, &mut self.out);
-        process.min(self.device.poll_services(self.now, &mut self.out))
+        let next = self.device.poll(self.now, &mut self.out);
+        self.follow(next)
     }
 
     pub(crate) fn nmt(&mut self, command: u8) {
@@ -310,8 +430,9 @@ impl Bench {
     }
 
     pub(crate) fn set_value(&mut self, sub: u8, bytes: &[u8]) {
-        DICTIONARY.field(0x6000, sub).set(self.device.image_mut(), bytes);
-        self.device.changed(self.now, &mut self.out);
+        let field = DICTIONARY.field(0x6000, sub);
+        let next = self.device.publish(self.now, &mut self.out, |_, image| field.set(image, bytes));
+        self.follow(next);
     }
 
     /// One SDO exchange.

@@ -1,7 +1,8 @@
 //! EMCY: messages, error register, the list 1003h and its COB-ID 1014h.
 
-use crate::bench::Bench;
-use canopen::emcy::{Fault, Message};
+use crate::bench::{Bench, PRESSURE_RAIL, SENSOR_BREAK, TEMPERATURE_RAIL};
+use canopen::BusEvent;
+use canopen::emcy::Message;
 
 fn emcy(code: u16, register: u8) -> (u16, Vec<u8>) {
     (0x085, Message { code, register, detail: [0; 5] }.encode().to_vec())
@@ -10,13 +11,12 @@ fn emcy(code: u16, register: u8) -> (u16, Vec<u8>) {
 #[test]
 fn a_fault_is_signalled_once_and_the_last_one_gone_is_signalled() {
     let mut bench = Bench::booted();
-    let now = bench.now;
-    bench.device.raise(Fault::SensorBreak, now);
-    bench.device.raise(Fault::SensorBreak, now);
-    bench.device.raise(Fault::ErrorPassive, now);
-    bench.device.clear(Fault::SensorBreak, now);
-    bench.device.clear(Fault::SensorBreak, now);
-    bench.device.clear(Fault::ErrorPassive, now);
+    bench.raise(SENSOR_BREAK);
+    bench.raise(SENSOR_BREAK);
+    bench.bus(BusEvent::Passive);
+    bench.clear(SENSOR_BREAK);
+    bench.clear(SENSOR_BREAK);
+    bench.bus(BusEvent::Recovered);
     bench.poll();
     assert_eq!(bench.sent(), [emcy(0x5006, 0x01), emcy(0x8120, 0x11), emcy(0, 0)]);
 }
@@ -24,9 +24,9 @@ fn a_fault_is_signalled_once_and_the_last_one_gone_is_signalled() {
 #[test]
 fn the_error_register_follows() {
     let mut bench = Bench::booted();
-    bench.device.raise(Fault::Overrun, bench.now);
+    bench.bus(BusEvent::Passive);
     assert_eq!(bench.read(0x1001, 0), Ok(vec![0x11]));
-    bench.device.clear(Fault::Overrun, bench.now);
+    bench.bus(BusEvent::Recovered);
     assert_eq!(bench.read(0x1001, 0), Ok(vec![0]));
 }
 
@@ -35,8 +35,8 @@ fn the_list_has_what_was_signalled_newest_first() {
     let mut bench = Bench::booted();
     assert_eq!(bench.read(0x1003, 0), Ok(vec![0]));
     assert_eq!(bench.read(0x1003, 1), Err(0x0800_0024));
-    bench.device.raise(Fault::SensorBreak, bench.now);
-    bench.device.raise(Fault::PressureRail, bench.now);
+    bench.raise(SENSOR_BREAK);
+    bench.raise(PRESSURE_RAIL);
     assert_eq!(bench.read(0x1003, 0), Ok(vec![2]));
     assert_eq!(bench.read(0x1003, 1), Ok(vec![0x02, 0x80, 0, 0]));
     assert_eq!(bench.read(0x1003, 2), Ok(vec![0x06, 0x50, 0, 0]));
@@ -45,7 +45,7 @@ fn the_list_has_what_was_signalled_newest_first() {
 #[test]
 fn the_list_is_cleared_by_a_zero_and_by_nothing_else() {
     let mut bench = Bench::booted();
-    bench.device.raise(Fault::SensorBreak, bench.now);
+    bench.raise(SENSOR_BREAK);
     assert_eq!(bench.write(0x1003, 0, &[1]), Err(0x0609_0030));
     assert_eq!(bench.write32(0x1003, 1, 0), Err(0x0601_0002));
     assert_eq!(bench.write(0x1003, 0, &[0]), Ok(()));
@@ -59,8 +59,8 @@ fn messages_wait_for_room_in_order_and_the_oldest_are_kept() {
     let mut bench = Bench::booted();
     bench.out.room = 0;
     for _ in 0..6 {
-        bench.device.raise(Fault::SensorBreak, bench.now);
-        bench.device.clear(Fault::SensorBreak, bench.now);
+        bench.raise(SENSOR_BREAK);
+        bench.clear(SENSOR_BREAK);
     }
     bench.poll();
     assert_eq!(bench.sent(), []);
@@ -73,9 +73,9 @@ fn messages_wait_for_room_in_order_and_the_oldest_are_kept() {
 #[test]
 fn a_fault_that_is_still_there_after_a_reset_is_news_again() {
     let mut bench = Bench::booted();
-    bench.device.raise(Fault::SensorBreak, bench.now);
-    bench.device.raise(Fault::PressureRail, bench.now);
-    bench.device.clear(Fault::PressureRail, bench.now);
+    bench.raise(SENSOR_BREAK);
+    bench.raise(PRESSURE_RAIL);
+    bench.clear(PRESSURE_RAIL);
     bench.nmt(0x82);
     bench.take();
     bench.start();
@@ -92,11 +92,11 @@ fn its_identifier_changes_only_while_it_does_not_exist() {
         assert_eq!(bench.write32(0x1014, 0, refused), Err(0x0609_0030));
     }
     bench.write32(0x1014, 0, 0x8000_0085).unwrap();
-    bench.device.raise(Fault::SensorBreak, bench.now);
+    bench.raise(SENSOR_BREAK);
     bench.poll();
     assert_eq!(bench.sent(), []);
     bench.write32(0x1014, 0, 0x0000_00A0).unwrap();
-    bench.device.raise(Fault::PressureRail, bench.now);
+    bench.raise(PRESSURE_RAIL);
     bench.poll();
     assert_eq!(bench.sent(), [(0x0A0, vec![0x02, 0x80, 1, 0, 0, 0, 0, 0])]);
 }
@@ -105,13 +105,13 @@ fn its_identifier_changes_only_while_it_does_not_exist() {
 fn the_inhibit_time_separates_messages() {
     let mut bench = Bench::booted();
     bench.write(0x1015, 0, &[50, 0]).unwrap();
-    bench.device.raise(Fault::SensorBreak, bench.now);
-    bench.device.raise(Fault::PressureRail, bench.now);
-    bench.device.raise(Fault::TemperatureRail, bench.now);
+    bench.raise(SENSOR_BREAK);
+    bench.raise(PRESSURE_RAIL);
+    bench.raise(TEMPERATURE_RAIL);
     assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0, 5_000, 10_000]);
-    bench.device.clear(Fault::SensorBreak, bench.now);
-    bench.device.raise(Fault::SensorBreak, bench.now);
+    bench.clear(SENSOR_BREAK);
+    bench.raise(SENSOR_BREAK);
     assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0]);
-    bench.device.raise(Fault::Overrun, bench.now);
+    bench.bus(BusEvent::Overrun);
     assert_eq!(bench.times_of(0x085, canopen::Duration::from_millis(30)), [0]);
 }

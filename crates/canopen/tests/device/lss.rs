@@ -68,7 +68,7 @@ fn a_waiting_slave_takes_no_configuration() {
     ];
     for request in requests {
         assert_eq!(send(&mut bench, request), None);
-        assert_eq!(bench.device.take_action(), Some(Action::Identifiers).filter(|_| request == requests[0]));
+        assert_eq!(bench.take_action(), Some(Action::Identifiers).filter(|_| request == requests[0]));
     }
 }
 
@@ -110,13 +110,13 @@ fn an_unconfigured_device_hears_lss_alone_and_boots_once_it_has_a_node_id() {
     bench.run(Duration::from_millis(3000));
     assert_eq!((bench.sent(), bench.device.state()), (vec![], State::Initialising));
 
-    assert_eq!(bench.device.take_action(), Some(Action::Identifiers));
+    assert_eq!(bench.take_action(), Some(Action::Identifiers));
     select(&mut bench);
     assert_eq!(send(&mut bench, Request::InquireNodeId), Some(Response::NodeIdIs(255)));
     assert_eq!(send(&mut bench, Request::NodeId(0x7F)), Some(Response::NodeId(0)));
-    assert_eq!(bench.device.take_action(), None);
+    assert_eq!(bench.take_action(), None);
     configuration(&mut bench, false);
-    assert_eq!(bench.device.take_action(), Some(Action::ResetCommunication));
+    assert_eq!(bench.take_action(), Some(Action::ResetCommunication));
     bench.start();
     assert_eq!(bench.sent(), [(0x77F, vec![0])]);
     assert_eq!(bench.device.state(), State::PreOperational);
@@ -139,20 +139,20 @@ fn bit_rates_are_those_of_table_0() {
 #[test]
 fn nothing_is_sent_from_the_activation_until_two_delays_later() {
     let mut bench = Bench::operational();
-    bench.device.take_action();
+    bench.take_action();
     configuration(&mut bench, true);
     send(&mut bench, Request::BitTiming { table: 0, index: 2 });
     bench.run(Duration::from_millis(500));
     bench.take();
     assert_eq!(send(&mut bench, Request::Activate { delay: 700 }), None);
     bench.run(Duration::from_millis(699));
-    assert_eq!((bench.sent(), bench.device.take_action()), (vec![], None));
+    assert_eq!((bench.sent(), bench.take_action()), (vec![], None));
     bench.run(Duration::from_millis(1));
     bench.poll();
     let rate = BitRate::from_kbit(500).unwrap();
-    assert_eq!(bench.device.take_action(), Some(Action::BitRate(rate)));
+    assert_eq!(bench.take_action(), Some(Action::BitRate(rate)));
     bench.run(Duration::from_millis(698));
-    assert_eq!((bench.sent(), bench.device.take_action()), (vec![], None));
+    assert_eq!((bench.sent(), bench.take_action()), (vec![], None));
     bench.run(Duration::from_millis(5));
     assert!(!bench.sent().is_empty(), "what was held back is sent");
     assert_eq!(bench.device.state(), State::Operational);
@@ -162,15 +162,15 @@ fn nothing_is_sent_from_the_activation_until_two_delays_later() {
 fn a_store_is_answered_when_it_is_done() {
     for (result, code) in [(Ok(()), 0), (Err(canopen::sdo::Abort::General), 2)] {
         let mut bench = Bench::booted();
-        bench.device.take_action();
+        bench.take_action();
         configuration(&mut bench, true);
         send(&mut bench, Request::NodeId(9));
         send(&mut bench, Request::BitTiming { table: 0, index: 9 });
         assert_eq!(send(&mut bench, Request::Store), None);
         let configuration = Configuration { node_id: NodeId::new(9), bit_rate: BitRate::AUTO };
-        assert_eq!(bench.device.take_action(), Some(Action::Store(Job::Configure(configuration))));
-        assert_eq!(bench.device.take_action(), None);
-        bench.device.finish(result, bench.now, &mut bench.out);
+        assert_eq!(bench.take_action(), Some(Action::Store(Job::Configure(configuration))));
+        assert_eq!(bench.take_action(), None);
+        bench.finish(result);
         assert_eq!(bench.sent(), [(0x7E4, Response::Stored(code).encode().to_vec())]);
     }
 }

@@ -5,6 +5,7 @@ mod block;
 mod dictionary;
 mod emcy;
 mod heartbeat;
+mod hooks;
 mod lss;
 mod mapping;
 mod multiplexed;

@@ -168,7 +168,7 @@ fn the_dispatching_list_says_where_the_objects_of_others_go() {
         (line(2, 1, 5, 9), false),
     ] {
         let mut bench = receiver(SOURCE);
-        DICTIONARY.field(0x1FD0, 1).set(bench.device.image_mut(), &line);
+        bench.device.show(|_, image| DICTIONARY.field(0x1FD0, 1).set(image, &line));
         bench.write(0x1FD0, 0, &[1]).unwrap();
         bench.receive(Frame::new(RPDO, &[9, 0x34, 0x71, 5, 0xCD, 0xAB, 0, 0]).unwrap());
         assert_eq!(value(&bench) == 0xABCD, is_taken, "{line:x?}");

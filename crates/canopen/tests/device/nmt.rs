@@ -1,9 +1,8 @@
 //! NMT: commands, the services of each state, boot-up, start-up and error behaviour.
 
-use crate::bench::{Bench, ID};
-use canopen::emcy::Fault;
+use crate::bench::{Bench, ID, SENSOR_BREAK, UNEXPECTED_RESET};
 use canopen::nmt::State;
-use canopen::{Action, Duration, Frame};
+use canopen::{Action, Duration, ErrorClass, Frame};
 
 const START: u8 = 1;
 const STOP: u8 = 2;
@@ -37,7 +36,7 @@ fn before_the_start_the_node_is_silent_and_deaf() {
     bench.nmt(RESET_NODE);
     bench.run(Duration::from_millis(5000));
     assert_eq!(bench.sent(), []);
-    assert_eq!((bench.device.state(), bench.device.take_action()), (State::Initialising, None));
+    assert_eq!((bench.device.state(), bench.take_action()), (State::Initialising, None));
 }
 
 #[test]
@@ -69,7 +68,7 @@ fn stopped_has_heartbeat_and_nothing_else() {
     let mut bench = Bench::operational();
     bench.nmt(STOP);
     bench.take();
-    bench.device.raise(Fault::SensorBreak, bench.now);
+    bench.raise(SENSOR_BREAK);
     assert_eq!(bench.ask_raw([0x40, 0, 0x10, 0, 0, 0, 0, 0]), None);
     bench.sync();
     bench.run(Duration::from_millis(3000));
@@ -81,7 +80,7 @@ fn stopped_has_heartbeat_and_nothing_else() {
 fn what_waits_for_a_state_with_emcy_is_sent_then() {
     let mut bench = Bench::booted();
     bench.nmt(STOP);
-    bench.device.raise(Fault::SensorBreak, bench.now);
+    bench.raise(SENSOR_BREAK);
     bench.poll();
     assert_eq!(bench.sent(), []);
     bench.nmt(PRE_OPERATIONAL);
@@ -94,10 +93,10 @@ fn a_reset_is_told_once_and_the_node_waits_for_its_start() {
         [(RESET_NODE, Action::ResetNode), (RESET_COMMUNICATION, Action::ResetCommunication)]
     {
         let mut bench = Bench::operational();
-        while bench.device.take_action().is_some() {}
+        while bench.take_action().is_some() {}
         bench.nmt(command);
-        assert_eq!(bench.device.take_action(), Some(action));
-        assert_eq!(bench.device.take_action(), None);
+        assert_eq!(bench.take_action(), Some(action));
+        assert_eq!(bench.take_action(), None);
         bench.run(Duration::from_millis(5000));
         assert_eq!(bench.sent(), []);
         bench.start();
@@ -157,7 +156,7 @@ fn a_master_that_was_faster_has_the_last_word() {
 fn a_node_with_an_error_does_not_start_by_itself() {
     let mut bench = Bench::unstarted();
     bench.device.application_mut().start_up = 8;
-    bench.device.raise(Fault::UnexpectedReset, bench.now);
+    bench.raise(UNEXPECTED_RESET);
     bench.start();
     bench.set_value(1, &[1, 2, 3, 4]);
     assert_eq!(bench.device.state(), State::PreOperational);
@@ -167,10 +166,10 @@ fn a_node_with_an_error_does_not_start_by_itself() {
 #[test]
 fn error_behaviour_0_leaves_operational_only() {
     let mut bench = Bench::operational();
-    bench.device.apply_error_behaviour(1);
+    bench.error(ErrorClass::COMMUNICATION);
     assert_eq!(bench.device.state(), State::PreOperational);
     bench.nmt(STOP);
-    bench.device.apply_error_behaviour(1);
+    bench.error(ErrorClass::COMMUNICATION);
     assert_eq!(bench.device.state(), State::Stopped);
 }
 
@@ -179,7 +178,7 @@ fn error_behaviour_2_stops_and_others_change_nothing() {
     for (value, state) in [(1, State::Operational), (3, State::Operational), (2, State::Stopped)] {
         let mut bench = Bench::operational();
         bench.write(0x1029, 1, &[value]).unwrap();
-        bench.device.apply_error_behaviour(1);
+        bench.error(ErrorClass::COMMUNICATION);
         assert_eq!(bench.device.state(), state);
     }
 }

@@ -99,12 +99,12 @@ fn faults_of_an_access_have_their_abort_codes() {
 #[test]
 fn the_application_decides_on_its_own_objects() {
     let mut bench = Bench::booted();
-    bench.device.take_parameters_changed();
+    bench.take_parameters();
     assert_eq!(bench.write32(0x6102, 0, 4712), Err(0x0800_0020));
-    assert!(!bench.device.take_parameters_changed());
+    assert!(!bench.take_parameters());
     assert_eq!(bench.write32(0x6102, 0, 4711), Ok(()));
-    assert!(bench.device.take_parameters_changed());
-    assert!(!bench.device.take_parameters_changed());
+    assert!(bench.take_parameters());
+    assert!(!bench.take_parameters());
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Storing and loading: 1010h, 1011h, and the packed values.
 
 use crate::bench::{Bench, DICTIONARY, ID};
-use canopen::dictionary::Group;
+use canopen::dictionary::{Group, Groups};
 use canopen::sdo::Abort;
-use canopen::{Action, Job, NodeId, Selection};
+use canopen::{Action, Job, NodeId};
 
 const SAVE: [u8; 4] = *b"save";
 const LOAD: [u8; 4] = *b"load";
@@ -12,11 +12,11 @@ const RESET_NODE: u8 = 0x81;
 
 /// Writes a signature that the node takes, and gives the job.
 fn begin(bench: &mut Bench, index: u16, sub: u8, signature: [u8; 4]) -> Job {
-    bench.device.take_action();
+    while bench.take_action().is_some() {}
     let [low, high] = index.to_le_bytes();
     let [a, b, c, d] = signature;
     assert_eq!(bench.ask_raw([0x23, low, high, sub, a, b, c, d]), None, "the response waits");
-    match bench.device.take_action() {
+    match bench.take_action() {
         Some(Action::Store(job)) => job,
         other => panic!("{other:?}"),
     }
@@ -24,7 +24,7 @@ fn begin(bench: &mut Bench, index: u16, sub: u8, signature: [u8; 4]) -> Job {
 
 fn finish(bench: &mut Bench, result: Result<(), Abort>) -> Vec<u8> {
     bench.take();
-    bench.device.finish(result, bench.now, &mut bench.out);
+    bench.finish(result);
     let sent = bench.sent();
     assert_eq!(sent.len(), 1);
     sent[0].1.clone()
@@ -33,7 +33,7 @@ fn finish(bench: &mut Bench, result: Result<(), Abort>) -> Vec<u8> {
 /// Does what the memory would do.
 fn save(bench: &mut Bench) {
     let job = begin(bench, 0x1010, 1, SAVE);
-    assert_eq!(job, Job::Save(Selection::All));
+    assert_eq!(job, Job::Store(Groups::ALL_PARAMETERS));
     for (number, group) in [Group::Communication, Group::Application].into_iter().enumerate() {
         bench.device.application_mut().stored[number] = packed(bench, group);
     }
@@ -41,10 +41,9 @@ fn save(bench: &mut Bench) {
 }
 
 fn packed(bench: &Bench, group: Group) -> Vec<u8> {
-    let mut buffer = heapless::Vec::<u8, 2048>::new();
-    let node_id = bench.device.node_id();
-    DICTIONARY.pack(group, node_id, bench.device.image(), &mut buffer).unwrap();
-    buffer.to_vec()
+    let mut buffer = [0; 2048];
+    let len = DICTIONARY.pack(group, bench.device.node_id(), bench.device.image(), &mut buffer).unwrap();
+    buffer[..len].to_vec()
 }
 
 fn reset(bench: &mut Bench, command: u8) {
@@ -55,10 +54,14 @@ fn reset(bench: &mut Bench, command: u8) {
 
 #[test]
 fn the_sub_index_says_what_is_stored_and_restored() {
-    let selections = [(1, Selection::All), (2, Selection::Communication), (3, Selection::Application)];
+    let selections = [
+        (1, Groups::ALL_PARAMETERS),
+        (2, Groups::one(Group::Communication)),
+        (3, Groups::one(Group::Application)),
+    ];
     for (sub, selection) in selections {
         let mut bench = Bench::booted();
-        assert_eq!(begin(&mut bench, 0x1010, sub, SAVE), Job::Save(selection));
+        assert_eq!(begin(&mut bench, 0x1010, sub, SAVE), Job::Store(selection));
         finish(&mut bench, Ok(()));
         assert_eq!(begin(&mut bench, 0x1011, sub, LOAD), Job::Restore(selection));
         finish(&mut bench, Ok(()));
@@ -71,7 +74,7 @@ fn the_calibration_is_stored_by_its_own_command() {
     let mut bench = Bench::booted();
     let value = 2.5_f32.to_le_bytes();
     bench.write(0x6106, 0, &value).unwrap();
-    assert_eq!(begin(&mut bench, 0x6107, 0, SAVE), Job::Save(Selection::Calibration));
+    assert_eq!(begin(&mut bench, 0x6107, 0, SAVE), Job::Store(Groups::one(Group::Calibration)));
     bench.device.application_mut().stored[2] = packed(&bench, Group::Calibration);
     finish(&mut bench, Ok(()));
     assert_eq!(bench.write(0x6107, 0, &LOAD), Err(0x0800_0020));
@@ -82,20 +85,22 @@ fn the_calibration_is_stored_by_its_own_command() {
 
 #[test]
 fn the_other_commands_leave_the_calibration_alone() {
-    for selection in [Selection::All, Selection::Communication, Selection::Application] {
+    for selection in
+        [Groups::ALL_PARAMETERS, Groups::one(Group::Communication), Groups::one(Group::Application)]
+    {
         assert!(!selection.contains(Group::Calibration));
     }
-    assert!(Selection::Calibration.contains(Group::Calibration));
-    assert!(!Selection::Calibration.contains(Group::Application));
+    assert!(Groups::one(Group::Calibration).contains(Group::Calibration));
+    assert!(!Groups::one(Group::Calibration).contains(Group::Application));
 }
 
 #[test]
 fn a_wrong_signature_stores_nothing() {
     let mut bench = Bench::booted();
-    bench.device.take_action();
+    bench.take_action();
     for (index, signature) in [(0x1010, LOAD), (0x1011, SAVE), (0x1010, *b"SAVE"), (0x1011, [0; 4])] {
         assert_eq!(bench.write(index, 1, &signature), Err(0x0800_0020));
-        assert_eq!(bench.device.take_action(), None);
+        assert_eq!(bench.take_action(), None);
     }
     assert_eq!(bench.write(0x1010, 4, &SAVE), Err(0x0609_0011));
 }
@@ -112,11 +117,11 @@ fn a_repeated_request_waits_for_the_same_job_and_another_one_is_refused() {
     let mut bench = Bench::booted();
     begin(&mut bench, 0x1010, 2, SAVE);
     assert_eq!(bench.ask_raw([0x23, 0x10, 0x10, 2, b's', b'a', b'v', b'e']), None);
-    assert_eq!(bench.device.take_action(), None);
+    assert_eq!(bench.take_action(), None);
     assert_eq!(bench.write(0x1010, 3, &SAVE), Err(0x0800_0022));
     // The client has gone on to something else: nobody waits for the first job any more.
     bench.take();
-    bench.device.finish(Ok(()), bench.now, &mut bench.out);
+    bench.finish(Ok(()));
     assert_eq!(bench.sent(), []);
 }
 
@@ -240,11 +245,11 @@ fn the_size_of_a_packed_group_is_known() {
 #[test]
 fn a_setting_is_stored_at_once_and_shown_by_the_application() {
     let mut bench = Bench::booted();
-    bench.device.take_action();
+    bench.take_action();
     assert_eq!(bench.write(0x5F00, 0, &[3]), Err(0x0609_0031));
-    assert_eq!(bench.device.take_action(), None);
+    assert_eq!(bench.take_action(), None);
     assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "the response waits");
-    assert_eq!(bench.device.take_action(), Some(Action::Store(Job::Set(2))));
+    assert_eq!(bench.take_action(), Some(Action::Store(Job::Setting(2))));
     assert_eq!(bench.read(0x5F00, 0), Ok(vec![0]), "it is not stored yet");
     assert_eq!(bench.ask_raw([0x2F, 0, 0x5F, 0, 2, 0, 0, 0]), None, "asked again");
     assert_eq!(finish(&mut bench, Ok(())), [0x60, 0, 0x5F, 0, 0, 0, 0, 0]);

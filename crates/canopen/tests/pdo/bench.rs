@@ -1,7 +1,6 @@
 //! A device without an application, a queue that keeps what it is given, and a client.
 
-use canopen::dictionary::Entry;
-use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response};
+use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response};
 use canopen::{Application, Device, Frame, Instant, QueueFull, Transmit};
 
 /// The node-ID of the devices.
@@ -9,13 +8,7 @@ pub(crate) const ID: u8 = 5;
 
 pub(crate) struct Nothing;
 
-impl Application for Nothing {
-    fn initialise(&mut self, _: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, _: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        Ok(())
-    }
-}
+impl Application for Nothing {}
 
 /// Everything that was sent.
 #[derive(Default)]
@@ -33,8 +26,15 @@ impl Transmit for Sent {
 }
 
 /// Writes up to four bytes by SDO; the abort code where the device refuses them.
-pub(crate) fn download<const N: usize>(
-    device: &mut Device<Nothing, N>,
+pub(crate) fn download<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+>(
+    device: &mut Device<A, N, T, R, W, M>,
     (index, sub): (u16, u8),
     bytes: &[u8],
     now: Instant,
@@ -43,7 +43,7 @@ pub(crate) fn download<const N: usize>(
     let request = Request::Download(at, Initiate::Expedited(Bytes::from_slice(bytes)));
     let mut sent = Sent::default();
     let frame = Frame::new(0x600 + u16::from(ID), &request.encode()).unwrap();
-    device.on_service_frame(&frame, now, &mut sent);
+    let _ = device.on_service_frame(&frame, now, &mut sent);
     let response = sent.0.iter().find(|frame| frame.id() == 0x580 + u16::from(ID)).unwrap();
     match Response::parse(response.data().try_into().unwrap()) {
         Some(Response::Downloaded(_)) => Ok(()),

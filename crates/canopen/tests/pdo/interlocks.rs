@@ -1,7 +1,7 @@
 //! The interlocks of the PDO objects: whatever is written to them in whatever order, no PDO exists that cannot be, and
 //! none changes while it exists (CiA 301, 7.5.2.35 to 38).
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Type};
 use canopen::pdo::MappedObject;
 use canopen::{CobId, Device, Frame, Instant, NodeId};
 use proptest::prelude::*;
@@ -11,27 +11,27 @@ use crate::bench::{ID, Nothing, Sent, download};
 
 const PDOS: u16 = 8;
 
-const fn parameter(index: u16, sub: u8, kind: Type, rule: Rule) -> Object {
-    Object::new(index, sub, "", kind, Access::ReadWrite).rule(rule)
+const fn parameter(index: u16, sub: u8, kind: Type) -> Object {
+    Object::new(index, sub, "", kind, Access::ReadWrite)
 }
 
 const fn communication(index: u16) -> [Object; 6] {
     let invalid = DefaultValue::NodeId(0x8000_0180);
     [
         Object::highest(index, 6, ""),
-        parameter(index, 1, Type::Unsigned32, Rule::PdoCobId).default(invalid),
-        parameter(index, 2, Type::Unsigned8, Rule::PdoType).value(255),
-        parameter(index, 3, Type::Unsigned16, Rule::PdoInhibit),
-        parameter(index, 5, Type::Unsigned16, Rule::PdoEventTimer),
-        parameter(index, 6, Type::Unsigned8, Rule::PdoSyncStart).limits(0, 240),
+        parameter(index, 1, Type::Unsigned32).default(invalid),
+        parameter(index, 2, Type::Unsigned8).value(255),
+        parameter(index, 3, Type::Unsigned16),
+        parameter(index, 5, Type::Unsigned16),
+        parameter(index, 6, Type::Unsigned8).limits(0, 240),
     ]
 }
 
 const fn mapping(index: u16) -> [Object; 9] {
-    let mut rows = [parameter(index, 0, Type::Unsigned8, Rule::PdoCount).limits(0, 8); 9];
+    let mut rows = [parameter(index, 0, Type::Unsigned8).limits(0, 8); 9];
     let mut sub = 1;
     while sub <= 8 {
-        rows[sub as usize] = parameter(index, sub, Type::Unsigned32, Rule::PdoSlot);
+        rows[sub as usize] = parameter(index, sub, Type::Unsigned32);
         sub += 1;
     }
     rows
@@ -92,7 +92,7 @@ type Node = Device<Nothing, SIZE>;
 
 fn node() -> Node {
     let mut device = Device::new(&DICTIONARY, NodeId::new(ID).unwrap(), Nothing);
-    device.start(Instant(0), &mut Sent::default());
+    let _ = device.start(Instant(0), &mut Sent::default());
     device
 }
 
@@ -279,7 +279,11 @@ fn no_sequence_of_writes_makes_a_pdo_that_cannot_be() {
         .run(&sequences(), |(is_operational, sequence)| {
             let mut device = node();
             if is_operational {
-                device.on_process_frame(&Frame::new(0, &[1, 0]).unwrap(), Instant(0), &mut Sent::default());
+                let _ = device.on_process_frame(
+                    &Frame::new(0, &[1, 0]).unwrap(),
+                    Instant(0),
+                    &mut Sent::default(),
+                );
             }
             for next in sequence {
                 step(&mut device, &next, &mut seen.borrow_mut())?;

@@ -1,18 +1,24 @@
 //! PDOs at numbers of the dictionary's choice, and PDOs to which a profile has given their CAN-IDs.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Type};
 use canopen::{Device, Frame, Instant, NodeId};
 
 use crate::bench::{ID, Nothing, Sent, download};
 
 const NOW: Instant = Instant(1_000_000);
 
-const fn cob_id(index: u16, default: DefaultValue, rule: Rule) -> [Object; 3] {
+const fn cob_id(index: u16, default: DefaultValue) -> [Object; 3] {
     [
         Object::highest(index, 2, ""),
-        Object::new(index, 1, "", Type::Unsigned32, Access::ReadWrite).default(default).rule(rule),
-        Object::new(index, 2, "", Type::Unsigned8, Access::ReadWrite).value(255).rule(Rule::PdoType),
+        Object::new(index, 1, "", Type::Unsigned32, Access::ReadWrite).default(default),
+        Object::new(index, 2, "", Type::Unsigned8, Access::ReadWrite).value(255),
     ]
+}
+
+/// One whose CAN-ID is fixed.
+const fn predefined(index: u16, default: DefaultValue) -> [Object; 3] {
+    let [highest, cob_id, transmission] = cob_id(index, default);
+    [highest, cob_id.predefined(), transmission]
 }
 
 /// A mapping that never changes.
@@ -29,14 +35,14 @@ const fn value(index: u16, access: Access, mapping: Mapping) -> Object {
 
 /// RPDOs 7 and 512, TPDOs 2 (multiplexed), 130, 261 and 512, all but the last with a CAN-ID of their own.
 const PARTS: &[&[Object]] = &[
-    &cob_id(0x1406, DefaultValue::Integer(0x206), Rule::PdoPredefined),
-    &cob_id(0x15FF, DefaultValue::Integer(0x180), Rule::PdoPredefined),
+    &predefined(0x1406, DefaultValue::Integer(0x206)),
+    &predefined(0x15FF, DefaultValue::Integer(0x180)),
     &mapping(0x1606, 0x2004_0010),
     &mapping(0x17FF, 0x2005_0010),
-    &cob_id(0x1801, DefaultValue::NodeId(0x500), Rule::PdoPredefined),
-    &cob_id(0x1881, DefaultValue::NodeId(0x4000_0480), Rule::PdoPredefined),
-    &cob_id(0x1904, DefaultValue::Integer(0x4000_0180), Rule::PdoPredefined),
-    &cob_id(0x19FF, DefaultValue::Integer(0x8000_0000), Rule::PdoCobId),
+    &predefined(0x1801, DefaultValue::NodeId(0x500)),
+    &predefined(0x1881, DefaultValue::NodeId(0x4000_0480)),
+    &predefined(0x1904, DefaultValue::Integer(0x4000_0180)),
+    &cob_id(0x19FF, DefaultValue::Integer(0x8000_0000)),
     &[Object::new(0x1A01, 0, "", Type::Unsigned8, Access::Const).value(0xFF)],
     &mapping(0x1A81, 0x2001_0010),
     &mapping(0x1B04, 0x2002_0010),
@@ -63,16 +69,15 @@ impl Bench {
     fn operational() -> Bench {
         let device = Device::new(&DICTIONARY, NodeId::new(ID), Nothing);
         let mut bench = Bench { device, sent: Sent::default() };
-        bench.device.start(NOW, &mut bench.sent);
+        let _ = bench.device.start(NOW, &mut bench.sent);
         bench.sent.0.clear();
         bench.receive(&Frame::new(0, &[1, ID]).unwrap());
         bench
     }
 
     fn receive(&mut self, frame: &Frame) {
-        self.device.on_process_frame(frame, NOW, &mut self.sent);
-        self.device.on_service_frame(frame, NOW, &mut self.sent);
-        self.device.poll_process(NOW, &mut self.sent);
+        let _ = self.device.on_frame(frame, NOW, &mut self.sent);
+        let _ = self.device.poll_process(NOW, &mut self.sent);
     }
 
     fn ids(&mut self) -> Vec<u16> {
@@ -84,14 +89,14 @@ impl Bench {
         self.ids();
         let field = DICTIONARY.field(index, 0);
         let changed = field.u16(self.device.image()).wrapping_add(1);
-        field.store(self.device.image_mut(), changed.to_le_bytes());
-        self.device.changed(NOW, &mut self.sent);
+        let _ =
+            self.device.publish(NOW, &mut self.sent, |_, image| field.store(image, changed.to_le_bytes()));
         self.ids()
     }
 
     fn write_cob_id(&mut self, index: u16, value: u32) -> Result<(), u32> {
         let result = download(&mut self.device, (index, 1), &value.to_le_bytes(), NOW);
-        self.device.poll_process(NOW, &mut self.sent);
+        let _ = self.device.poll_process(NOW, &mut self.sent);
         result
     }
 }

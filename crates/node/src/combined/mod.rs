@@ -6,7 +6,7 @@ mod shift;
 
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
-use crate::{Personality, communication, dictionaries, encoder, flags, pressure};
+use crate::{Personality, communication, dictionaries, encoder, flags, lost_events, pressure};
 use canopen::dictionary::{self, Access, Object, Type};
 
 /// From the indexes of a device profile to those of the second device.
@@ -41,6 +41,7 @@ const PARTS: &[&[Object]] = &[
     communication::tpdo_mappings(&pdos::TPDOS).as_flattened(),
     communication::START_UP,
     &[personality(Personality::Combined)],
+    lost_events::OBJECTS,
     encoder::SENSORS,
     pressure::CALIBRATION,
     &[TRANSFER_BUFFER],

@@ -1,7 +1,7 @@
 //! PDO objects: eight PDOs each way. RPDOs wait for a use in every personality; what a TPDO is by default is a matter of
 //! the personality.
 
-use canopen::dictionary::{self, Access, DefaultValue, Group, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Group, Object, Type};
 
 /// What a TPDO is by default.
 pub(crate) struct Tpdo {
@@ -32,38 +32,38 @@ pub(crate) const fn off(base: u32, number: u16) -> DefaultValue {
     }
 }
 
-const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type, rule: Rule) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Communication).rule(rule)
+const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Communication)
 }
 
 pub(crate) const fn cob_id(index: u16, default: DefaultValue) -> Object {
-    parameter(index, 1, "COB-ID", Type::Unsigned32, Rule::PdoCobId).default(default)
+    parameter(index, 1, "COB-ID", Type::Unsigned32).default(default)
 }
 
 pub(crate) const fn transmission_type(index: u16, default: i64) -> Object {
-    parameter(index, 2, "Transmission type", Type::Unsigned8, Rule::PdoType).value(default)
+    parameter(index, 2, "Transmission type", Type::Unsigned8).value(default)
 }
 
 pub(crate) const fn inhibit_time(index: u16) -> Object {
-    parameter(index, 3, "Inhibit time", Type::Unsigned16, Rule::PdoInhibit).unit("100 us")
+    parameter(index, 3, "Inhibit time", Type::Unsigned16).unit("100 us")
 }
 
 pub(crate) const fn event_timer(index: u16, milliseconds: i64) -> Object {
-    parameter(index, 5, "Event timer", Type::Unsigned16, Rule::PdoEventTimer).value(milliseconds).unit("ms")
+    parameter(index, 5, "Event timer", Type::Unsigned16).value(milliseconds).unit("ms")
 }
 
 pub(crate) const fn sync_start(index: u16) -> Object {
-    parameter(index, 6, "SYNC start value", Type::Unsigned8, Rule::PdoSyncStart).limits(0, 240)
+    parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240)
 }
 
 /// The number of mapped objects. No limit in the table: 254 and 255 make it a multiplexed PDO, and the rule knows how
 /// many slots there are.
 pub(crate) const fn count(index: u16, name: &'static str, used: i64) -> Object {
-    parameter(index, 0, name, Type::Unsigned8, Rule::PdoCount).value(used)
+    parameter(index, 0, name, Type::Unsigned8).value(used)
 }
 
 pub(crate) const fn slot(index: u16, sub: u8, mapped: i64) -> Object {
-    parameter(index, sub, "Mapped object", Type::Unsigned32, Rule::PdoSlot).value(mapped)
+    parameter(index, sub, "Mapped object", Type::Unsigned32).value(mapped)
 }
 
 const fn rpdo(index: u16, cob_id_default: DefaultValue, name: &'static str) -> [Object; 4] {

@@ -1,15 +1,14 @@
 //! Manufacturer-specific objects of the encoder, 2100h to 210Ch: which sensors there are, and what CiA 406 leaves open.
 
-use super::rules;
-use canopen::dictionary::{Access, Group, Mapping, Object, Rule, Type};
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Application)
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
 
 /// A parameter that says what a sensor is.
 const fn sensor(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
-    parameter(index, sub, name, kind).rule(Rule::Application(rules::SENSOR))
+    parameter(index, sub, name, kind).handled()
 }
 
 /// The codes 1 to 9 of object 1000h. The type decides whether the SSI input is read or the timer.
@@ -30,10 +29,7 @@ const fn fastest(sub: u8, name: &'static str) -> Object {
 }
 
 const fn module(sub: u8, name: &'static str, default: i64) -> Object {
-    parameter(0x2107, sub, name, Type::Integer32)
-        .value(default)
-        .unit("steps")
-        .rule(Rule::Application(rules::FACTORY))
+    parameter(0x2107, sub, name, Type::Integer32).value(default).unit("steps").handled()
 }
 
 const fn state(index: u16, sub: u8, name: &'static str) -> Object {
@@ -85,8 +81,7 @@ pub(crate) const SENSORS: &[Object] = &[
     // "fact" opens 2107h until the next reset or anything else is written.
     Object::new(0x2108, 0, "Factory key", Type::Unsigned32, Access::WriteOnly),
     // A mask of alarms (6503h) to clear.
-    Object::new(0x2109, 0, "Alarm acknowledgement", Type::Unsigned16, Access::WriteOnly)
-        .rule(Rule::Application(rules::ACKNOWLEDGE)),
+    Object::new(0x2109, 0, "Alarm acknowledgement", Type::Unsigned16, Access::WriteOnly).handled(),
     Object::highest(0x210A, 3, "Commands taken"),
     commands(1, "Presets channel 1"),
     commands(2, "Presets channel 2"),

@@ -11,13 +11,12 @@ mod values;
 
 pub(crate) use manufacturer::SENSORS;
 pub(crate) use pdos::{BY_EVENT, BY_SYNC};
-pub(crate) use rules::FIRST as FIRST_RULE;
 pub(crate) use sensors::Sensors;
 pub(crate) use values::{Fields, device_type};
 
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
-use crate::{Personality, communication, dictionaries};
+use crate::{Personality, communication, dictionaries, lost_events};
 use canopen::dictionary::{self, Object};
 
 /// The table: everything there is to say about every object, sorted.
@@ -40,6 +39,7 @@ const PARTS: &[&[Object]] = &[
     communication::tpdo_mappings(&pdos::TPDOS).as_flattened(),
     communication::START_UP,
     &[personality(Personality::Encoder)],
+    lost_events::OBJECTS,
     SENSORS,
     &[TRANSFER_BUFFER],
     &PROFILE,

@@ -1,19 +1,18 @@
 //! Device profile objects, 6000h to 65FFh (CiA 406, classes C1 and C2): sub-index n is channel n.
 
-use super::rules;
 use crate::REVISION;
-use canopen::dictionary::{Access, Group, Mapping, Object, Rule, Type};
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 use profiles::encoder::{SUPPORTED_ALARMS, SUPPORTED_WARNINGS};
 
 /// CiA 406 v3.0.
 const PROFILE_VERSION: u16 = 0x0300;
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Application)
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
 
-const fn ruled(index: u16, sub: u8, name: &'static str, kind: Type, rule: u8) -> Object {
-    parameter(index, sub, name, kind).rule(Rule::Application(rule))
+const fn ruled(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    parameter(index, sub, name, kind).handled()
 }
 
 const fn fixed(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
@@ -46,24 +45,20 @@ const fn shown([highest, one, two]: [Object; 3]) -> [Object; 3] {
 }
 
 const PARAMETERS: &[Object] = &[
-    ruled(0x6000, 0, "Operating parameters", Type::Unsigned16, rules::OPERATING),
-    ruled(0x6001, 0, "Measuring units per revolution", Type::Unsigned32, rules::PER_REVOLUTION)
-        .value(4096)
-        .unit("units"),
-    ruled(0x6002, 0, "Total measuring range", Type::Unsigned32, rules::RANGE)
-        .value(4096 * 4096)
-        .unit("units"),
-    ruled(0x6003, 0, "Preset value", Type::Unsigned32, rules::PRESET).unit("units"),
+    ruled(0x6000, 0, "Operating parameters", Type::Unsigned16),
+    ruled(0x6001, 0, "Measuring units per revolution", Type::Unsigned32).value(4096).unit("units"),
+    ruled(0x6002, 0, "Total measuring range", Type::Unsigned32).value(4096 * 4096).unit("units"),
+    ruled(0x6003, 0, "Preset value", Type::Unsigned32).unit("units"),
     measured(0x6004, 0, "Position value", Type::Unsigned32).unit("units"),
     Object::highest(0x6005, 2, "Linear measuring steps"),
-    ruled(0x6005, 1, "Position measuring step", Type::Unsigned32, rules::STEP).value(10_000).unit("nm"),
+    ruled(0x6005, 1, "Position measuring step", Type::Unsigned32).value(10_000).unit("nm"),
     parameter(0x6005, 2, "Speed measuring step", Type::Unsigned32)
         .limits(1, 0xFFFF_FFFF)
         .value(100)
         .unit("0.01 mm/s"),
     Object::highest(0x6010, 2, "Preset values by channel"),
-    ruled(0x6010, 1, "Preset value channel 1", Type::Integer32, rules::PRESET).unit("units"),
-    ruled(0x6010, 2, "Preset value channel 2", Type::Integer32, rules::PRESET).unit("units"),
+    ruled(0x6010, 1, "Preset value channel 1", Type::Integer32).unit("units"),
+    ruled(0x6010, 2, "Preset value channel 2", Type::Integer32).unit("units"),
 ];
 
 const POSITION: [Object; 3] = values(
@@ -77,7 +72,7 @@ const SPEED: [Object; 3] =
 /// Hard-wired to 1800h:5, and saved as that.
 const TIMER: &[Object] = &[Object::new(0x6200, 0, "Cyclic timer", Type::Unsigned16, Access::ReadWrite)
     .unit("ms")
-    .rule(Rule::EventTimerOf(0))];
+    .event_timer_of(0)];
 
 const CAM_STATE: [Object; 3] =
     values(0x6300, ["Cam states", "Cam states channel 1", "Cam states channel 2"], Type::Unsigned8);

@@ -5,43 +5,24 @@ use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
 use profiles::encoder::{COMMISSIONING, ChannelParameters, Parameters, SCALING, SENSOR_HELD};
 
-/// The lowest number of them.
-pub(crate) const FIRST: u8 = OPERATING;
-/// 6000h.
-pub(super) const OPERATING: u8 = 0x20;
-/// 6001h.
-pub(super) const PER_REVOLUTION: u8 = 0x21;
-/// 6002h.
-pub(super) const RANGE: u8 = 0x22;
-/// 6003h and 6010h.
-pub(super) const PRESET: u8 = 0x23;
-/// 6005h:1.
-pub(super) const STEP: u8 = 0x24;
-/// 2100h to 2103h.
-pub(super) const SENSOR: u8 = 0x25;
-/// 2107h.
-pub(super) const FACTORY: u8 = 0x26;
-/// 2109h.
-pub(super) const ACKNOWLEDGE: u8 = 0x27;
-
 /// What 2108h takes to open 2107h: "fact".
 const FACTORY_SIGNATURE: [u8; 4] = *b"fact";
 
 impl Fields {
-    /// Decides on a write to an object with one of the rules above.
-    pub(crate) fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    /// Decides on a write to an object that is handled.
+    pub(crate) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let mut word = [0; 4];
         word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
         let value = u32::from_le_bytes(word);
-        match rule {
-            OPERATING => allow(is_operating(&self.parameters(image), value)),
-            PER_REVOLUTION => allow(self.parameters(image).allow_per_revolution(value)),
-            RANGE => allow(self.parameters(image).allow_range(value)),
-            STEP => allow(self.parameters(image).allow_step(value)),
-            PRESET => self.preset(entry, value, image),
-            SENSOR => self.describe_sensor(entry, bytes, image),
-            FACTORY if self.factory_key.load(image) != FACTORY_SIGNATURE => Err(Abort::Access),
-            ACKNOWLEDGE => {
+        match entry.index() {
+            0x6000 => allow(is_operating(&self.parameters(image), value)),
+            0x6001 => allow(self.parameters(image).allow_per_revolution(value)),
+            0x6002 => allow(self.parameters(image).allow_range(value)),
+            0x6005 => allow(self.parameters(image).allow_step(value)),
+            0x6003 | 0x6010 => self.preset(entry, value, image),
+            0x2100..=0x2103 => self.describe_sensor(entry, bytes, image),
+            0x2107 if self.factory_key.load(image) != FACTORY_SIGNATURE => Err(Abort::Access),
+            0x2109 => {
                 count(self.acknowledgements, image);
                 Ok(())
             }

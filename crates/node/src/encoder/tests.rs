@@ -50,8 +50,8 @@ impl Node {
         let size = entry.field().get(&self.image).len();
         let bytes = &value.to_le_bytes()[..size];
         let row = OBJECTS.iter().find(|row| (row.index, row.sub) == (index, sub)).unwrap();
-        if let Rule::Application(rule) = row.rule {
-            FIELDS.write(rule, &entry, bytes, &mut self.image)?;
+        if row.rule == Rule::Application {
+            FIELDS.write(&entry, bytes, &mut self.image)?;
         }
         entry.field().set(&mut self.image, bytes);
         Ok(())
@@ -77,7 +77,7 @@ fn own() -> impl Iterator<Item = &'static Object> {
 fn every_parameter_is_saved_and_nothing_else() {
     // The cyclic timer is saved as 1800h:5.
     let others: Vec<u16> = own()
-        .filter(|row| (row.access == Access::ReadWrite) != (row.group == Group::Application))
+        .filter(|row| (row.access == Access::ReadWrite) != (row.group == Some(Group::Application)))
         .map(|row| row.index)
         .collect();
     assert_eq!(others, [0x6200]);
@@ -92,7 +92,7 @@ fn every_parameter_changes_what_the_measurement_gets() {
         (0x6005, 1) => 20_000,
         _ => 5,
     };
-    for row in own().filter(|row| row.group == Group::Application) {
+    for row in own().filter(|row| row.group == Some(Group::Application)) {
         let mut node = Node::new();
         node.write(0x2108, 0, i64::from(u32::from_le_bytes(*b"fact"))).unwrap();
         node.write(0x2100, 2, 7).unwrap();

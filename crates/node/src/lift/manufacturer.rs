@@ -1,20 +1,16 @@
 //! Manufacturer-specific objects of the lift, 2300h to 2322h: which sensors the virtual devices have, and what CiA 417
 //! leaves open. The sensors of positions are described as those of the encoder are (2100h to 2106h).
 
-use super::rules;
-use canopen::dictionary::{Access, Group, Mapping, Object, Rule, Type};
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 use profiles::lift::position::UNKNOWN;
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Application)
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
 
 /// The channel of the encoder that a position unit measures with; 0 for a unit that is not there.
 const fn source(sub: u8, name: &'static str, default: i64) -> Object {
-    parameter(0x2301, sub, name, Type::Unsigned8)
-        .limits(0, 2)
-        .value(default)
-        .rule(Rule::Application(rules::SOURCE))
+    parameter(0x2301, sub, name, Type::Unsigned8).limits(0, 2).value(default).handled()
 }
 
 /// What a preset or a change of direction leads to.
@@ -37,7 +33,7 @@ pub(super) const OBJECTS: &[Object] = &[
         .limits(1, 0xFFFF_FFFF)
         .value(200_000)
         .unit("um")
-        .rule(Rule::Application(rules::TRAVEL)),
+        .handled(),
     Object::highest(0x2301, 4, "Position unit sources"),
     source(1, "Position unit 1 source", 1),
     source(2, "Position unit 2 source", 0),

@@ -15,7 +15,7 @@ pub(crate) use values::Fields;
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
 use crate::pressure::CALIBRATION;
-use crate::{Personality, communication, dictionaries};
+use crate::{Personality, communication, dictionaries, lost_events};
 use canopen::dictionary::{self, Object};
 
 /// The table: everything there is to say about every object, sorted.
@@ -35,7 +35,8 @@ const PARTS: &[&[Object]] = &[
     &pdos::ROWS,
     communication::START_UP,
     &[personality(Personality::Lift)],
-    &sensors::OBJECTS,
+    lost_events::OBJECTS,
+    sensors::OBJECTS,
     CALIBRATION,
     manufacturer::OBJECTS,
     &[TRANSFER_BUFFER],

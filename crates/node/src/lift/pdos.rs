@@ -4,7 +4,7 @@
 //! node-ID and up) is among them, so no PDO of a lift device can have the CAN-ID of another one of the same device.
 
 use crate::communication::{self, inhibit_time, sync_start};
-use canopen::dictionary::{self, Access, DefaultValue, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Object, Type};
 use profiles::lift::catalogue::{CobId, Content, Pdo, by_number};
 
 /// Flags of a COB-ID: the PDO is switched off; no remote frames.
@@ -13,7 +13,7 @@ const NO_REMOTE: u32 = 1 << 30;
 
 /// A COB-ID of which only the flags change.
 const fn cob_id(index: u16, default: DefaultValue) -> Object {
-    communication::cob_id(index, default).rule(Rule::PdoPredefined)
+    communication::cob_id(index, default).predefined()
 }
 
 /// 255: the event is that of the profile.

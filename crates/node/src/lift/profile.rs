@@ -1,15 +1,14 @@
 //! Application profile objects, 6000h to 64FFh (CiA 417): of the position unit sub-index n is unit n.
 
-use super::rules;
-use canopen::dictionary::{Access, Group, Mapping, Object, Rule, Type};
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 use profiles::encoder::SUPPORTED_WARNINGS;
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Application)
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
 
-const fn ruled(index: u16, sub: u8, name: &'static str, kind: Type, rule: u8) -> Object {
-    parameter(index, sub, name, kind).rule(Rule::Application(rule))
+const fn ruled(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    parameter(index, sub, name, kind).handled()
 }
 
 const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
@@ -38,11 +37,11 @@ macro_rules! units {
 const POSITION: &str = "6384h:1";
 
 const fn operating(sub: u8, name: &'static str) -> Object {
-    ruled(0x6380, sub, name, Type::Unsigned16, rules::OPERATING)
+    ruled(0x6380, sub, name, Type::Unsigned16)
 }
 
 const fn preset(sub: u8, name: &'static str) -> Object {
-    ruled(0x6382, sub, name, Type::Unsigned32, rules::PRESET).unit(POSITION)
+    ruled(0x6382, sub, name, Type::Unsigned32).unit(POSITION)
 }
 
 const fn position(sub: u8, name: &'static str) -> Object {
@@ -99,7 +98,7 @@ pub(super) const PARTS: &[&[Object]] = &[
     &units!(0x6383, "position", "Positions", position),
     &[
         Object::highest(0x6384, 2, "Position unit measuring steps"),
-        ruled(0x6384, 1, "Position measuring step", Type::Unsigned16, rules::STEP)
+        ruled(0x6384, 1, "Position measuring step", Type::Unsigned16)
             .limits(1, 0xFFFF)
             .value(100)
             .unit("10 um"),
@@ -127,6 +126,6 @@ pub(super) const PARTS: &[&[Object]] = &[
         limit(2, "Half load limit"),
         limit(3, "Full load limit"),
         limit(4, "Overload limit"),
-        ruled(0x6486, 0, "Car reference weight", Type::Unsigned16, rules::REFERENCE).unit("kg"),
+        ruled(0x6486, 0, "Car reference weight", Type::Unsigned16).unit("kg"),
     ],
 ];

@@ -1,38 +1,22 @@
 //! Rules of the lift's own objects.
 
 use super::values::{Fields, UnitFields};
-use crate::pressure::CALIBRATION_RULES;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
 use profiles::lift::position::{INVERTED, UNKNOWN};
 
-/// 6380h.
-pub(super) const OPERATING: u8 = 0x40;
-/// 6382h.
-pub(super) const PRESET: u8 = 0x41;
-/// 6384h:1.
-pub(super) const STEP: u8 = 0x42;
-/// 6486h.
-pub(super) const REFERENCE: u8 = 0x43;
-/// 2300h.
-pub(super) const TRAVEL: u8 = 0x44;
-/// 2301h.
-pub(super) const SOURCE: u8 = 0x45;
-/// 2100h to 2103h.
-pub(super) const SENSOR: u8 = 0x46;
-
 impl Fields {
-    /// Decides on a write to an object with one of the rules above, or with one of the calibration.
-    pub(crate) fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    /// Decides on a write to an object that is handled.
+    pub(crate) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         let unit = usize::from(entry.sub()).wrapping_sub(1);
         let value = word(bytes);
-        match rule {
-            OPERATING => self.operate(unit, value, image),
-            PRESET => self.preset(unit, value, image),
-            STEP | TRAVEL | SENSOR => self.measure_anew(entry.field(), bytes, image),
-            SOURCE => self.take_source(unit, entry.field(), bytes, image),
-            REFERENCE => self.weigh(value, image),
-            _ if CALIBRATION_RULES.contains(&rule) => self.transducer.write(rule, entry, bytes, image),
+        match entry.index() {
+            0x6380 => self.operate(unit, value, image),
+            0x6382 => self.preset(unit, value, image),
+            0x6384 | 0x2300 | 0x2100..=0x2103 => self.measure_anew(entry.field(), bytes, image),
+            0x2301 => self.take_source(unit, entry.field(), bytes, image),
+            0x6486 => self.weigh(value, image),
+            0x2200..=0x22FF => self.transducer.write(entry, bytes, image),
             _ => Ok(()),
         }
     }

@@ -76,8 +76,8 @@ impl Node {
 
     fn write_bytes(&mut self, entry: &Entry, bytes: &[u8]) -> Result<(), Abort> {
         let row = OBJECTS.iter().find(|row| (row.index, row.sub) == (entry.index(), entry.sub())).unwrap();
-        if let Rule::Application(rule) = row.rule {
-            FIELDS.write(rule, entry, bytes, &mut self.image)?;
+        if row.rule == Rule::Application {
+            FIELDS.write(entry, bytes, &mut self.image)?;
         }
         entry.field().set(&mut self.image, bytes);
         Ok(())
@@ -107,7 +107,7 @@ fn every_parameter_is_saved_and_nothing_else() {
     let application = OBJECTS.iter().filter(|row| row.index >= 0x2000);
     let own = application.filter(|row| !others().any(|other| other.index == row.index));
     let others: Vec<u16> = own
-        .filter(|row| (row.access == Access::ReadWrite) != (row.group == Group::Application))
+        .filter(|row| (row.access == Access::ReadWrite) != (row.group == Some(Group::Application)))
         .map(|row| row.index)
         .collect();
     assert_eq!(others, [0x2322, 0x2322, 0x6011], "outputs");
@@ -126,7 +126,7 @@ fn every_parameter_changes_what_the_measurement_gets() {
         (0x6384, 1) => 200,
         _ => 5,
     };
-    let parameters = OBJECTS.iter().filter(|row| row.group == Group::Application);
+    let parameters = OBJECTS.iter().filter(|row| row.group == Some(Group::Application));
     for row in parameters.filter(|row| !silent.contains(&row.index)) {
         let mut node = Node::new();
         node.write(0x2100, 2, 7).unwrap();

@@ -4,34 +4,25 @@
 //! refused with 0601 0000h; a value that would leave a calibration which is not valid is refused with 0604 0043h. What is
 //! written acts from the next sample on, and is kept when 2204h gets "save". 1010h and 1011h do not touch it.
 
-use canopen::dictionary::{Access, Dictionary, Entry, Field, Group, Object, Rule, Type};
+use canopen::dictionary::{Access, Dictionary, Entry, Field, Group, Object, Type};
 use canopen::sdo::Abort;
 use profiles::pressure::{
     Calibration, Polynomial, PressureCalibration, TemperatureCalibration, Thermistor, Thermometer,
 };
 
-/// 2200h and 2201h.
-pub(super) const VALUE: u8 = 3;
-/// 2202h.
-pub(super) const RECORD: u8 = 4;
-/// 2203h.
-pub(super) const LOCK: u8 = 5;
-
 /// What 2203h takes to open the lock until the node is reset: "cali". 0 closes it.
 const KEY: [u8; 4] = *b"cali";
 
-const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type, rule: u8) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite)
-        .saved(Group::Calibration)
-        .rule(Rule::Application(rule))
+const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Calibration).handled()
 }
 
 const fn real(index: u16, sub: u8, name: &'static str, default: f32) -> Object {
-    parameter(index, sub, name, Type::Real32, VALUE).real(default)
+    parameter(index, sub, name, Type::Real32).real(default)
 }
 
-const fn command(index: u16, name: &'static str, rule: Rule) -> Object {
-    Object::new(index, 0, name, Type::Unsigned32, Access::ReadWrite).rule(rule)
+const fn command(index: u16, name: &'static str) -> Object {
+    Object::new(index, 0, name, Type::Unsigned32, Access::ReadWrite)
 }
 
 pub(crate) const CALIBRATION: &[Object] = &[
@@ -49,7 +40,7 @@ pub(crate) const CALIBRATION: &[Object] = &[
     real(0x2200, 11, "Highest ratio of an intact sensor", 0.975),
     Object::highest(0x2201, 9, "Temperature calibration"),
     // 0: the sensor of the chip, 1: the thermistor.
-    parameter(0x2201, 1, "Thermometer", Type::Unsigned8, VALUE).limits(0, 1),
+    parameter(0x2201, 1, "Thermometer", Type::Unsigned8).limits(0, 1),
     real(0x2201, 2, "Temperature factor", 1.0),
     real(0x2201, 3, "Temperature offset", 0.0).unit("K"),
     // 10 kohm at 25 degC, beta 3950 K.
@@ -60,15 +51,12 @@ pub(crate) const CALIBRATION: &[Object] = &[
     real(0x2201, 8, "Lowest ratio of an intact thermistor", 0.01),
     real(0x2201, 9, "Highest ratio of an intact thermistor", 0.99),
     Object::highest(0x2202, 2, "Calibration record"),
-    parameter(0x2202, 1, "Number of calibrations", Type::Unsigned32, RECORD),
+    parameter(0x2202, 1, "Number of calibrations", Type::Unsigned32),
     // As decimal digits, year, month and day: 20251231. 0 for a device that was not calibrated.
-    parameter(0x2202, 2, "Date of calibration", Type::Unsigned32, RECORD).limits(0, 99_991_231),
-    command(0x2203, "Calibration lock", Rule::Application(LOCK)),
-    command(0x2204, "Save calibration", Rule::StoreCalibration).value(1),
+    parameter(0x2202, 2, "Date of calibration", Type::Unsigned32).limits(0, 99_991_231),
+    command(0x2203, "Calibration lock").handled(),
+    command(0x2204, "Save calibration").stores_calibration().value(1),
 ];
-
-/// The rules of these objects.
-pub(crate) const RULES: core::ops::RangeInclusive<u8> = VALUE..=LOCK;
 
 /// Where the values are.
 pub(crate) struct Places {
@@ -124,13 +112,13 @@ impl Places {
         is_valid
     }
 
-    /// Decides on a write to an object with one of the rules above.
-    pub(crate) fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        match rule {
-            LOCK if bytes == KEY || bytes == [0; 4] => Ok(()),
-            LOCK => Err(Abort::NotStored),
+    /// Decides on a write to one of these objects.
+    pub(crate) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        match entry.index() {
+            0x2203 if bytes == KEY || bytes == [0; 4] => Ok(()),
+            0x2203 => Err(Abort::NotStored),
             _ if self.lock.load(image) != KEY => Err(Abort::Access),
-            VALUE if !self.admits(entry.field(), bytes, image) => Err(Abort::Parameter),
+            0x2200 | 0x2201 if !self.admits(entry.field(), bytes, image) => Err(Abort::Parameter),
             _ => Ok(()),
         }
     }

@@ -7,7 +7,7 @@ const fn flags(sub: u8, name: &'static str) -> Object {
 }
 
 const fn user(sub: u8) -> Object {
-    Object::new(0x4000, sub, "User word", Type::Unsigned32, Access::ReadWrite).saved(Group::Application)
+    Object::new(0x4000, sub, "User word", Type::Unsigned32, Access::ReadWrite).stored(Group::Application)
 }
 
 pub(crate) const STATUS_AND_USER: &[Object] = &[

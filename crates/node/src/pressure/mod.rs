@@ -7,14 +7,14 @@ mod profile;
 mod rules;
 mod values;
 
-pub(crate) use calibration::{CALIBRATION, Places, RULES as CALIBRATION_RULES};
+pub(crate) use calibration::{CALIBRATION, Places};
 pub(crate) use manufacturer::STATUS_AND_USER;
 pub(crate) use profile::{INTEGER, REAL};
 pub(crate) use values::Fields;
 
 use crate::manufacturer::{TRANSFER_BUFFER, personality};
 use crate::personality::Definition;
-use crate::{Personality, communication, dictionaries, flags};
+use crate::{Personality, communication, dictionaries, flags, lost_events};
 use canopen::dictionary::{self, Object};
 
 /// CiA 404, two analogue input blocks.
@@ -33,6 +33,7 @@ const PARTS: &[&[Object]] = &[
     &PDOS,
     communication::START_UP,
     &[personality(Personality::Pressure)],
+    lost_events::OBJECTS,
     CALIBRATION,
     &[TRANSFER_BUFFER],
     STATUS_AND_USER,

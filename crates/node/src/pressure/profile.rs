@@ -1,7 +1,6 @@
 //! Device profile objects, 6000h to 9FFFh (CiA 404): sub-index 1 is the pressure, sub-index 2 the temperature.
 
-use super::rules;
-use canopen::dictionary::{Access, Group, Mapping, Object, Rule, Type};
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
 const fn both(index: u16, name: &'static str) -> Object {
     Object::highest(index, 2, name)
@@ -12,7 +11,7 @@ const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object
 }
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
-    Object::new(index, sub, name, kind, Access::ReadWrite).saved(Group::Application)
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
 }
 
 const fn sensor_type(sub: u8, name: &'static str, code: i64) -> Object {
@@ -20,12 +19,11 @@ const fn sensor_type(sub: u8, name: &'static str, code: i64) -> Object {
 }
 
 const fn autozero(sub: u8, name: &'static str) -> Object {
-    Object::new(0x6125, sub, name, Type::Unsigned32, Access::WriteOnly)
-        .rule(Rule::Application(rules::AUTOZERO))
+    Object::new(0x6125, sub, name, Type::Unsigned32, Access::WriteOnly).handled()
 }
 
-const fn unit(sub: u8, name: &'static str, code: i64, rule: u8) -> Object {
-    parameter(0x6131, sub, name, Type::Unsigned32).value(code).rule(Rule::Application(rule))
+const fn unit(sub: u8, name: &'static str, code: i64) -> Object {
+    parameter(0x6131, sub, name, Type::Unsigned32).value(code).handled()
 }
 
 /// 10^38 is the largest power of ten that a REAL32 can hold.
@@ -64,8 +62,8 @@ pub(crate) const REAL: &[Object] = &[
     measured(0x6130, 1, "Pressure process value", Type::Real32).unit(PV),
     measured(0x6130, 2, "Temperature process value", Type::Real32).unit(PV),
     both(0x6131, "AI physical unit process value"),
-    unit(1, "Pressure physical unit", 0x004E_0000, rules::PRESSURE_UNIT),
-    unit(2, "Temperature physical unit", 0x002D_0000, rules::TEMPERATURE_UNIT),
+    unit(1, "Pressure physical unit", 0x004E_0000),
+    unit(2, "Temperature physical unit", 0x002D_0000),
     both(0x6132, "AI decimal digits process value"),
     digits(1, "Pressure decimal digits"),
     digits(2, "Temperature decimal digits"),

@@ -1,30 +1,34 @@
 //! Rules of the profile's own objects.
 
 use super::Fields;
-use super::calibration::{LOCK, VALUE};
 use canopen::dictionary::Entry;
 use canopen::sdo::Abort;
 use profiles::pressure::{STATUS_INVALID, Unit};
-
-/// 6125h.
-pub(super) const AUTOZERO: u8 = 0;
-/// 6131h:1.
-pub(super) const PRESSURE_UNIT: u8 = 1;
-/// 6131h:2.
-pub(super) const TEMPERATURE_UNIT: u8 = 2;
 
 /// What 6125h takes: "zero".
 const ZERO_SIGNATURE: [u8; 4] = *b"zero";
 
 impl Fields {
-    /// Decides on a write to an object with one of the rules above.
-    pub(crate) fn write(&self, rule: u8, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+    /// Whether an object that is handled is one of the transmitter.
+    pub(crate) fn decides_on(&self, entry: &Entry) -> bool {
+        matches!(entry.index(), 0x2200..=0x22FF) || matches!(self.index(entry), 0x6125 | 0x6131)
+    }
+
+    /// The index that the object has where the transmitter is the only device.
+    fn index(&self, entry: &Entry) -> u16 {
+        entry.index().wrapping_sub(self.shift)
+    }
+
+    /// Decides on a write to an object that is handled.
+    pub(crate) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if matches!(entry.index(), 0x2200..=0x22FF) {
+            return self.calibration.write(entry, bytes, image);
+        }
         let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
-        let known = match rule {
-            AUTOZERO => return self.autozero(entry.sub(), bytes, image),
-            VALUE..=LOCK => return self.calibration.write(rule, entry, bytes, image),
-            PRESSURE_UNIT => Unit::pressure(code).is_some(),
-            TEMPERATURE_UNIT => Unit::temperature(code).is_some(),
+        let known = match (self.index(entry), entry.sub()) {
+            (0x6125, _) => return self.autozero(entry.sub(), bytes, image),
+            (0x6131, 1) => Unit::pressure(code).is_some(),
+            (0x6131, 2) => Unit::temperature(code).is_some(),
             _ => true,
         };
         if known { Ok(()) } else { Err(Abort::InvalidValue) }

@@ -28,6 +28,8 @@ pub(crate) struct Fields {
     pub(super) pressure: Channel,
     pub(super) temperature: Channel,
     pub(super) calibration: Places,
+    /// What is added to the indexes of the device profile.
+    pub(super) shift: u16,
 }
 
 impl Channel {
@@ -86,6 +88,7 @@ impl Fields {
             pressure: Channel::new(d, shift, 1),
             temperature: Channel::new(d, shift, 2),
             calibration: Places::new(d),
+            shift,
         }
     }
 

@@ -73,7 +73,7 @@ pub struct BxCan {
     mode: Mode,
     monitor: Monitor,
     looped: Option<Loop>,
-    pub(super) transmitter: Transmitter,
+    pub(crate) transmitter: Transmitter,
     pub(super) fifos: [Fifo; 2],
     pub(super) filters: FilterBanks,
     pub(super) status: Status,

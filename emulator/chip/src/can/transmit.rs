@@ -107,6 +107,8 @@ impl Mailbox {
 pub(crate) struct Transmitter {
     mailboxes: [Mailbox; MAILBOXES],
     turns: u64,
+    /// Completions that a test wants lost.
+    pub(crate) to_lose: usize,
 }
 
 impl Transmitter {
@@ -232,9 +234,12 @@ impl Transmitter {
     }
 
     pub(crate) fn sent(&mut self) {
+        let is_lost = self.to_lose > 0;
+        self.to_lose = self.to_lose.saturating_sub(1);
         if let Some(mailbox) = self.on_wire() {
             mailbox.outcome = Outcome::Sent;
             mailbox.complete();
+            mailbox.completed = !is_lost;
         }
     }
 

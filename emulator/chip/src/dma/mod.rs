@@ -62,14 +62,18 @@ impl Dma {
 
     /// The stream that serves a request: the first enabled one of those that the request is wired to.
     pub(crate) fn serving(&mut self, request: &[Line]) -> Option<&mut Stream> {
-        let line = *request.iter().find(|line| self.streams[line.stream].listens_to(line.channel))?;
+        let line = self.line(request)?;
         self.streams.get_mut(line.stream)
     }
 
     /// The same, to look at.
     pub(crate) fn serves(&self, request: &[Line]) -> Option<&Stream> {
-        let line = request.iter().find(|line| self.streams[line.stream].listens_to(line.channel))?;
-        self.streams.get(line.stream)
+        self.streams.get(self.line(request)?.stream)
+    }
+
+    /// The line on which a request is served.
+    pub(crate) fn line(&self, request: &[Line]) -> Option<Line> {
+        request.iter().copied().find(|line| self.streams[line.stream].listens_to(line.channel))
     }
 
     /// Levels of the interrupt lines of the streams.

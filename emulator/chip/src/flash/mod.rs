@@ -88,6 +88,8 @@ pub struct Flash {
     half: Option<Store>,
     operations: u64,
     cut_at: Option<u64>,
+    /// BSY stays up until then, whatever the array does.
+    stuck_until: Time,
 }
 
 impl Flash {
@@ -105,6 +107,7 @@ impl Flash {
             half: None,
             operations: 0,
             cut_at: None,
+            stuck_until: Time::ZERO,
         }
     }
 
@@ -112,6 +115,11 @@ impl Flash {
     /// sector is an operation. The array is then torn, and `Effect::PowerCut` tells.
     pub fn cut_power_at_operation(&mut self, n: u64) {
         self.cut_at = Some(self.operations + n);
+    }
+
+    /// Keeps BSY up until this instant, though the array can be read: a controller that hangs.
+    pub fn hang(&mut self, until: Time) {
+        self.stuck_until = until;
     }
 
     /// Operations so far.
@@ -137,7 +145,7 @@ impl Flash {
         match offset {
             ACR => Some(self.acr),
             KEYR | OPTKEYR => Some(0),
-            SR => Some(self.sr | flag(now < self.busy_until, SR_BSY)),
+            SR => Some(self.sr | flag(now < self.busy_until.max(self.stuck_until), SR_BSY)),
             CR => Some(
                 self.cr
                     | flag(now < self.busy_until && self.erases(), CR_STRT)

@@ -208,6 +208,11 @@ impl Spi {
         self.received
     }
 
+    /// The byte that came is gone, as by a disturbance inside of the chip.
+    pub(crate) fn lose(&mut self) {
+        self.full = false;
+    }
+
     fn read_status(&mut self) -> u32 {
         let status = self.status();
         // OVR is cleared by a read of DR and then of SR (RM0390 section 26.3.10).

@@ -252,6 +252,16 @@ impl Timer {
         }
     }
 
+    /// The flags of the channels.
+    pub(crate) fn matches(&self) -> u32 {
+        self.sr & 0x1E
+    }
+
+    /// Takes the flag of a channel, 1 to 4, down again.
+    pub(crate) fn forget_match(&mut self, channel: u32) {
+        self.sr &= !(1 << channel);
+    }
+
     /// An interrupt is enabled whose flag is not up.
     fn awaits(&self, flag_bit: u32) -> bool {
         bit(self.dier & !self.sr, flag_bit)

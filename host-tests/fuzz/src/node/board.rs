@@ -1,11 +1,11 @@
 //! The node on a board: what the firmware's tasks do around it.
 
+use std::collections::VecDeque;
+
 use canopen::dictionary::Object;
-use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
+use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
 use eds::DEVICES;
-use node::{
-    BitRate, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample, Request, Setup, Start, State,
-};
+use node::{BitRate, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample, Setup, Start, State};
 use storage::{DeviceRecord, Pages, Store, View};
 
 use super::flash::{Flash, PAGE};
@@ -51,6 +51,8 @@ pub(super) struct Board {
     pub(super) now: Instant,
     pub(super) due: Instant,
     filters: [Vec<u16>; 2],
+    actions: VecDeque<Action>,
+    has_parameters: bool,
     /// Whether it has started since the last step.
     pub(super) has_started: bool,
 }
@@ -77,6 +79,8 @@ impl Board {
             now: Instant(0),
             due: Instant(0),
             filters: [vec![], vec![]],
+            actions: VecDeque::new(),
+            has_parameters: false,
             has_started: false,
         };
         board.power_on(Start::First);
@@ -88,7 +92,9 @@ impl Board {
     /// As the firmware's start. A power cut in it is a start of its own.
     fn power_on(&mut self, kept: Start) {
         self.out.waiting.clear();
+        self.actions.clear();
         self.store = None;
+        let mut parameters = self.protocol.parameters();
         while self.store.is_none() {
             self.flash.power_up();
             let mut view = View::open(self.flash.clone(), PAGES).expect("there is power");
@@ -96,12 +102,18 @@ impl Board {
             let setup = record.map_or(self.unless_stored, |record| stored(record, &self.unless_stored));
             self.personality = setup.personality;
             self.protocol = Protocol::new(&setup);
-            self.protocol.load(&mut view);
+            parameters = self.protocol.load(&mut view);
             self.store = Store::prepare(view).ok();
         }
         self.measurement = Measurement::new(self.personality, kept);
-        self.measurement.apply(&self.protocol.prepare());
+        self.measurement.apply(&parameters);
         self.start();
+    }
+
+    /// Keeps what follows from a call of the services half.
+    fn keep(&mut self, next: Next) {
+        self.actions.extend(next.action);
+        self.has_parameters |= next.parameters;
     }
 
     fn kept(&self) -> Start {
@@ -110,7 +122,8 @@ impl Board {
 
     fn start(&mut self) {
         self.out.waiting.clear();
-        self.protocol.start(self.now, &mut self.out);
+        let next = self.protocol.start(self.now, &mut self.out);
+        self.keep(next);
         self.has_started = true;
     }
 
@@ -156,7 +169,9 @@ impl Board {
             Step::Sample { pressure, supply, temperature, vrefint, encoder, buttons } => {
                 self.sample(&raw(pressure, supply, temperature, vrefint), encoder, buttons);
             }
-            Step::Bus(report) => self.protocol.bus_event(report.into(), self.now, &mut self.out),
+            Step::Bus(report) => {
+                let _ = self.protocol.bus_event(report.into(), self.now);
+            }
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
             Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
@@ -185,21 +200,22 @@ impl Board {
         let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data[..usize::from(len)]) };
         let frame = frame.expect("an identifier of 11 bits and at most eight bytes");
         if self.filters[0].contains(&id) {
-            self.protocol.on_process_frame(&frame, self.now, &mut self.out);
+            let _ = self.protocol.on_process_frame(&frame, self.now, &mut self.out);
         }
         if self.filters[1].contains(&id) {
-            self.protocol.on_service_frame(&frame, self.now, &mut self.out);
+            let next = self.protocol.on_service_frame(&frame, self.now, &mut self.out);
+            self.keep(next);
         }
     }
 
     fn sample(&mut self, raw: &RawSample, encoder: u16, buttons: [bool; 2]) {
         self.now = self.now + Duration::from_millis(1);
-        if let Some(parameters) = self.protocol.take_parameters() {
-            self.measurement.apply(&parameters);
+        if std::mem::take(&mut self.has_parameters) {
+            self.measurement.apply(&self.protocol.parameters());
         }
         let shaft = RawEncoder { counter: encoder, ..RawEncoder::default() };
         let snapshot = self.measurement.sample(raw, &shaft, buttons);
-        self.protocol.publish(&snapshot, self.now, &mut self.out);
+        let _ = self.protocol.publish(&snapshot, self.now, &mut self.out);
     }
 
     /// Polls and fulfils until there is nothing left to do now.
@@ -216,24 +232,26 @@ impl Board {
     }
 
     fn poll(&mut self) -> Instant {
-        let process = self.protocol.poll_process(self.now, &mut self.out);
-        process.min(self.protocol.poll_services(self.now, &mut self.out))
+        let process = self.protocol.poll_process(self.now, &mut self.out).process;
+        let next = self.protocol.poll_services(self.now, &mut self.out);
+        self.keep(next);
+        process.min(next.services)
     }
 
     fn fulfil(&mut self) {
         for _ in 0..REQUESTS {
-            let Some(request) = self.protocol.take_request() else { return };
-            match request {
-                Request::ResetNode | Request::Bootloader => {
+            let Some(action) = self.actions.pop_front() else { return };
+            match action {
+                Action::ResetNode | Action::Bootloader => {
                     self.power_on(self.kept());
                 }
-                Request::ResetCommunication => self.start(),
-                Request::Filters => {
+                Action::ResetCommunication => self.start(),
+                Action::Identifiers => {
                     self.filters =
                         [self.protocol.process_ids().collect(), self.protocol.service_ids().collect()];
                 }
-                Request::BitRate(_) => (),
-                Request::Store => self.deliver(),
+                Action::BitRate(_) => (),
+                Action::Store(_) => self.deliver(),
             }
         }
         panic!("the requests have no end");
@@ -246,7 +264,7 @@ impl Board {
         if self.flash.is_down() {
             return self.power_on(Start::First);
         }
-        self.protocol.finish(&parcel, result, self.now, &mut self.out);
+        let _ = self.protocol.finish(&parcel, result, self.now, &mut self.out);
     }
 }
 

@@ -3,13 +3,10 @@
 //! It behaves as devices in the field do: stopping and starting the program is not acknowledged, the node then answers
 //! in its new state; erasing takes time, in which SDO is served.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Object, Rule, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Object, Type};
 use canopen::sdo::{Abort, Multiplexer, Response};
 use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Transmit};
 use nodectl::bus::Station;
-
-const PROGRAM: u8 = 1;
-const CONTROL: u8 = 2;
 
 const fn read_only(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadOnly)
@@ -20,16 +17,16 @@ const ROWS: &[Object] = &[
     read_only(0x1001, 0, Type::Unsigned8),
     Object::new(0x1008, 0, "", Type::VisibleString(32), Access::Const).default(DefaultValue::Text("loader")),
     read_only(0x100A, 0, Type::VisibleString(32)),
-    Object::new(0x1017, 0, "", Type::Unsigned16, Access::ReadWrite).rule(Rule::HeartbeatTime),
+    Object::new(0x1017, 0, "", Type::Unsigned16, Access::ReadWrite),
     Object::highest(0x1018, 4, ""),
     read_only(0x1018, 1, Type::Unsigned32).value(7),
     read_only(0x1018, 2, Type::Unsigned32).value(42),
     read_only(0x1018, 3, Type::Unsigned32).value(0x0001_0000),
     read_only(0x1018, 4, Type::Unsigned32).value(99),
     Object::highest(0x1F50, 1, ""),
-    Object::new(0x1F50, 1, "", Type::Domain, Access::ReadWrite).rule(Rule::Application(PROGRAM)),
+    Object::new(0x1F50, 1, "", Type::Domain, Access::ReadWrite),
     Object::highest(0x1F51, 1, ""),
-    Object::new(0x1F51, 1, "", Type::Unsigned8, Access::ReadWrite).rule(Rule::Application(CONTROL)),
+    Object::new(0x1F51, 1, "", Type::Unsigned8, Access::ReadWrite).handled(),
     Object::highest(0x1F56, 1, ""),
     read_only(0x1F56, 1, Type::Unsigned32),
     Object::highest(0x1F57, 1, ""),
@@ -94,17 +91,15 @@ pub(crate) fn identification(program: &[u8]) -> u32 {
 }
 
 impl Application for Flash {
-    fn initialise(&mut self, _: &mut [u8]) {}
-
-    fn write(&mut self, _: u8, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+    fn write(&mut self, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
         self.command(bytes[0])
     }
 
-    fn read_domain(&self, _: u8) -> Result<&[u8], Abort> {
+    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
         Ok(&self.program)
     }
 
-    fn write_domain(&mut self, _: u8, part: Part<'_>) -> Result<(), Abort> {
+    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
         if self.runs || self.now < self.busy_until {
             return Err(Abort::DeviceState);
         }
@@ -173,12 +168,13 @@ impl Loader {
         let status = if now < flash.busy_until { 1 } else { flash.status };
         let identification = if flash.program.is_empty() { 0 } else { identification(&flash.program) };
         let runs = flash.runs;
-        let image = self.device.image_mut();
-        DICTIONARY.field(0x1000, 0).set(image, &device_type.to_le_bytes());
-        DICTIONARY.field(0x100A, 0).set(image, &version);
-        DICTIONARY.field(0x1F51, 1).set(image, &[u8::from(runs)]);
-        DICTIONARY.field(0x1F56, 1).set(image, &identification.to_le_bytes());
-        DICTIONARY.field(0x1F57, 1).set(image, &status.to_le_bytes());
+        self.device.show(|_, image| {
+            DICTIONARY.field(0x1000, 0).set(image, &device_type.to_le_bytes());
+            DICTIONARY.field(0x100A, 0).set(image, &version);
+            DICTIONARY.field(0x1F51, 1).set(image, &[u8::from(runs)]);
+            DICTIONARY.field(0x1F56, 1).set(image, &identification.to_le_bytes());
+            DICTIONARY.field(0x1F57, 1).set(image, &status.to_le_bytes());
+        });
     }
 
     fn understands(&self, frame: &Frame) -> bool {
@@ -215,7 +211,7 @@ impl Station for Loader {
         }
         let mut answers = Answers::default();
         if self.understands(frame) {
-            self.device.on_service_frame(frame, now, &mut answers);
+            let _ = self.device.on_service_frame(frame, now, &mut answers);
         } else {
             let at = Multiplexer { index: 0x1F50, sub: 1 };
             let refusal = Response::Abort(at, Abort::Command.code()).encode();
@@ -233,8 +229,8 @@ impl Station for Loader {
             return self.up;
         }
         if !std::mem::replace(&mut self.is_started, true) {
-            self.device.start(now, out);
+            let _ = self.device.start(now, out);
         }
-        self.device.poll_services(now, out)
+        self.device.poll(now, out).due()
     }
 }

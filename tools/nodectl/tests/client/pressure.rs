@@ -1,7 +1,7 @@
 //! The node of this project on the simulated bus, with its parameter store.
 
-use canopen::{Frame, Instant, NodeId, Transmit};
-use node::{BitRate, Parcel, Personality, Protocol, Request, Setup};
+use canopen::{Action, Frame, Instant, Next, NodeId, Transmit};
+use node::{BitRate, Parcel, Personality, Protocol, Setup};
 use nodectl::bus::Station;
 use storage::{Memory, Pages, Store, View};
 
@@ -42,9 +42,17 @@ impl Pressure {
 
     fn with_flash(setup: Setup, flash: Vec<u8>) -> Pressure {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
-        let mut protocol = Protocol::new(&setup);
+        let record = view.device().expect("a record or none");
+        // What LSS has stored of the device comes before what the factory has set.
+        let stored = record.map_or(setup, |record| Setup {
+            node_id: NodeId::new(record.node_id()),
+            bit_rate: BitRate::from_kbit(record.bit_rate_kbit()).expect("a bit rate"),
+            ..setup
+        });
+        let mut protocol = Protocol::new(&stored);
         protocol.load(&mut view);
-        Pressure { setup, protocol, store: Store::prepare(view).expect("a store"), is_started: false }
+        let store = Store::prepare(view).expect("a store");
+        Pressure { setup, protocol, store, is_started: false }
     }
 
     fn restart(&mut self) {
@@ -54,22 +62,24 @@ impl Pressure {
         *self = Pressure::with_flash(self.setup, flash);
     }
 
-    fn serve_requests(&mut self, now: Instant, out: &mut impl Transmit) {
-        while let Some(request) = self.protocol.take_request() {
-            match request {
-                Request::ResetNode => self.restart(),
-                Request::ResetCommunication => self.is_started = false,
-                Request::Store => self.save(now, out),
-                Request::Filters | Request::BitRate(_) | Request::Bootloader => (),
+    fn follow(&mut self, mut next: Next, now: Instant, out: &mut impl Transmit) -> Instant {
+        while let Some(action) = next.action {
+            match action {
+                Action::ResetNode => self.restart(),
+                Action::ResetCommunication => self.is_started = false,
+                Action::Store(_) => self.save(now, out),
+                Action::Identifiers | Action::BitRate(_) | Action::Bootloader => (),
             }
+            next = self.protocol.poll_services(now, out);
         }
+        next.services
     }
 
     fn save(&mut self, now: Instant, out: &mut impl Transmit) {
         let mut parcel = Parcel::new(Personality::default());
         if self.protocol.pack(&mut parcel) {
             let result = parcel.deliver(&mut self.store);
-            self.protocol.finish(&parcel, result, now, out);
+            let _ = self.protocol.finish(&parcel, result, now, out);
         }
     }
 }
@@ -77,20 +87,23 @@ impl Pressure {
 impl Station for Pressure {
     fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         if self.protocol.process_ids().any(|id| id == frame.id()) {
-            self.protocol.on_process_frame(frame, now, out);
+            let _ = self.protocol.on_process_frame(frame, now, out);
         }
         if self.protocol.service_ids().any(|id| id == frame.id()) {
-            self.protocol.on_service_frame(frame, now, out);
+            let next = self.protocol.on_service_frame(frame, now, out);
+            self.follow(next, now, out);
         }
-        self.serve_requests(now, out);
+        let next = self.protocol.poll_services(now, out);
+        self.follow(next, now, out);
     }
 
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
         if !std::mem::replace(&mut self.is_started, true) {
-            self.protocol.start(now, out);
-            self.serve_requests(now, out);
+            let next = self.protocol.start(now, out);
+            self.follow(next, now, out);
         }
-        let process = self.protocol.poll_process(now, out);
-        process.min(self.protocol.poll_services(now, out))
+        let process = self.protocol.poll_process(now, out).process;
+        let next = self.protocol.poll_services(now, out);
+        process.min(self.follow(next, now, out))
     }
 }

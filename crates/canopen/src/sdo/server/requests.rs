@@ -170,6 +170,6 @@ impl Server {
 fn unsized_value(data: [u8; 4], at: Multiplexer, objects: &impl Objects) -> Result<Bytes<4>, Abort> {
     match objects.writable(at)? {
         Writable::Value(size) => Ok(Bytes::from_slice(data.get(..size).unwrap_or(&data))),
-        Writable::Stream(_) => Ok(Bytes::new(data, 4)),
+        Writable::Stream => Ok(Bytes::new(data, 4)),
     }
 }

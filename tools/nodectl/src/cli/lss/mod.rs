@@ -1,5 +1,8 @@
 //! `nodectl lss`
 
+mod only;
+mod scan;
+
 use std::fmt;
 
 use canopen::lss::{BitRate, Identity};
@@ -7,9 +10,14 @@ use canopen::{Duration, NodeId};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
+use self::scan::Scan;
 use super::output::hex;
 use super::{Failure, Session};
+use crate::heartbeat;
 use crate::lss::{Master, Selection};
+
+/// How long a node may take to boot with a new node-ID, at least.
+const BOOT: Duration = Duration::from_millis(2000);
 
 /// Node-IDs and bit rates of nodes that are known by their identity (CiA 305).
 #[derive(Debug, Args)]
@@ -18,22 +26,19 @@ pub(super) struct Lss {
     command: Command,
 
     /// The node, as VENDOR:PRODUCT:REVISION:SERIAL, decimal or after 0x hexadecimal. Without it, the only node on the
-    /// bus.
+    /// bus: it is looked for first, and nothing is done where there are several.
     #[arg(long, global = true, value_name = "IDENTITY", value_parser = identity)]
     select: Option<Identity>,
+
+    /// All nodes on the bus, for set-rate, store and activate.
+    #[arg(long, global = true, conflicts_with = "select")]
+    all: bool,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Find the nodes that have no node-ID.
-    Scan {
-        /// How long each of the 133 steps takes, in milliseconds.
-        #[arg(long, value_name = "MS", default_value_t = 50)]
-        step: u32,
-        /// Give them node-IDs from this one on; else only the first is found.
-        #[arg(long, value_name = "NODE")]
-        assign: Option<u8>,
-    },
+    Scan(Scan),
     /// Ask for identity and node-ID.
     Inquire,
     /// Give a node-ID, or none.
@@ -78,29 +83,61 @@ struct Done {
 
 impl Lss {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
-        if let Command::Scan { step, assign } = self.command {
-            return scan(session, step, assign);
+        if let Command::Scan(scan) = &self.command {
+            return scan.run(session);
         }
+        let selection = self.selection(session)?;
         let timeout = session.options.timeout();
         let mut master = Master::new(&mut session.network, timeout);
-        master.select(self.select.map_or(Selection::All, Selection::One))?;
+        master.select(selection)?;
         let done = self.serve(&mut master);
         // Whatever came of it, no slave is left waiting for more.
         let released = master.release();
         let done = done?;
         released?;
+        if let Some((id, true)) = done.new_id() {
+            booted(session, id)?;
+        }
+        if let Some((_, false)) = done.new_id() {
+            eprintln!("in force after `nodectl nmt reset-comm`");
+        }
         done.print(session)
+    }
+
+    /// Whom the command is for. What cannot be is refused before anybody is selected.
+    fn selection(&self, session: &mut Session) -> Result<Selection, Failure> {
+        if let Command::SetRate { kbit, .. } = self.command {
+            bit_rate(kbit)?;
+        }
+        let id = match self.command {
+            Command::SetId { id, .. } => node_id(id)?,
+            _ => None,
+        };
+        match self.command {
+            Command::SetId { .. } | Command::Inquire if self.all => {
+                return Err(Failure::Usage("this command is for one node".to_owned()));
+            }
+            _ if self.all => return Ok(Selection::All),
+            _ => (),
+        }
+        let identity = self.select.map_or_else(|| only::only(session), Ok)?;
+        if let Some(id) = id {
+            free(session, id, &identity)?;
+        }
+        Ok(Selection::One(identity))
     }
 
     fn serve(&self, master: &mut Master) -> Result<Answer, Failure> {
         let done = match self.command {
             Command::Inquire => return Ok(Answer::Slave(slave(master.identity()?, master.node_id()?))),
             Command::SetId { id, store } => {
+                let had_one = master.node_id()?.is_some();
                 master.set_node_id(node_id(id)?)?;
                 if store {
                     master.store()?;
                 }
-                format!("node-ID {id}{}", kept(store))
+                let done = Done { done: format!("node-ID {id}{}", kept(store)) };
+                return Ok(Answer::NodeId { done, id: node_id(id)?, boots: !had_one });
             }
             Command::SetRate { kbit, store } => {
                 master.set_bit_rate(bit_rate(kbit)?)?;
@@ -117,7 +154,7 @@ impl Lss {
                 master.activate(delay)?;
                 format!("the bit rate changes in {delay} ms; the bus of this host has to change too")
             }
-            Command::Scan { .. } => String::new(),
+            Command::Scan(_) => String::new(),
         };
         Ok(Answer::Done(Done { done }))
     }
@@ -127,37 +164,60 @@ impl Lss {
 enum Answer {
     Slave(Slave),
     Done(Done),
+    /// A new node-ID, and whether the node boots with it at once.
+    NodeId {
+        done: Done,
+        id: Option<NodeId>,
+        boots: bool,
+    },
 }
 
 impl Answer {
+    fn new_id(&self) -> Option<(NodeId, bool)> {
+        match self {
+            Answer::NodeId { id, boots, .. } => id.map(|id| (id, *boots)),
+            _ => None,
+        }
+    }
+
     fn print(&self, session: &mut Session) -> Result<(), Failure> {
         match self {
             Answer::Slave(slave) => session.print(slave),
-            Answer::Done(done) => session.print(done),
+            Answer::Done(done) | Answer::NodeId { done, .. } => session.print(done),
         }
     }
 }
 
-/// A node that has got a node-ID no longer takes part, so the next one is found.
-fn scan(session: &mut Session, step: u32, assign: Option<u8>) -> Result<(), Failure> {
-    let timeout = Duration::from_millis(step.into());
-    let mut ids = assign.map(|first| (first..=127).filter_map(NodeId::new)).into_iter().flatten();
-    loop {
-        let mut master = Master::new(&mut session.network, timeout);
-        let Some(identity) = master.fastscan()? else {
-            eprintln!("no node without a node-ID (any more)");
-            return Ok(());
-        };
-        let id = ids.next();
-        if id.is_some() {
-            master.set_node_id(id)?;
-        }
-        master.release()?;
-        session.print(&slave(identity, id))?;
-        if id.is_none() {
-            return Ok(());
-        }
+/// How long a step of a search may take.
+fn step(session: &Session, given: Option<u32>) -> Duration {
+    given.map_or(Duration(session.options.timeout().0 / 10), |step| Duration::from_millis(step.into()))
+}
+
+/// Refuses a node-ID that somebody else has.
+fn free(session: &mut Session, id: NodeId, identity: &Identity) -> Result<(), Failure> {
+    let is_used = only::configured(session)?.contains_key(&id);
+    if is_used && only::identity(session, id).ok().as_ref() != Some(identity) {
+        return Err(Failure::Usage(format!("node-ID {} is in use by another node", id.get())));
     }
+    Ok(())
+}
+
+/// Waits for the boot-up message of a node that has got a node-ID.
+fn booted(session: &mut Session, id: NodeId) -> Result<(), Failure> {
+    let time = session.options.timeout().max(BOOT);
+    let heard = heartbeat::wait(&mut session.network, id, time)?;
+    heard.map(drop).ok_or_else(|| {
+        Failure::Silence(format!(
+            "node {0}: it has taken the node-ID {0}, and no boot-up message has come",
+            id.get()
+        ))
+    })
+}
+
+/// An identity as --select takes it.
+fn describe(identity: &Identity) -> String {
+    let Identity { vendor, product, revision, serial } = identity;
+    format!("0x{vendor:X}:0x{product:X}:0x{revision:X}:0x{serial:X}")
 }
 
 fn slave(identity: Identity, node: Option<NodeId>) -> Slave {

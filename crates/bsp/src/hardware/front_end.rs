@@ -1,0 +1,89 @@
+//! What TIM3 paces: the scans of the ADC, and the copies of the encoder's count at the start of each scan.
+//!
+//! Nothing in it may stop for good, and the two may not get out of step. Both are looked after once a millisecond, and both heal
+//! in the same way: everything that TIM3 paces is set up anew and started together ([`Event::Sampling`]). The counter of the
+//! encoder counts on meanwhile, so no position is lost.
+
+use stm32f4xx_hal::rcc::Rcc;
+
+use super::encoder::{self, Counted, Encoder};
+use super::sampling::{self, Sampling, Sums};
+use crate::losses::{Event, Losses};
+use crate::step::Progress;
+
+/// Analogue inputs and the incremental encoder.
+pub struct FrontEnd {
+    sampling: Sampling,
+    encoder: Encoder,
+    losses: &'static Losses,
+    /// Somebody has asked for a millisecond that was not there, and none has come since.
+    is_missed: bool,
+}
+
+/// One millisecond of both.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reading {
+    /// Of the analogue inputs.
+    pub sums: Sums,
+    /// Of the incremental encoder.
+    pub counted: Counted,
+}
+
+impl FrontEnd {
+    pub(super) fn new(
+        analogue: sampling::Parts,
+        encoder: encoder::Parts,
+        losses: &'static Losses,
+        rcc: &mut Rcc,
+    ) -> FrontEnd {
+        let sampling = Sampling::new(analogue, losses, rcc);
+        let encoder = Encoder::new(encoder, sampling.scans(), losses, rcc);
+        FrontEnd { sampling, encoder, losses, is_missed: false }
+    }
+
+    /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this is
+    /// the last thing that an initialisation does.
+    pub fn start(&mut self) {
+        self.is_missed = false;
+        self.sampling.start();
+    }
+
+    /// The millisecond that has just ended; `None` when there is none. To be called at each interrupt, and also by whoever
+    /// has not seen one for some milliseconds. When that happens twice in a row, everything is started anew: the first
+    /// time, the interrupt may just have come.
+    pub fn take(&mut self) -> Option<Reading> {
+        let Some(sums) = self.sampling.take() else {
+            if core::mem::replace(&mut self.is_missed, true) {
+                self.restart();
+            }
+            return None;
+        };
+        self.is_missed = false;
+        let index = self.encoder.index();
+        let counter = if self.is_in_step() {
+            self.encoder.at_last_scan(sums.half)
+        } else {
+            // The copies are those of other scans. This count is right and at most a scan younger.
+            self.restart();
+            self.encoder.now()
+        };
+        Some(Reading { sums, counted: Counted { counter, index } })
+    }
+
+    /// A copy that comes while the three places are read decides nothing.
+    fn is_in_step(&self) -> bool {
+        let copies_left = self.encoder.copies_left();
+        let conversions_left = self.sampling.conversions_left();
+        let second_half = self.sampling.second_half();
+        let is_certain = self.encoder.copies_left() == copies_left;
+        !is_certain || Progress { conversions_left, copies_left, second_half }.is_in_step()
+    }
+
+    fn restart(&mut self) {
+        self.losses.count(Event::Sampling);
+        self.encoder.stop_copies(self.sampling.scans());
+        self.sampling.set_up_again();
+        self.encoder.start_copies(self.sampling.scans());
+        self.start();
+    }
+}

@@ -1,0 +1,120 @@
+//! Saves while an absolute encoder turns: the flash stops the core for 16 us with every word, longer than a byte of the
+//! encoder lasts, and no reading may be lost to that.
+
+use canbus::{Stamped, Time};
+use host_tests::thorough;
+use sim::world::World;
+
+use crate::support::{Master, SECOND, START_ALL, SYNC, frame, read, run, world, write};
+
+/// TPDO 2, which carries the position with every SYNC.
+const TPDO2: u16 = 0x281;
+const BIT_RATES: [u16; 8] = [1000, 800, 500, 250, 125, 50, 20, 10];
+const RPM: f64 = 6000.0;
+/// Steps in a revolution, and in the range of the encoder.
+const STEPS: f64 = 8192.0;
+const RANGE: i64 = 1 << 25;
+
+const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
+const FASTEST: (u16, u8) = (0x2104, 1);
+const SENSOR_STATE: (u16, u8) = (0x210B, 1);
+/// Words of the absolute encoder that did not come whole.
+const LOST_WORDS: (u16, u8) = (0x2001, 4);
+const ALARMS: (u16, u8) = (0x6503, 0);
+/// A value that is saved and changes nothing: the limit of the operating time.
+const SAVED: (u16, u8) = (0x2106, 5);
+const MULTI_TURN: u32 = 2;
+/// 1010h:3, save the application parameters.
+const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 3, b's', b'a', b'v', b'e'];
+const DONE: u8 = 0x60;
+/// Saves after which the node is restarted: a start makes a page free for the next ones.
+const SAVES_A_START: u32 = 20;
+
+/// A node with a multi-turn encoder that turns, operational.
+fn start(bit_rate: u16) -> (World, Master) {
+    let mut world = world(&format!("--node 1:encoder --bitrate {bit_rate} --shaft rpm:{RPM}"));
+    let master = Master::join_at(&mut world, u32::from(bit_rate) * 1000);
+    world.run_until(SECOND);
+    write(&mut world, &master, SENSOR_TYPE, 1, MULTI_TURN);
+    write(&mut world, &master, FASTEST, 4, 1000);
+    master.send(&mut world, START_ALL.0, &START_ALL.1);
+    world.run_until(world.now() + Time::from_millis(100));
+    (world, master)
+}
+
+/// The greatest and the least age of the positions that came, each with the SYNC before it, in microseconds.
+fn ages(world: &mut World, frames: &[Stamped]) -> Vec<f64> {
+    let (sync, tpdo) = (frame(SYNC, &[]).id(), frame(TPDO2, &[]).id());
+    let mut sampled = None;
+    let mut ages = Vec::new();
+    for stamped in frames {
+        if stamped.frame.id() == sync {
+            sampled = Some(stamped.at);
+        } else if stamped.frame.id() == tpdo {
+            let at = sampled.take().expect("a SYNC before each position");
+            let shaft = (world.machine(0).peripherals().plant().revolutions(at) * STEPS).floor() as i64;
+            let position = i64::from(u32::from_le_bytes(stamped.frame.bytes()[..4].try_into().unwrap()));
+            let behind = (shaft - position + RANGE / 2).rem_euclid(RANGE) - RANGE / 2;
+            ages.push(behind as f64 / (STEPS * RPM / 60.0) * 1e6);
+        }
+    }
+    ages
+}
+
+/// Saves once, with SYNCs as fast as the bus takes them until the save is answered and some time after it. Gives the ages of the
+/// positions.
+fn save(world: &mut World, master: &Master, bit_rate: u16, value: u32) -> Vec<f64> {
+    write(world, master, SAVED, 4, value);
+    world.take_frames();
+    master.heard(world, 0x581);
+    master.send(world, 0x601, &SAVE);
+    // SYNC, a TPDO of eight bytes and what else there is: 300 bits.
+    let beat = Time::from_micros(300_000 / u64::from(bit_rate)).max(Time::from_micros(997));
+    let mut answer = None;
+    let mut after = 0;
+    while answer.is_none() || after < 3 {
+        master.send(world, SYNC, &[]);
+        world.run_until(world.now() + beat);
+        answer = answer.or_else(|| master.heard(world, 0x581).first().map(|frame| frame.bytes()[0]));
+        after += u32::from(answer.is_some());
+    }
+    assert_eq!(answer, Some(DONE), "save {value} at {bit_rate} kbit/s");
+    let frames = world.take_frames();
+    ages(world, &frames)
+}
+
+/// A word is started with one sample and taken with the next one, and the next one after that takes its place: no position is
+/// older than two milliseconds and what the core stood still for.
+#[test]
+fn saves_cost_no_reading_of_the_absolute_encoder() {
+    let saves = thorough::either(25, 200);
+    for bit_rate in BIT_RATES {
+        let (mut world, master) = start(bit_rate);
+        let (mut least, mut most, mut count) = (f64::MAX, f64::MIN, 0);
+        for number in 1..=saves {
+            for age in save(&mut world, &master, bit_rate, number) {
+                (least, most, count) = (least.min(age), most.max(age), count + 1);
+            }
+            if number % SAVES_A_START == 0 {
+                assert_eq!(read(&mut world, &master, ALARMS), 0, "at {bit_rate} kbit/s");
+                restart(&mut world, &master);
+            }
+        }
+        println!("{bit_rate} kbit/s: {saves} saves, {count} positions, {least:.0} to {most:.0} us old");
+        assert!(least > 900.0 && most < 2200.0, "{bit_rate} kbit/s: {least} to {most} us");
+        assert_eq!(read(&mut world, &master, SENSOR_STATE), 0, "at {bit_rate} kbit/s");
+        let summary = run(&mut world, Time::from_millis(1));
+        assert_eq!(summary.nodes[0].heard.emcys, 0, "{summary}");
+        assert!(summary.nodes[0].unmodelled.is_empty(), "{summary}");
+        assert_eq!(summary.nodes[0].incidents.len(), (saves / SAVES_A_START) as usize, "{summary}");
+        assert_eq!(read(&mut world, &master, LOST_WORDS), 0, "at {bit_rate} kbit/s");
+    }
+}
+
+/// Resets the node, which then has what was saved, and starts it again.
+fn restart(world: &mut World, master: &Master) {
+    master.send(world, 0x000, &[0x81, 1]);
+    world.run_until(world.now() + SECOND);
+    master.send(world, START_ALL.0, &START_ALL.1);
+    world.run_until(world.now() + Time::from_millis(100));
+}
