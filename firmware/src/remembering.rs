@@ -2,8 +2,13 @@
 
 use core::mem::MaybeUninit;
 
+use bsp::battery::Battery;
 use bsp::kept::Found;
-use node::{Kept, Measurement, Personality, Start};
+use bsp::reset_cause::ResetCause;
+use node::{Measurement, Personality};
+use profiles::board::{PowerOn, Retained};
+
+use crate::configuration;
 
 /// Makes the measurement in its place. Not inlined: the stack on which the value is made is free again after it.
 #[inline(never)]
@@ -12,20 +17,32 @@ pub(crate) fn make(
     personality: Personality,
     found: &Found,
 ) -> &'static mut Measurement {
-    place.write(Measurement::new(personality, start(found)))
+    place.write(Measurement::new(personality, &power_on(found)))
 }
 
-/// What the encoder goes on from.
+/// Says what the start tells of the battery.
+pub(crate) fn report_battery(cause: ResetCause, found: &Found) {
+    match Battery::after(cause, found) {
+        Battery::Unknown => {}
+        Battery::Holds => defmt::info!("the battery has kept the backup SRAM"),
+        Battery::Lost => {
+            defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new")
+        }
+    }
+}
+
+/// What the board knows when the power comes.
 ///
 /// Memory without a trace of a copy is that of a new board, and after a loss of power that of one without a battery, or with
 /// an empty one: the two cannot be told apart, and the encoder begins anew.
-fn start(found: &Found) -> Start {
-    match found {
-        Found::Nothing => Start::First,
-        Found::Kept(words) => Start::Kept(Kept::from_words(words)),
+fn power_on(found: &Found) -> PowerOn {
+    let retained = match found {
+        Found::Nothing => Retained::Nothing,
+        Found::Kept(words) => Retained::Words(*words),
         Found::Damaged => {
             defmt::error!("what was kept of the encoder is damaged");
-            Start::Damaged
+            Retained::Damaged
         }
-    }
+    };
+    PowerOn { thermometer: configuration::thermometer(), retained }
 }

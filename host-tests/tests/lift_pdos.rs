@@ -5,8 +5,8 @@ use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Objec
 use canopen::{Device, Duration, Frame, Instant, NodeId};
 use host_tests::bench::Queue;
 use host_tests::lift417::{Pdo, pdos};
-use node::lift::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 use profiles::lift::catalogue::by_cob_id;
+use profiles::lift::objects::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 
 /// Node-ID of the producer.
 const ID: u8 = 33;
@@ -86,7 +86,7 @@ fn device(row: &Pdo) -> (&'static Dictionary, Device<(), SIZE>) {
     let rows: [Object; ROWS] = rows.try_into().unwrap();
     let tables: &'static Tables<1, ROWS, ROWS, ROWS, SIZE> =
         Box::leak(Box::new(dictionary::compile(&[&rows])));
-    let [dictionary] = tables.dictionaries(&[&rows]);
+    let [dictionary] = tables.dictionaries();
     let dictionary: &'static Dictionary = Box::leak(Box::new(dictionary));
     (dictionary, Device::new(dictionary, NodeId::new(ID), ()))
 }

@@ -8,9 +8,9 @@ use canopen::{Duration, Instant};
 
 const FIRST: Duration = Duration::from_millis(50);
 const LONGEST: Duration = Duration::from_millis(3_200);
-/// So long on the bus, and the trouble is over.
+/// After so long on the bus without a bus-off the waiting times begin anew.
 const GOOD: Duration = Duration::from_millis(10_000);
-/// The way back takes 141 ms at 10 kbit/s; a node that is still off after this has failed again.
+/// The recovery of the controller takes 141 ms at 10 kbit/s. A node that is still off the bus after this time has failed again.
 const WAY_BACK: Duration = Duration::from_millis(200);
 
 /// The waiting times of a node.
@@ -30,7 +30,7 @@ impl Default for BackOff {
 }
 
 impl BackOff {
-    /// The node is off the bus. To be told as long as it is.
+    /// The node is off the bus. To be called again and again as long as that is so.
     pub fn bus_off(&mut self, now: Instant) {
         let is_returning = self.returned.is_some_and(|returned| now < returned + WAY_BACK);
         if self.due.is_some() || is_returning {
@@ -43,7 +43,7 @@ impl BackOff {
         self.next = Duration(self.next.0 * 2).min(LONGEST);
     }
 
-    /// Whether to return now; once.
+    /// Whether to begin the recovery now. True once for each bus-off.
     pub fn is_over(&mut self, now: Instant) -> bool {
         let is_over = self.due.is_some_and(|due| now >= due);
         if is_over {

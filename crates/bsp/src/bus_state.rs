@@ -27,7 +27,8 @@ impl BusState {
     }
 }
 
-/// Notices changes of the state. There is an interrupt for the way up only, so it is also looked at from time to time.
+/// Notices changes of the state. An interrupt tells when the state gets worse, none when the state gets better: the state has to be
+/// looked at from time to time as well.
 #[derive(Debug, Default)]
 pub struct BusWatch {
     last: BusState,

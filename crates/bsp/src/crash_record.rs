@@ -1,4 +1,5 @@
-//! What is left of a crash for the next start: a few words in RAM that no start-up code touches, sealed with a CRC.
+//! The crash record: a few words in RAM that no start-up code touches. A crash leaves the record for the next start; a CRC tells
+//! the record from what RAM holds by chance.
 
 use crate::checksum::SMALL;
 
@@ -9,13 +10,13 @@ const CLOCK: u32 = 3;
 const INTERRUPT: u32 = 4;
 const FILE_WORDS: usize = 8;
 
-/// What the record says of the crash: a line and a name take most.
+/// Words for the details of a crash. The place of a panic, a line and the name of a file, needs the most.
 type Content = [u32; 1 + FILE_WORDS];
 
-/// Words of a sealed record: a mark, the kind of crash, what is said of it, and the CRC.
+/// Words of a record in RAM: a mark, the kind of crash, its details, and the CRC.
 pub const WORDS: usize = 3 + size_of::<Content>() / 4;
 
-/// The sealed form.
+/// The record as it lies in RAM.
 pub type Sealed = [u32; WORDS];
 
 /// A crash.
@@ -38,7 +39,7 @@ pub enum Crash {
 pub struct Fault {
     /// Where it happened.
     pub pc: u32,
-    /// Where that was called from.
+    /// The link register: where the function was called from.
     pub lr: u32,
     /// The stack pointer on entry.
     pub sp: u32,
@@ -92,7 +93,7 @@ impl Crash {
         words
     }
 
-    /// The crash in `words`; `None` when they are not a sealed record, as after power-on.
+    /// The crash in `words`; `None` when the mark or the CRC is wrong, as after power-on.
     #[must_use]
     pub fn open(words: &Sealed) -> Option<Crash> {
         let [MAGIC, kind, content @ .., sum] = words else { return None };

@@ -1,7 +1,7 @@
 //! Contacts that bounce.
 
-/// Samples for which an input must be the same before that is believed. At 1 kHz these are 10 ms: contacts bounce for
-/// less than that, and nobody presses a button for less.
+/// How many samples in a row must agree before the input counts as changed. At 1 kHz these are 10 ms: contacts bounce for less than
+/// that, and nobody presses a button for less.
 const SAMPLES: u8 = 10;
 
 /// One input, sampled at an even pace.
@@ -19,7 +19,7 @@ impl Debounce {
         Debounce { is_on: false, other: 0 }
     }
 
-    /// Takes a sample and tells what the input is believed to be.
+    /// Takes a sample and returns the debounced state.
     pub fn sample(&mut self, level: bool) -> bool {
         self.other = if level == self.is_on { 0 } else { self.other.saturating_add(1) };
         if self.other >= SAMPLES {

@@ -1,8 +1,8 @@
 //! A 32-bit counter that wraps, extended to 64 bits without a lock.
 //!
 //! The software part counts half periods, and its lowest bit says in which half of the counter it was last seen. A
-//! reader that comes between the wrap of the counter and the next [`Extension::follow`] finds the two in disagreement
-//! and makes up for it, so reading is right at every priority, above the follower's as well.
+//! reader that comes between the wrap of the counter and the next [`Extension::follow`] finds that the two disagree, and corrects the
+//! result. So a reader gets the right count at every priority, also above that of the caller of `follow`.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -19,7 +19,7 @@ impl Extension {
         Extension { halves: AtomicU32::new(0) }
     }
 
-    /// Takes notice of the counter. One context only may call it, and at least once in each half period.
+    /// Takes notice of the counter. To be called by one task only, and at least once in each half period.
     pub fn follow(&self, counter: u32) {
         let halves = self.halves.load(Ordering::Relaxed);
         if halves & 1 != counter >> 31 {

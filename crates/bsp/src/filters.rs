@@ -41,7 +41,7 @@ impl Pair {
 pub struct Bank {
     /// Where its frames go.
     pub fifo: Fifo,
-    /// What passes: the one or the other.
+    /// A frame that agrees with one of the two pairs passes.
     pub pairs: [Pair; 2],
 }
 

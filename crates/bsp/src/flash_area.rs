@@ -4,7 +4,8 @@ use core::ops::Range;
 
 use embedded_storage::nor_flash::NorFlashErrorKind;
 
-/// Addresses that may be read, erased and programmed. Whoever uses them counts from an origin at or before the first.
+/// A range of addresses that may be read, erased and programmed. Offsets count from an origin, which is at the first of these
+/// addresses or before it.
 #[derive(Clone, Debug)]
 pub struct FlashArea {
     origin: u32,
@@ -12,16 +13,16 @@ pub struct FlashArea {
 }
 
 impl FlashArea {
-    /// These addresses, counted from `origin`.
+    /// The area `range`; offsets count from `origin`.
     #[must_use]
     pub const fn new(origin: u32, range: Range<u32>) -> FlashArea {
         FlashArea { origin, range }
     }
 
-    /// The address of a span of the area that starts and ends on a boundary.
+    /// The address of `len` bytes at `offset`. Both must be multiples of `boundary`.
     ///
     /// # Errors
-    /// It reaches beyond the area, or is not aligned.
+    /// `OutOfBounds` when the bytes reach beyond the area, `NotAligned`.
     pub fn address(&self, offset: u32, len: usize, boundary: u32) -> Result<u32, NorFlashErrorKind> {
         let out_of_bounds = NorFlashErrorKind::OutOfBounds;
         let len = u32::try_from(len).map_err(|_| out_of_bounds)?;

@@ -1,5 +1,5 @@
-//! What one image leaves for the other in RAM that survives a reset: where the node is on the bus, and whether the
-//! bootloader is to stay there.
+//! The note that the application and the bootloader leave each other in RAM that survives a reset: node-ID and bit rate in use,
+//! and whether the bootloader is to stay on the bus.
 //!
 //! A bootloader that comes on a bus whose bit rate it does not know would destroy everybody's frames. So the application
 //! writes down what it uses, which under automatic detection is what it has found.
@@ -17,7 +17,7 @@ pub struct Handover {
     pub stay: bool,
 }
 
-/// The note and its complement, which RAM does not hold by chance after power-up.
+/// The note as it lies in RAM: the note and its complement. RAM after power-up holds no such pair by chance.
 pub type Sealed = [u32; 2];
 
 impl Handover {

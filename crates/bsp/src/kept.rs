@@ -1,14 +1,14 @@
-//! A few words in memory that a battery keeps, written again and again, while the power may go at any moment.
+//! A few words in the backup SRAM, written every millisecond, while the power may fail at any moment.
 //!
-//! There are two copies, each with a sequence number and a CRC, and the older one is overwritten. So a write that is cut
-//! short damages what was of no more use, and the other copy is one write old.
+//! There are two copies, each with a sequence number and a CRC. A write goes over the older copy. A write that the loss of power
+//! cuts short damages that copy only; the other copy is good, and one write old.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 /// Words that a copy holds.
 pub const CAPACITY: usize = 18;
 
-/// What is to be kept.
+/// The words of a copy.
 pub type Content = [u32; CAPACITY];
 
 /// Tells a damaged copy from memory that never held one.
@@ -27,7 +27,7 @@ pub struct Slot {
 /// The places of both.
 pub type Slots = [Slot; 2];
 
-/// What the memory had.
+/// What the memory held at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
     /// No trace of a copy: nothing was ever written, or the battery was empty.
@@ -52,12 +52,12 @@ pub trait Checksum {
 pub struct Keeper<'a, C> {
     slots: &'a Slots,
     checksum: C,
-    /// Of the latest copy; its lowest bit tells which one that is.
+    /// The sequence number of the latest copy. An even number belongs to the first place, an odd one to the second.
     sequence: u32,
 }
 
 impl<'a, C: Checksum> Keeper<'a, C> {
-    /// Finds the newer good copy. The next write goes over the other one.
+    /// Finds the newer of the good copies. The next write goes over the other place.
     pub fn open(slots: &'a Slots, mut checksum: C) -> (Keeper<'a, C>, Found) {
         let [first, second] = slots.each_ref().map(|slot| slot.read(&mut checksum));
         let good = [first.filter(|copy| copy.0 % 2 == 0), second.filter(|copy| copy.0 % 2 == 1)];
@@ -73,7 +73,8 @@ impl<'a, C: Checksum> Keeper<'a, C> {
         (Keeper { slots, checksum, sequence }, found)
     }
 
-    /// Keeps this. Whether the memory has taken it: if not, the next write goes to the same place, and the copy before stays.
+    /// Writes the older copy. False when the memory has not taken the words: the next write goes to the same place, and the newer
+    /// copy stays.
     pub fn write(&mut self, content: &Content) -> bool {
         let next = self.sequence.wrapping_add(1);
         let [even, odd] = self.slots;
@@ -120,7 +121,7 @@ impl Slot {
     }
 }
 
-/// Counted round: half of all numbers are later.
+/// Whether a sequence number is later than another one. The numbers wrap, so half of all numbers are later.
 fn is_later(sequence: u32, than: u32) -> bool {
     sequence.wrapping_sub(than) < 1 << 31
 }

@@ -1,18 +1,20 @@
 //! Board support: everything that touches a register of the STM32F4, and the only crate with `unsafe`.
 //!
-//! What is pure logic (bit timing, filter packing, the transmit queue, the extension of the counter, oversampling,
-//! supervision, the crash record, what is kept through a loss of power) has modules of its own without hardware, which are
-//! built and tested on the host as well. The rest is built for the target only.
+//! Logic without registers (bit timing, filter packing, the transmit queue, the extension of the counter, oversampling, supervision,
+//! the crash record, the copies in the backup SRAM, the counts of lost events) has modules of its own, which are tested on the host.
+//! The modules below `hardware` are built for the target only.
 #![no_std]
 // On the host, where only the modules without hardware are: values are cut to the width of a register everywhere else.
 #![cfg_attr(not(target_os = "none"), warn(clippy::pedantic))]
 #![deny(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 pub mod back_off;
+pub mod battery;
 pub mod bit_rate_detection;
 pub mod bit_timing;
 pub mod bus_state;
 mod checksum;
+pub mod chip_thermometer;
 pub mod crash_record;
 pub mod debounce;
 pub mod extension;
@@ -30,6 +32,7 @@ pub mod ssi_word;
 pub mod step;
 pub mod supervision;
 pub mod transmit_queue;
+pub mod update_layout;
 pub mod vectors;
 
 #[cfg(target_os = "none")]

@@ -1,7 +1,7 @@
 //! A frame in the registers of a mailbox (RM0390, 30.9.3); those of a transmit mailbox have the same layout.
 //!
-//! bxcan's own reception is not used: it takes the length code as it comes, and a code of 9 to 15, which any node may
-//! send for eight bytes (ISO 11898-1, 10.4.2.4), makes it index out of range.
+//! The reception of the crate bxcan is not used: bxcan takes the length code as it comes and indexes out of range at the codes 9 to
+//! 15, which any node may send for eight bytes (ISO 11898-1, 10.4.2.4).
 
 use canopen::Frame;
 

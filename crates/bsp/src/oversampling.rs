@@ -16,8 +16,8 @@ const _: () = {
     assert!(SCANS.is_multiple_of(2), "a channel has its conversions in both halves");
 };
 
-/// The sum of each channel. Both halves of a word are added at once: two scans are a whole number of words. Written out,
-/// because the firmware is compiled for size, and inner loops would cost three times as much.
+/// The sum of each channel. Two scans are a whole number of words, and both halves of a word are added at once. The five words of two
+/// scans are written out: the firmware is compiled for size, and inner loops would take three times as long.
 #[allow(clippy::many_single_char_names)] // The five words of two scans.
 pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
     let load = |word: &AtomicU32| word.load(Ordering::Relaxed);

@@ -46,6 +46,12 @@ impl ResetCause {
         matches!(self, ResetCause::IndependentWatchdog | ResetCause::WindowWatchdog | ResetCause::LowPower)
     }
 
+    /// Whether the main supply was gone.
+    #[must_use]
+    pub fn is_power_loss(self) -> bool {
+        matches!(self, ResetCause::PowerOn | ResetCause::BrownOut)
+    }
+
     /// For the log.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -1,4 +1,4 @@
-//! What an SPI clocks in from an encoder with synchronous serial interface.
+//! The word of an encoder with synchronous serial interface (SSI), as an SPI clocks it in.
 
 /// Clocks that the longest frame takes: eight bytes.
 pub const LONGEST: u32 = 64;
@@ -12,8 +12,8 @@ pub struct SsiWord {
     pub clocks: u32,
 }
 
-/// Bytes to clock in for a word of `length` bits: the rest level comes before it, and at least one low bit after it. An SPI
-/// clocks whole bytes, so up to seven bits more follow.
+/// Bytes to clock in for a word of `length` bits: one bit of rest level before the word and at least one low bit after the word. An
+/// SPI clocks whole bytes, so up to seven more bits follow.
 #[must_use]
 pub fn bytes(length: u32) -> usize {
     let clocks = length.saturating_add(2).min(LONGEST);

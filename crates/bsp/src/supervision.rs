@@ -12,26 +12,26 @@ pub enum Part {
     Process = 2,
     /// The services task.
     Services = 4,
-    /// The task that stores parameters. It is the one of the lowest priority, below everything that could starve it.
+    /// The task that stores parameters. It has the lowest priority, so a task that never ends starves this one as well.
     Keeper = 8,
 }
 
 const ALL: u8 = Part::Sampling as u8 | Part::Process as u8 | Part::Services as u8 | Part::Keeper as u8;
 
-/// Who has made progress since the watchdog was last fed.
+/// Which parts have made progress since the watchdog was last fed.
 #[derive(Debug, Default)]
 pub struct Supervision {
     done: AtomicU8,
 }
 
 impl Supervision {
-    /// Nobody yet.
+    /// No part has made progress yet.
     #[must_use]
     pub const fn new() -> Supervision {
         Supervision { done: AtomicU8::new(0) }
     }
 
-    /// Notes that `part` has made progress. True when that made it complete: feed now.
+    /// Notes that `part` has made progress. True when now all parts have: feed the watchdog.
     pub fn progress(&self, part: Part) -> bool {
         let done = self.done.fetch_or(part as u8, Ordering::Relaxed) | part as u8;
         let complete = done == ALL;

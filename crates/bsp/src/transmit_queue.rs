@@ -3,8 +3,13 @@
 //! The bus itself prefers the lowest identifier. A plain queue in front of the mailboxes would undo that: a heartbeat
 //! that came first would hold up a SYNC (priority inversion).
 //!
-//! Of heartbeats and PDOs only the newest waits. Else a node that more urgent frames have kept silent would fill the queue with
-//! what has long ceased to be so, and would tell it all in the first gap.
+//! There are two kinds of frames, and the sender says which kind a frame is:
+//!
+//! * An event ([`Transmit::send`]) is sent once and in its order, however long it waits. When the queue is full, the sender keeps the event
+//!   and offers it again.
+//! * A state ([`Transmit::send_state`]), such as a heartbeat or a measured value, is worth nothing once there is a newer one. The newer
+//!   frame takes the place of the older one of its CAN-ID. So a node that more urgent frames keep silent for minutes sends one frame of
+//!   each CAN-ID in the first gap, and not a queue of old values.
 
 use canopen::{Frame, QueueFull, Transmit};
 use heapless::Vec;
@@ -33,7 +38,7 @@ pub trait Mailboxes {
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     frame: Frame,
-    /// A newer one of its identifier takes its place.
+    /// A newer frame of the same identifier may take the place of this one.
     is_state: bool,
 }
 
@@ -77,19 +82,19 @@ impl TransmitQueue {
         self.waiting.clear();
     }
 
-    /// Adds a frame before those of its identifier: it was taken before them. As there is one of an identifier in the mailboxes
-    /// at most, there is one of these at most, and it need not make way.
+    /// Adds a frame that comes back from a mailbox. The frame was queued before all others of its identifier, so its place is before
+    /// them. The mailboxes hold one frame of an identifier at most, so at most one such frame waits; it counts as an event.
     fn push_first(&mut self, frame: Frame) -> Result<(), QueueFull> {
         let index = self.waiting.partition_point(|other| other.frame.id() >= frame.id());
         self.insert(index, Waiting { frame, is_state: false })
     }
 
-    /// The place behind those of this identifier.
+    /// The place behind all frames of this identifier.
     fn place(&self, frame: &Frame) -> usize {
         self.waiting.partition_point(|other| other.frame.id() > frame.id())
     }
 
-    /// Moves what is behind the place one further. `Vec::insert` panics at a place behind the end.
+    /// Puts a frame at a place and moves all frames behind the place one further. `Vec::insert` would panic at a place behind the end.
     fn insert(&mut self, index: usize, new: Waiting) -> Result<(), QueueFull> {
         if self.waiting.is_full() {
             return Err(QueueFull);
@@ -103,13 +108,13 @@ impl TransmitQueue {
 }
 
 impl Transmit for TransmitQueue {
-    /// Adds a frame behind those of its identifier.
+    /// Adds an event behind the frames of its identifier.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.insert(self.place(&frame), Waiting { frame, is_state: false })
     }
 
-    /// The same, or in place of the last of its identifier, if that is a state as well: what was sent between two states keeps
-    /// them apart.
+    /// Adds a state behind the frames of its identifier. When the last of these frames is a state too, the new one takes its place. An
+    /// event between two states keeps both.
     fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
         let index = self.place(&frame);
         match self.waiting.get_mut(index).filter(|last| last.is_state && last.frame.id() == frame.id()) {
@@ -245,6 +250,57 @@ mod tests {
         }
         let order = sent(&mut queue, &mut bus);
         assert_eq!(order, [(0x181, 0), (0x281, 0), (0x581, 0), (0x701, 1), (0x701, 4)]);
+    }
+
+    /// Events and states of the same and of other identifiers, on a bus that comes and goes: every event arrives once and in
+    /// the order of its identifier, and of the states the newest.
+    #[test]
+    fn no_event_is_lost_or_passed_whatever_waits_beside_it() {
+        const IDS: [u16; 4] = [0x181, 0x183, 0x281, 0x701];
+        const EVENTS: usize = 10_000;
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        let (mut seed, mut sent, mut state) = (1_u32, [0_u16; 4], 0_u16);
+        let mut arrived: Vec<(u16, bool, u16)> = Vec::new();
+        let message = |id: u16, is_event: bool, number: u16| {
+            let [low, high] = number.to_le_bytes();
+            Frame::new(id, &[is_event.into(), low, high]).unwrap()
+        };
+        let mut take = |bus: &mut Fake| {
+            let Some(frame) = bus.send() else { return false };
+            let [is_event, low, high] = *frame.data() else { panic!("{frame:?}") };
+            arrived.push((frame.id(), is_event != 0, u16::from_le_bytes([low, high])));
+            true
+        };
+        while sent.iter().map(|count| usize::from(*count)).sum::<usize>() < EVENTS {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let (place, choice) = ((seed >> 30) as usize, seed >> 20 & 0xF);
+            // For a quarter of the time there is no bus.
+            let is_off = (sent.iter().map(|count| u32::from(*count)).sum::<u32>() / 64).is_multiple_of(4);
+            match choice {
+                // A sender that finds no room comes again with the same event.
+                0..6 if queue.send(message(IDS[place], true, sent[place])).is_ok() => sent[place] += 1,
+                6..10 => {
+                    state = state.wrapping_add(1);
+                    let _ = queue.send_state(message(IDS[place], false, state));
+                }
+                _ if !is_off || queue.room() == 0 => drop(take(&mut bus)),
+                _ => (),
+            }
+            queue.pump(&mut bus);
+        }
+        for id in IDS {
+            queue.send_state(message(id, false, u16::MAX)).unwrap_or_else(|QueueFull| ());
+        }
+        while take(&mut bus) {
+            queue.pump(&mut bus);
+        }
+        for (id, sent) in IDS.into_iter().zip(sent) {
+            let own = arrived.iter().filter(|(other, ..)| *other == id);
+            let events: Vec<u16> = own.filter(|(_, is_event, _)| *is_event).map(|event| event.2).collect();
+            assert!(events.iter().copied().eq(0..sent), "{id:03X}h");
+        }
+        let states = arrived.iter().filter(|(_, is_event, _)| !is_event).count();
+        assert!(states > 100 && states < usize::from(state), "{states} of {state} states: some gave way");
     }
 
     #[test]

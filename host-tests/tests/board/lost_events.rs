@@ -3,6 +3,7 @@
 
 use canbus::Time;
 use chip::Loss;
+use emulator::Exception;
 use sim::world::World;
 
 use crate::chip_faults::{peek, poke};
@@ -15,6 +16,7 @@ use crate::support::{
 };
 
 /// Sub-indexes of 2001h.
+const MILLISECONDS: u8 = 2;
 const SAMPLING: u8 = 3;
 const SSI_WORDS: u8 = 4;
 const INDEX: u8 = 5;
@@ -22,15 +24,20 @@ const ALARMS: u8 = 6;
 const BACKUP_WRITES: u8 = 7;
 const FLASH: u8 = 8;
 
-/// Data register of SPI2; the stream of the index and that of the ADC (RM0390, 26.7.4 and 9.5.5); the converter and the timer that
-/// starts it.
+/// Data register of SPI2; control registers of the streams of the count, the absolute encoder, the index and the ADC (RM0390, 26.7.4 and
+/// 9.5.5), of the converter and of the timer that starts it.
 const SPI2_DR: u32 = 0x4000_380C;
 const DMA1_S5CR: u32 = 0x4002_6088;
 const DMA1_S2CR: u32 = 0x4002_6040;
+const DMA1_S3CR: u32 = 0x4002_6058;
+const DMA1_S4CR: u32 = 0x4002_6070;
 const DMA2_S0CR: u32 = 0x4002_6410;
 const ADC1_CR2: u32 = 0x4001_2008;
 const TIM3_CR1: u32 = 0x4000_0400;
 const ENABLED: u32 = 1;
+
+/// DMA2 stream 0 (RM0390, table 38).
+const SAMPLING_TASK: Exception = Exception::irq(56);
 
 const RPM: u32 = 6000;
 /// TPDO 2 of the encoder comes with every SYNC.
@@ -254,4 +261,57 @@ fn a_flash_that_hangs_refuses_a_save_and_takes_the_next() {
     world.run_until(until);
     assert_eq!(master.ask(&mut world, 1, &SAVE)[0], 0x60);
     assert_silent(&mut world);
+}
+
+/// One of the two streams of the absolute encoder stops in the middle of a word; without the one that receives, the SPI has an
+/// overrun.
+#[test]
+fn a_stream_of_the_absolute_encoder_that_stops_is_started_again() {
+    let (mut world, master) = turning(true);
+    for (number, stream) in (1..).zip([DMA1_S3CR, DMA1_S4CR, DMA1_S3CR, DMA1_S4CR]) {
+        // Some way into a word, which lasts 57 us.
+        let before = world.machine(0).stats().of(SAMPLING_TASK).entries;
+        while world.machine(0).stats().of(SAMPLING_TASK).entries == before {
+            world.run_until(world.now() + Time::from_micros(10));
+        }
+        world.run_until(world.now() + Time::from_micros(20));
+        poke(&mut world, stream, 0);
+        assert_eq!(counted(&mut world, &master, SSI_WORDS), number);
+        assert!(oldest(&mut world, &master, true) < 2200.0);
+    }
+    assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
+    assert_silent(&mut world);
+}
+
+/// The interrupts of the sampling do not come for two milliseconds: the newer of the two that are there counts.
+#[test]
+fn milliseconds_that_nobody_collects_are_counted() {
+    const INTERRUPTS: u32 = 0x18;
+    let (mut world, master) = turning(false);
+    let control = peek(&mut world, DMA2_S0CR);
+    poke(&mut world, DMA2_S0CR, control & !INTERRUPTS);
+    world.run_until(world.now() + Time::from_micros(1900));
+    poke(&mut world, DMA2_S0CR, control);
+    assert_eq!(counted(&mut world, &master, MILLISECONDS), 1);
+    assert!(oldest(&mut world, &master, false) < 1200.0);
+    assert_eq!(read(&mut world, &master, (0x2001, SAMPLING)), 0);
+    assert_silent(&mut world);
+}
+
+/// Nobody tells of the bus-off: the state is looked at every 20 ms as well.
+#[test]
+fn a_bus_off_without_its_interrupt_is_noticed() {
+    const CAN1_IER: u32 = 0x4000_6414;
+    const ERRIE: u32 = 1 << 15;
+    let mut world = running();
+    let enabled = peek(&mut world, CAN1_IER);
+    poke(&mut world, CAN1_IER, enabled & !ERRIE);
+    world.bus().faults.noise(1, 1.0);
+    world.run_until(world.now() + SECOND);
+    world.bus().faults.quiet();
+    let silent = world.traffic().node(1);
+    let after = run(&mut world, SECOND * 3);
+    let node = &after.nodes[0];
+    assert!(node.heard.heartbeats > silent.heartbeats && node.heard.emcys > silent.emcys, "{after}");
+    assert!(node.incidents.is_empty() && node.heard.boot_ups == 1, "{after}");
 }

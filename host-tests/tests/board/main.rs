@@ -11,6 +11,8 @@ mod faults;
 mod lift;
 mod lost_events;
 mod measuring;
+mod power_cycles;
+mod races;
 mod running;
 mod saves;
 mod stack;

@@ -11,10 +11,11 @@ use thiserror::Error;
 use crate::bus::{BusError, Received};
 use crate::heartbeat::{self, Heartbeat};
 use crate::object::at;
+use crate::quantity::Quantity;
 use crate::sdo::{self, Client, Options};
 use crate::tpdo::{self, Tpdo};
 use crate::value::{Value, guess};
-use crate::{Catalogue, Network, nmt, unit};
+use crate::{Catalogue, Network, nmt};
 
 /// Something whose value is followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,11 +24,14 @@ pub struct Signal {
     pub at: Multiplexer,
     /// Its name; empty where none is known.
     pub name: String,
+    /// Its name with that of its record; `None` where none is known.
+    pub path: Option<String>,
     /// Its unit; empty where none is known.
     pub unit: String,
     /// The TPDO that has it, from 1; `None` for one that is read.
     pub tpdo: Option<u16>,
     data_type: Option<DataType>,
+    quantity: Quantity,
 }
 
 /// A value at a time.
@@ -89,10 +93,10 @@ impl<'n> Acquisition<'n> {
         catalogue: &Catalogue,
         objects: &[Multiplexer],
     ) -> Result<Acquisition<'n>, Interruption> {
-        let mut client = Client::new(network, setup.node, setup.options);
+        let deadline = network.now() + setup.options.limit;
+        let mut client = Client::new(network, setup.node, setup.options).by(deadline);
         let tpdos = tpdo::read(&mut client, catalogue)?;
-        let mapped = tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|mapped| at(mapped.index, mapped.sub));
-        let objects = if objects.is_empty() { mapped.collect() } else { objects.to_vec() };
+        let objects = if objects.is_empty() { mapped(&tpdos) } else { objects.to_vec() };
         let mut signals = Vec::new();
         for at in objects {
             signals.push(signal(&mut client, catalogue, &tpdos, at)?);
@@ -179,8 +183,13 @@ impl<'n> Acquisition<'n> {
                 continue;
             }
             let bytes = Client::new(self.network, self.setup.node, self.setup.options).upload(signal.at)?;
-            let at = self.network.bus_time().unwrap_or(self.network.now());
-            self.ready.push_back(Sample { at, signal: number, value: signal.decode(&bytes) });
+            let value = signal.decode(&bytes);
+            // The answer was the newest frame; what came before it goes first, so that times do not go backwards.
+            let at = self.network.newest_stamp().unwrap_or(self.network.now());
+            while let Some(received) = self.network.take_kept() {
+                self.take(&received);
+            }
+            self.ready.push_back(Sample { at, signal: number, value });
         }
         Ok(())
     }
@@ -190,12 +199,44 @@ impl Signal {
     /// A signal that is read and not in a TPDO.
     #[must_use]
     pub fn polled(at: Multiplexer, name: &str, unit: &str) -> Signal {
-        Signal { at, name: name.to_owned(), unit: unit.to_owned(), tpdo: None, data_type: None }
+        let quantity = Quantity::plain(unit);
+        let path = Some(name.to_owned()).filter(|name| !name.is_empty());
+        Signal {
+            at,
+            name: name.to_owned(),
+            path,
+            unit: unit.to_owned(),
+            tpdo: None,
+            data_type: None,
+            quantity,
+        }
+    }
+
+    /// The name of its data type; that of the bytes of a value where none is known.
+    #[must_use]
+    pub fn data_type(&self, value: &Value) -> String {
+        let guessed = || match value {
+            Value::Bytes(_) => DataType::DOMAIN,
+            _ => DataType(0x07),
+        };
+        self.data_type.unwrap_or_else(guessed).to_string()
     }
 
     fn decode(&self, bytes: &[u8]) -> Value {
-        Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes)))
+        self.quantity.apply(Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes))))
     }
+}
+
+/// What the TPDOs carry, each object once. Below the communication profile are the data types: they stand for a gap.
+fn mapped(tpdos: &[Tpdo]) -> Vec<Multiplexer> {
+    let mut objects = Vec::new();
+    for mapped in tpdos.iter().flat_map(|tpdo| &tpdo.mapping).filter(|mapped| mapped.index >= 0x1000) {
+        let object = at(mapped.index, mapped.sub);
+        if !objects.contains(&object) {
+            objects.push(object);
+        }
+    }
+    objects
 }
 
 fn signal(
@@ -206,11 +247,14 @@ fn signal(
 ) -> Result<Signal, sdo::Error> {
     let is_in =
         |tpdo: &&Tpdo| tpdo.mapping.iter().any(|mapped| (mapped.index, mapped.sub) == (at.index, at.sub));
+    let quantity = Quantity::of(client, catalogue, at)?;
     Ok(Signal {
         at,
         name: catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default(),
-        unit: unit::of(client, catalogue, at)?,
+        path: catalogue.name(at),
+        unit: quantity.unit.clone(),
         tpdo: tpdos.iter().find(is_in).map(|tpdo| tpdo.number),
         data_type: catalogue.data_type(at),
+        quantity,
     })
 }

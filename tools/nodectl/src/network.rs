@@ -2,8 +2,10 @@
 
 use std::collections::VecDeque;
 
+use canopen::client::heartbeat::Heartbeat;
 use canopen::client::{Service, Step, Taken};
-use canopen::{Duration, Frame, Instant};
+use canopen::nmt::State;
+use canopen::{Duration, Frame, Instant, NodeId};
 
 use crate::bus::{Bus, BusError, Received};
 
@@ -56,6 +58,24 @@ impl Network {
     #[must_use]
     pub fn bus_time(&self) -> Option<Instant> {
         self.newest.map(|(at, arrival)| at + Duration(self.now().0.saturating_sub(arrival.0)))
+    }
+
+    /// The time stamp of the newest frame. `None` before the first.
+    #[must_use]
+    pub fn newest_stamp(&self) -> Option<Instant> {
+        self.newest.map(|(at, _)| at)
+    }
+
+    /// The state that the newest heartbeat of a node told, of those that were passed over.
+    #[must_use]
+    pub fn last_state(&self, node: NodeId) -> Option<State> {
+        let heartbeats = self.kept.iter().rev().filter_map(|received| Heartbeat::parse(&received.frame));
+        heartbeats.filter(|heard| heard.node == node).map(|heard| heard.state).next()
+    }
+
+    /// The oldest of the frames that were passed over.
+    pub fn take_kept(&mut self) -> Option<Received> {
+        self.kept.pop_front()
     }
 
     /// Sends a frame.

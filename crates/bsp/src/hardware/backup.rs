@@ -1,4 +1,4 @@
-//! The backup SRAM: what is written there outlives a loss of power, as long as there is a battery behind VBAT.
+//! The backup SRAM, which keeps its content through a loss of power as long as there is a battery behind VBAT.
 
 use stm32f4xx_hal::pac::{CRC, PWR};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
@@ -11,7 +11,7 @@ const BASE: *const Slots = 0x4002_4000 as *const Slots;
 
 const _: () = assert!(size_of::<Slots>() <= 4096);
 
-/// The memory, written through the copies of [`Keeper`].
+/// The memory, with two copies of its content: see [`Keeper`].
 pub struct BackupMemory {
     power: PWR,
     keeper: Keeper<'static, CrcUnit>,
@@ -45,8 +45,8 @@ impl Checksum for CrcUnit {
 }
 
 impl BackupMemory {
-    /// Switches it on, and finds what was kept. The backup regulator need not be ready: it takes over when the main supply
-    /// goes (RM0390, 5.1.2).
+    /// Switches the memory on and finds the newer copy. The backup regulator need not be ready yet: the memory runs from the main
+    /// supply until that fails (RM0390, 5.1.2).
     pub(crate) fn open(
         power: PWR,
         crc: CRC,
@@ -65,8 +65,8 @@ impl BackupMemory {
         (BackupMemory { power, keeper, losses }, found)
     }
 
-    /// Keeps this. Nothing else can write to the memory: it is protected but for the time of this call. A write that does not
-    /// arrive is counted, and the next one goes to the same place: the copy before it stays good.
+    /// Writes the older copy. The memory is write protected but for the time of this call. A write that does not arrive is counted
+    /// ([`Event::BackupWrite`]); the newer copy stays good, and the next write goes to the same place.
     pub fn write(&mut self, content: &Content) {
         protect(&self.power, false);
         let is_kept = self.keeper.write(content);
@@ -77,7 +77,7 @@ impl BackupMemory {
     }
 }
 
-/// DBP. The bus of PWR is slower than that of the memory: to read it back is to wait for it.
+/// DBP. The bus of PWR is slower than the bus of the memory: reading the register back waits until the write has arrived.
 fn protect(power: &PWR, on: bool) {
     power.cr().modify(|_, w| w.dbp().bit(!on));
     let _ = power.cr().read();

@@ -35,7 +35,7 @@ pub const NAME: &str = "STM32F405/407";
 pub struct Board {
     /// Why the chip was reset.
     pub reset_cause: ResetCause,
-    /// Runs already, with the patience that the start-up needs.
+    /// Runs already, with the long time-out of the start-up.
     pub watchdog: StartUpWatchdog,
     /// The interrupt of the time base.
     pub time: TimeInterrupt,
@@ -51,9 +51,9 @@ pub struct Board {
     pub front_end: FrontEnd,
     /// The absolute encoder.
     pub ssi: Ssi,
-    /// What outlives a loss of power.
+    /// The backup SRAM.
     pub backup: BackupMemory,
-    /// What was in it.
+    /// What the backup SRAM held at the start.
     pub found: Found,
     /// The digital inputs.
     pub buttons: Buttons,
@@ -65,7 +65,7 @@ pub struct Board {
 
 impl Board {
     /// Starts everything but the bus and the sampling. The watchdog comes first: a crystal that does not start ends in a
-    /// reset too. What the hardware loses later on is counted in `losses`.
+    /// reset too. Events that the hardware loses later on are counted in `losses`.
     #[must_use]
     pub fn start(device: Peripherals, losses: &'static Losses) -> Board {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);

@@ -1,5 +1,5 @@
-//! The clocks of `board`, register by register: the HAL computes them at run time, which takes 2 KiB that the bootloader does
-//! not have. And what watches the clock in both images.
+//! The same clocks as in `board`, register by register, for the bootloader: the HAL computes the dividers at run time, which takes
+//! 2 KiB of flash that the bootloader does not have. And the clock security system, for both images.
 
 use stm32f4xx_hal::pac::{FLASH, RCC};
 
@@ -34,7 +34,7 @@ pub(super) fn watch(rcc: &RCC) {
     rcc.cr().modify(|_, w| w.csson().set_bit());
 }
 
-/// Puts them back as a reset leaves them, for the application to raise (RM0390, 6.3.1 to 6.3.3).
+/// Puts the clocks back as a reset leaves them: the application expects them so (RM0390, 6.3.1 to 6.3.3).
 pub(super) fn lower(rcc: &RCC) {
     rcc.cr().modify(|_, w| w.csson().clear_bit());
     rcc.cfgr().reset();

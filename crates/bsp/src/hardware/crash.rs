@@ -1,11 +1,11 @@
-//! The crash record: what writes it, and what the next start does with it.
+//! Writing the crash record at a crash, and reading it at the next start.
 
 use core::panic::Location;
 
 use super::{memory, retained};
 use crate::crash_record::{Crash, Fault, Place, WORDS};
 
-/// The crash that ended the last run, and forgets it.
+/// Takes the crash that ended the last run; a second call finds none.
 pub fn take() -> Option<Crash> {
     let crash = Crash::open(&retained::crash());
     retained::set_crash([0; WORDS]);
@@ -52,8 +52,8 @@ fn log_fault(fault: &Fault) {
     defmt::error!("CFSR {=u32:#010x}, HFSR {=u32:#010x}, address {=u32:#010x}", cfsr, hfsr, address);
 }
 
-/// What the panic handler of an image does. It is not the handler itself because one that uses the place is linked with the
-/// names of all places, for which the bootloader has no room.
+/// For the panic handler of an image. This crate has no handler of its own: a handler that uses the place of a panic is linked with
+/// the names of all source files, for which the bootloader has no room.
 pub fn panicked(place: Option<&Location<'_>>) -> ! {
     let place = place.map_or(Place::new("", 0), |at| Place::new(at.file(), at.line()));
     restart(&Crash::Panic(place))

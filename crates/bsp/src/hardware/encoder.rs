@@ -52,7 +52,7 @@ pub(super) struct Encoder {
     _pins: (PB5<Alternate<2>>, PB6<Alternate<2>>, PB7<Alternate<2>>),
 }
 
-/// What it is made of.
+/// The peripherals and pins of the input.
 pub(crate) struct Parts {
     pub(crate) timer: TIM4,
     pub(crate) at_scan: Stream2<DMA1>,

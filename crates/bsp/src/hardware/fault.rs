@@ -1,7 +1,7 @@
-//! The handlers of what must never happen: every fault, a clock that fails, and interrupts that nobody asked for.
+//! The handlers of what must never happen: every fault, a clock that fails, and interrupts without a handler.
 //!
-//! The stack lies at the very start of RAM, so that one that overflows leaves RAM and faults. The handler of that fault
-//! has no stack to run on: it takes a small one of its own before anything else.
+//! The stack lies at the very start of RAM: a stack that overflows leaves RAM, which is a fault. The handler of that fault has no stack
+//! left to run on, so the handler switches to a small stack of its own before anything else.
 
 use core::arch::naked_asm;
 use core::cell::UnsafeCell;

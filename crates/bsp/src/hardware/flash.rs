@@ -11,22 +11,22 @@ use crate::flash_area::FlashArea;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// The error flags of SR; writing 1 clears one.
 const ERRORS: u32 = 0b1_1111_0010;
-/// How often to look whether a word is programmed, and whether a sector is erased: 10 ms and 2.5 s at least, where 100 us and 2 s
-/// are the longest that the data sheet allows. Counted, because the time base does not run in every image that programs.
+/// How often to read BSY before an operation is given up: programming a word for about 10 ms (the data sheet allows 100 us), an erase
+/// for about 2.5 s (the data sheet allows 2 s). Reads are counted because the time base does not run whenever the bootloader programs.
 const PROGRAM_POLLS: u32 = 1 << 17;
 const ERASE_POLLS: u32 = 1 << 25;
 
 /// The flash controller.
 pub struct Flash(FLASH);
 
-/// Why it did not do what it was told.
+/// Why an operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// Outside of the area, or not on a boundary.
+    /// The place is outside of the area, or not on a boundary.
     Place(NorFlashErrorKind),
-    /// The controller says so: its error flags (RM0390, 3.8.4).
+    /// The error flags of the controller (RM0390, 3.8.4).
     Flags(u32),
-    /// It is busy for longer than any operation takes.
+    /// The controller is busy for longer than any operation takes.
     Busy,
 }
 
@@ -52,7 +52,7 @@ impl Flash {
         Flash(flash)
     }
 
-    /// Copies what is there.
+    /// Copies bytes out of the flash.
     pub(super) fn read(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
         // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
@@ -121,15 +121,15 @@ impl Flash {
         Ok(())
     }
 
-    /// After an operation: locks the controller, and says whether it has done what it was told.
+    /// After an operation: locks the controller, and returns the error flags as an error.
     pub(super) fn end(&mut self) -> Result<(), Error> {
         let flags = self.0.sr().read().bits() & ERRORS;
         self.0.cr().write(|w| w.lock().set_bit());
         if flags == 0 { Ok(()) } else { Err(Error::Flags(flags)) }
     }
 
-    /// Waits for the end of the operation under way. One that does not end is given up: the controller stays locked for whoever
-    /// comes next, and is asked again then.
+    /// Waits for the end of the operation under way. An operation that does not end is an error. The controller is locked then; the
+    /// next operation waits for the same flag again.
     fn wait(&self, polls: u32) -> Result<(), Error> {
         if (0..polls).any(|_| !self.is_busy()) {
             return Ok(());
@@ -138,7 +138,7 @@ impl Flash {
         Err(Error::Busy)
     }
 
-    /// Drops what the data cache holds of the time before (RM0390, 3.4.2). It must be off for that.
+    /// Empties the data cache, which may hold words from before the operation (RM0390, 3.4.2). The cache must be off for that.
     pub(super) fn forget_cached(&mut self) {
         let was_on = self.0.acr().read().dcen().bit_is_set();
         self.0.acr().modify(|_, w| w.dcen().clear_bit());

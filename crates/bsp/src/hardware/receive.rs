@@ -9,7 +9,7 @@ use crate::filters::Fifo;
 use crate::losses::{Event, Losses};
 use crate::mailbox::Mailbox;
 
-/// Frames that wait for their task. At 1 Mbit/s the shortest frame takes 47 us, so this is 1.5 ms of nothing but them.
+/// Frames that wait for their task. The shortest frame takes 47 us at 1 Mbit/s, so the queue holds 1.5 ms of the densest traffic.
 const CAPACITY: usize = 32;
 
 /// The queue between the interrupt and the task.
@@ -45,8 +45,8 @@ impl Receiver {
         (Receiver { fifo, queue: producer, lost }, consumer)
     }
 
-    /// Empties the FIFO, whose three places at 1 Mbit/s fill in 141 us. A frame that finds no place, in the FIFO or in the
-    /// queue, is counted.
+    /// Moves all frames from the FIFO into the queue. The three places of the FIFO fill in 141 us at 1 Mbit/s. A frame that finds no
+    /// place in the FIFO or in the queue is counted ([`Event::Frame`]).
     pub fn drain(&mut self) {
         let at = Clock::now();
         // Never so, but the type of the queue does not say it, and without a place it would divide by zero.

@@ -7,7 +7,7 @@ use update::Trial;
 use crate::crash_record::{self, WORDS};
 use crate::handover::{self, Handover};
 
-/// Everything that is there. Both images must have the same layout: it changes with a new bootloader only.
+/// The content. Both images must agree on the layout, so the layout changes with a new bootloader only.
 #[repr(C)]
 struct Retained {
     handover: [AtomicU32; 2],
@@ -15,7 +15,7 @@ struct Retained {
     crash: [AtomicU32; WORDS],
 }
 
-/// `used`, so that the compiler does not take it for zero at the start.
+/// `used` keeps the compiler from taking the initial values for granted: a reset does not write them.
 #[used]
 #[unsafe(link_section = ".retained")]
 static RETAINED: Retained = Retained {
@@ -24,7 +24,7 @@ static RETAINED: Retained = Retained {
     crash: [const { AtomicU32::new(0) }; WORDS],
 };
 
-/// What the other image left, if it did since power came.
+/// The note of the other image; `None` when there is none since power-on.
 #[must_use]
 pub fn handover() -> Option<Handover> {
     Handover::open(&load(&RETAINED.handover))
@@ -42,7 +42,7 @@ pub fn trial() -> Trial {
     Trial::from_word(RETAINED.trial.load(Ordering::Relaxed))
 }
 
-/// Keeps that count.
+/// Stores the count of crashes.
 pub fn set_trial(trial: Trial) {
     RETAINED.trial.store(trial.word(), Ordering::Relaxed);
 }
@@ -52,7 +52,7 @@ pub(super) fn crash() -> crash_record::Sealed {
     load(&RETAINED.crash)
 }
 
-/// Replaces them.
+/// Replaces the words of the crash record.
 pub(super) fn set_crash(words: crash_record::Sealed) {
     store(&RETAINED.crash, words);
 }

@@ -82,7 +82,7 @@ impl Sums {
     pub const COUNT: u16 = SCANS as u16;
 }
 
-/// The ADC with what starts it and what collects from it.
+/// The ADC, the timer that starts its scans, and the DMA controller that collects them.
 pub(super) struct Sampling {
     adc: ADC1,
     dma: DMA2,
@@ -91,7 +91,7 @@ pub(super) struct Sampling {
     _pins: (PA0<Analog>, PA1<Analog>, PC2<Analog>),
 }
 
-/// What it is made of.
+/// The peripherals and pins of the analogue inputs.
 pub(crate) struct Parts {
     pub(crate) adc: ADC1,
     pub(crate) common: ADC_COMMON,
@@ -117,7 +117,7 @@ impl Sampling {
         Sampling { adc, dma, timer, losses, _pins: (pressure, supply, thermistor) }
     }
 
-    /// What paces it, for those who have something to do at the same instants.
+    /// The timer that starts the scans, for the copies of the encoder's count at the same instants.
     pub(super) fn scans(&self) -> &TIM3 {
         &self.timer
     }
@@ -128,7 +128,7 @@ impl Sampling {
     }
 
     /// Stops everything and sets it up anew, whatever has gone wrong: an overrun of the ADC, which then asks for nothing more
-    /// (RM0390, 13.8.2), a stream that a bus error has switched off, a lost request. [`Sampling::start`] follows.
+    /// (RM0390, 13.8.1), a stream that a bus error has switched off, a lost request. [`Sampling::start`] follows.
     pub(super) fn set_up_again(&mut self) {
         self.timer.cr1().modify(|_, w| w.cen().clear_bit());
         self.timer.cnt().reset();

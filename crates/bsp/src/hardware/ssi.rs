@@ -10,7 +10,7 @@
 //! Nothing. The flash stops the core for 16 us with each word that it programs, longer than a byte lasts on the line; but no
 //! byte waits for the core. Both directions are moved by DMA1 between SPI2 and RAM, and neither way leads through the flash: the
 //! controller's port for peripherals is at the bridge of APB1, its port for memory has SRAM to itself while the core waits
-//! (RM0390, 2.1 and 9.3.2).
+//! (RM0390, 2.1 and 9.3).
 //!
 //! # What a lost byte costs
 //!
@@ -59,7 +59,7 @@ pub struct Ssi {
     _pins: (PB13<Alternate<5>>, PB14<Alternate<5>>),
 }
 
-/// What it is made of.
+/// The peripherals and pins of the input.
 pub(crate) struct Parts {
     pub(crate) spi: SPI2,
     pub(crate) receive: Stream3<DMA1>,

@@ -1,6 +1,5 @@
 //! What the streams of DMA1 have in common.
 
-use stm32f4xx_hal::ClearFlags;
 use stm32f4xx_hal::dma::traits::{Stream, StreamISR};
 
 /// How often to look whether a stream has stopped: it ends the transfer that it is at, some ten clocks.

@@ -12,7 +12,8 @@ static EXTENSION: Extension = Extension::new();
 /// Half a period: no alarm is set further ahead, so that a compare value means one instant only.
 const FARTHEST: Duration = Duration(1 << 31);
 
-/// So long after its time an alarm has lost its interrupt, which is late by a few microseconds at most.
+/// Microseconds after its time, from which on an alarm without a flag has lost its flag. The interrupt is late by a few microseconds
+/// at most.
 const MISSED: u32 = 500;
 
 /// Clock of the timers at APB1: twice that of the bus, which is divided (RM0390, 6.2).
@@ -66,8 +67,8 @@ enum Compare {
 }
 
 impl Alarm {
-    /// Raises the timer's interrupt at `deadline`, at once when that is past, and in any case within half a period, when
-    /// whoever set it must look again.
+    /// Raises the interrupt of the timer at `deadline`, or at once when the deadline is past. An alarm further ahead than half a period
+    /// of the counter comes after half a period: the caller then sets the alarm again.
     #[expect(clippy::cast_possible_truncation, reason = "the hardware compares the low half")]
     pub fn set(&mut self, deadline: Instant) {
         let now = Clock::now();
@@ -83,14 +84,14 @@ impl Alarm {
 /// The timer's interrupt.
 #[derive(Debug)]
 pub struct TimeInterrupt {
-    /// For which value of its compare register each alarm was told.
+    /// For each alarm, the value of the compare register for which [`TimeInterrupt::acknowledge`] has reported the alarm.
     told: [u32; 2],
 }
 
 /// What became of an alarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ring {
-    /// Its time has not come, or it was told before.
+    /// Its time has not come, or was reported before.
     No,
     /// It has just gone off.
     Yes,
@@ -99,8 +100,8 @@ pub enum Ring {
 }
 
 impl TimeInterrupt {
-    /// Acknowledges it and keeps the extension up to date. Tells which alarms went off: by their flags, and by the time for one
-    /// whose flag was lost. So whoever calls it from time to time without an interrupt misses none for longer than that.
+    /// Acknowledges the interrupt, keeps the extension up to date, and tells which alarms have gone off. An alarm whose flag was lost is
+    /// found by the time: a caller that comes by every millisecond without an interrupt finds such an alarm a millisecond late.
     pub fn acknowledge(&mut self) -> [Ring; 2] {
         // In this order: an alarm whose time had come before has its flag.
         let now = registers().cnt().read().cnt().bits();
@@ -116,7 +117,8 @@ impl TimeInterrupt {
     }
 }
 
-/// No alarm lies more than half a period ahead, so one that seems to lie further ahead has passed.
+/// The state of one alarm. No alarm is set further ahead than half a period, so a compare value that seems to lie further ahead has
+/// passed.
 fn ring(alarm: Compare, told: &mut u32, has_flag: bool, now: u32) -> Ring {
     let due = registers().ccr(alarm as usize).read().ccr().bits();
     let is_late = (MISSED..1 << 31).contains(&now.wrapping_sub(due));

@@ -1,6 +1,7 @@
 //! The transmit mailboxes of CAN1 (RM0390, 30.7.1).
 //!
-//! bxcan's own transmission is not used: it panics at a number of a mailbox and a length that a register could hold.
+//! The transmission of the crate bxcan is not used: bxcan panics at a mailbox number or a length that only a broken register could
+//! hold.
 
 use canopen::Frame;
 use stm32f4xx_hal::pac::can1::TX;
@@ -23,12 +24,13 @@ const ABORT_POLLS: u32 = 100;
 
 /// The transmit mailboxes.
 pub struct Transmitter {
-    /// A frame that is to be taken back, with the number of its mailbox, while the end of its transmission is awaited.
+    /// A frame that was to be taken back, and the number of its mailbox. The transmission of the frame had just begun, so the end of
+    /// the transmission decides whether the frame was sent.
     aborted: Option<(u32, Frame)>,
 }
 
 impl Transmitter {
-    /// There is one.
+    /// The only one.
     pub(super) fn new() -> Transmitter {
         Transmitter { aborted: None }
     }
@@ -40,7 +42,7 @@ impl Transmitter {
         registers().tsr().write(|w| w.rqcp0().set_bit().rqcp1().set_bit().rqcp2().set_bit());
     }
 
-    /// A frame whose transmission had begun when it was to be taken back has ended: if nobody has received it, it is sent again.
+    /// Looks whether the transmission of the aborted frame has ended. A frame that was not sent goes back into its mailbox.
     fn settle(&mut self) {
         if let Some((number, frame)) = self.aborted.filter(|(number, _)| !is_aborting(*number)) {
             self.aborted = None;
@@ -104,7 +106,7 @@ fn is_pending(mailbox: &TX) -> bool {
     mailbox.tir().read().txrq().bit_is_set()
 }
 
-/// What the arbitration goes by, lowest first.
+/// The key of the arbitration: identifier and RTR. The lowest key wins.
 fn order(mailbox: &TX) -> u32 {
     mailbox.tir().read().bits() & !TXRQ
 }
@@ -113,8 +115,9 @@ fn identifier(frame: &Frame) -> u32 {
     u32::from(frame.id()) << STID | if frame.is_remote() { REMOTE } else { 0 }
 }
 
-/// With all mailboxes full a frame that waits is taken back, and when that frame is on the wire, it takes up to its end: 13 ms
-/// at 10 kbit/s. So nothing is taken back while the controller transmits; the interrupt at the end comes soon.
+/// Whether taking back a frame would mean waiting. A frame leaves its mailbox at once while it waits, and at the end of its
+/// transmission once it is on the wire: after up to 13 ms at 10 kbit/s. So no frame is taken back while the controller transmits;
+/// the interrupt at the end of the transmission comes soon.
 fn would_wait() -> bool {
     let full = registers().tx_iter().all(is_pending);
     full && registers().msr().read().txm().bit_is_set()
@@ -131,7 +134,8 @@ fn content(mailbox: &TX) -> Option<Frame> {
     content.frame()
 }
 
-/// Takes the frame out of a mailbox, unless it is on the wire by now: then the end of its transmission ends this too.
+/// Asks for the frame in a mailbox to be given up. The mailbox is empty some clocks later, or at the end of a transmission that has
+/// just begun: see [`is_aborting`].
 fn abort(number: u32) {
     // SAFETY: the other bits of TSR are cleared by writing 1, so 0 leaves them.
     registers().tsr().write(|w| unsafe { w.bits(ABRQ << flags_of(number)) });

@@ -10,14 +10,14 @@ use crate::supervision::{Part, Supervision};
 /// 136 to 376 ms; the parts report every 20 ms at the latest.
 const TIMEOUT_MS: u32 = 200;
 
-/// The same for the start-up, in which the parameter store may erase two sectors of 16 KiB, 0.8 s each at most: it is 2 to
-/// 6 s.
+/// Nominal time-out of the start-up in milliseconds, 2 to 6 s: the parameter store may erase two sectors of 16 KiB then, which takes
+/// up to 0.8 s each.
 const START_UP_MS: u32 = 3_000;
 
-/// What KR takes to start again from the top.
+/// The value of KR that starts the countdown again.
 const RELOAD: u16 = 0xAAAA;
 
-/// The watchdog while the node starts, with much patience.
+/// The watchdog while the node starts, with the long time-out.
 pub struct StartUpWatchdog(IndependentWatchdog);
 
 impl StartUpWatchdog {
@@ -29,7 +29,7 @@ impl StartUpWatchdog {
         StartUpWatchdog(watchdog)
     }
 
-    /// Gives it another few seconds. That is for the bootloader, whose one loop is alive if it comes by.
+    /// Starts the countdown again. For the bootloader, which has one loop: the loop is alive when it calls this.
     pub fn feed(&mut self) {
         self.0.feed();
     }

@@ -52,6 +52,13 @@ pub trait Application {
     /// then changes its NMT state as object 1029h says.
     fn error(&mut self, _class: ErrorClass, _image: &mut [u8]) {}
 
+    /// Whether each frame of a TPDO is an event of its own, such as a call of a lift: no newer frame may take the place of
+    /// one that waits for the bus. The frames of other TPDOs tell how things are, and only the newest needs to wait. `tpdo` is
+    /// the number of the TPDO, 1 to 512. Asked whenever the communication parameters or the mapping of the TPDO change.
+    fn sends_events(&self, _tpdo: u16) -> bool {
+        false
+    }
+
     /// What is stored of a group, for every reset that covers it.
     fn stored(&self, _group: Group) -> Stored<'_> {
         Stored { packed: &[], is_sound: true }

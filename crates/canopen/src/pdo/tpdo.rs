@@ -4,7 +4,7 @@
 //! type 255 is sent with every change of a mapped value, at most once per inhibit time. With one, the timer alone sends: a
 //! measured value changes a thousand times a second.
 
-use super::{Layout, Transmission};
+use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
 use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
@@ -22,6 +22,8 @@ pub(crate) struct Settings {
     pub(crate) event: u16,
     /// SYNC counter with which the count of SYNCs begins; 0 for any.
     pub(crate) sync_start: u8,
+    /// A frame that waits for the bus gives way to no newer one.
+    pub(crate) sends_events: bool,
     pub(crate) layout: Layout,
 }
 
@@ -34,6 +36,8 @@ impl Settings {
 /// A TPDO and its timers. Without settings it does not exist.
 #[derive(Debug)]
 pub(crate) struct Tpdo {
+    /// The PDOs that follow in the chains.
+    pub(crate) links: Links,
     settings: Option<Settings>,
     /// Something waits to be sent: an event within the inhibit time, or a frame that found the queue full.
     pending: bool,
@@ -52,6 +56,7 @@ pub(crate) struct Tpdo {
 impl Tpdo {
     pub(crate) const fn new() -> Tpdo {
         Tpdo {
+            links: Links::END,
             settings: None,
             pending: false,
             syncs: 0,
@@ -133,6 +138,12 @@ impl Tpdo {
         }
     }
 
+    /// The application has found an event.
+    pub(crate) fn on_event(&mut self) {
+        self.pending |=
+            self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
+    }
+
     /// Mapped values may have changed.
     pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         if self.settings.as_ref().is_some_and(Settings::sends_on_change) && self.has_changed(image) {
@@ -177,7 +188,8 @@ impl Tpdo {
     fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         let data = settings.layout.gather(image);
-        let sent = turn.send_state(Frame::data_frame(settings.id, settings.layout.len(), data));
+        let frame = Frame::data_frame(settings.id, settings.layout.len(), data);
+        let sent = if settings.sends_events { turn.send(frame) } else { turn.send_state(frame) };
         self.pending = !sent;
         self.inhibited_until = turn.now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
         if sent {

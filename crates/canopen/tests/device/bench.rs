@@ -150,6 +150,8 @@ pub(crate) struct Numbers {
     /// What the device said of the groups that it loaded.
     pub(crate) loaded: Vec<(Group, bool)>,
     pub(crate) told: Vec<Told>,
+    /// The TPDO whose frames are events; 0 for none.
+    pub(crate) event_tpdo: u16,
 }
 
 impl Application for Numbers {
@@ -166,6 +168,10 @@ impl Application for Numbers {
         }
         assert_eq!((entry.index(), entry.sub()), (0x6102, 0));
         if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+
+    fn sends_events(&self, tpdo: u16) -> bool {
+        tpdo == self.event_tpdo
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {

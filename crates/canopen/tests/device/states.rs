@@ -56,3 +56,22 @@ fn what_is_answered_or_told_once_is_none() {
     ids.dedup();
     assert_eq!((ids, &bench.out.states[..]), (vec![0x085, 0x7E4], &[][..]));
 }
+
+/// The application says that the frames of the TPDO are events: the queue gets every one of them.
+#[test]
+fn a_pdo_of_events_is_none() {
+    let mut bench = Bench::booted();
+    bench.device.application_mut().event_tpdo = 1;
+    bench.write32(0x1800, 1, 0x8000_0000 | u32::from(TPDO)).unwrap();
+    bench.write(0x1800, 2, &[255]).unwrap();
+    bench.write(0x1800, 3, &[0, 0]).unwrap();
+    bench.write(0x1800, 5, &[0, 0]).unwrap();
+    bench.write32(0x1800, 1, TPDO.into()).unwrap();
+    bench.nmt(1);
+    for value in 1..=5 {
+        bench.set_value(1, &[value; 4]);
+    }
+    let sent: Vec<_> =
+        bench.sent().into_iter().filter(|(id, _)| *id == TPDO).map(|(_, data)| data[0]).collect();
+    assert_eq!((sent, &bench.out.states[..]), (vec![0, 1, 2, 3, 4, 5], &[][..]));
+}

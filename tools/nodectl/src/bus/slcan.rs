@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
 
-use canopen::{Frame, Instant};
+use canopen::{Duration, Frame, Instant};
 
 use super::socketcand::hex_bytes;
 use super::stream::Stream;
@@ -15,6 +15,8 @@ use super::{Bus, BusError, Received, clock};
 
 /// Bit rates of S0 to S8 in kbit/s.
 const BIT_RATES: [u16; 9] = [10, 20, 50, 100, 125, 250, 500, 800, 1000];
+/// How long somebody who is no adapter may take to say so.
+const GREETING: Duration = Duration::from_millis(200);
 /// The longest line of an adapter is an extended frame with a time stamp: 30 characters.
 const LONGEST: usize = 64;
 
@@ -83,7 +85,14 @@ pub(super) struct Slcan {
 
 impl Slcan {
     pub(super) fn connect(host: &str, bit_rate: u16) -> io::Result<Slcan> {
-        Slcan::open(Stream::connect(host)?, bit_rate)
+        let mut stream = Stream::connect(host)?;
+        // A socketcand greets at once; an adapter says nothing before it is asked.
+        let greeting = stream.read(clock::now() + GREETING).map_err(io::Error::other)?;
+        if greeting.starts_with(b"<") {
+            let message = "a socketcand answers there: the address is socketcand://HOST:PORT/BUS";
+            return Err(io::Error::new(ErrorKind::InvalidData, message));
+        }
+        Slcan::open(stream, bit_rate)
     }
 
     pub(super) fn open_serial(device: &str, bit_rate: u16) -> io::Result<Slcan> {

@@ -9,7 +9,9 @@ use serde::Serialize;
 use super::output::hex;
 use super::{Failure, Session};
 use crate::heartbeat;
+use crate::meaning;
 use crate::object::at;
+use crate::text::visible;
 use crate::update::{Program, Status};
 use crate::value;
 
@@ -51,6 +53,7 @@ struct ProgramReport {
 impl Info {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         for node in session.options.node.list()? {
+            session.begin();
             let report = report(session, node)?;
             session.print(&report)?;
         }
@@ -81,7 +84,9 @@ fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
 /// What the next heartbeat says; nothing where there is none.
 fn state(session: &mut Session, node: NodeId, period: Option<u32>) -> Result<Option<&'static str>, Failure> {
     let Some(period) = period.filter(|&period| period > 0) else { return Ok(None) };
-    let time = Duration(MARGIN.0 + Duration::from_millis(period.into()).0);
+    // A node may say anything; 1017h has 16 bits, and nobody waits for a heartbeat longer than for a transfer.
+    let period = Duration::from_millis(period.into()).min(session.options.sdo().limit);
+    let time = Duration(period.0 + MARGIN.0);
     Ok(heartbeat::wait(&mut session.network, node, time)?.map(heartbeat::words))
 }
 
@@ -118,7 +123,7 @@ fn text(session: &mut Session, node: NodeId, index: u16) -> Result<Option<String
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "-".to_owned());
+        let or_dash = |text: &Option<String>| visible(text.as_deref().unwrap_or("-"));
         let is_boot = self.device_type == Some(BOOT);
         write!(f, "node {}: {}", self.node, or_dash(&self.name))?;
         let note = if is_boot { " (bootloader)" } else { "" };
@@ -134,7 +139,13 @@ impl fmt::Display for Report {
         write!(f, "\n  error register    {register}")?;
         for error in &self.errors {
             // CiA 301, 7.5.2.4: the error code is the low half, the rest is the manufacturer's.
-            write!(f, "\n  error             {:04X}h, {:04X}h", error & 0xFFFF, error >> 16)?;
+            let code = u16::try_from(error & 0xFFFF).unwrap_or(0);
+            write!(
+                f,
+                "\n  error             {code:04X}h {}, {:04X}h",
+                meaning::error_code(code),
+                error >> 16
+            )?;
         }
         self.program.iter().try_for_each(|program| write!(f, "\n  program           {program}"))
     }

@@ -11,6 +11,7 @@ mod output;
 mod paper;
 mod read;
 mod record;
+mod replacement;
 mod scan;
 mod session;
 mod store;

@@ -11,6 +11,8 @@ use super::node_set::NodeSet;
 use super::{Failure, Session};
 use crate::heartbeat;
 use crate::nmt::{self as master, send};
+use crate::object::at;
+use crate::sdo::{Cause, Error};
 
 /// How long a node may take to boot.
 const BOOT: Duration = Duration::from_millis(10_000);
@@ -70,11 +72,27 @@ fn restart(session: &mut Session, command: nmt::Command, node: NodeId) -> Result
     session.print(&Done { node: node.get(), state: Some("booted") })
 }
 
-/// A node that sends no heartbeat cannot tell.
+/// A node that sends no heartbeat cannot tell its state; whether there is one, an answer by SDO tells.
 fn change(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
+    let answers = is_there(session, node)?;
     let time = session.options.timeout().max(Duration::from_millis(1500));
     let state = master::change(&mut session.network, command, node, time)?;
+    if state.is_none() && !answers && !is_there(session, node)? {
+        let node = node.get();
+        return Err(Failure::Silence(format!(
+            "node {node}: sent, but no such node answers or sends a heartbeat"
+        )));
+    }
     session.print(&Done { node: node.get(), state: state.map(heartbeat::words) })
+}
+
+/// Whether the node answers by SDO, which it does not while it is stopped.
+fn is_there(session: &mut Session, node: NodeId) -> Result<bool, Failure> {
+    match session.client(node).upload(at(0x1000, 0)) {
+        Err(Error { cause: Cause::Bus(error), .. }) => Err(error.into()),
+        Err(error) => Ok(error.abort().is_some()),
+        Ok(_) => Ok(true),
+    }
 }
 
 impl Command {

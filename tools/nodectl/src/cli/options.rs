@@ -36,6 +36,10 @@ pub struct Options {
     #[arg(long, global = true, value_name = "MS", default_value_t = 1000)]
     pub timeout: u32,
 
+    /// How long a transfer may take in all, in seconds, whatever the node does.
+    #[arg(long, global = true, value_name = "SECONDS", default_value_t = 10)]
+    pub limit: u32,
+
     /// How often a transfer without an answer is begun anew.
     #[arg(long, global = true, value_name = "N", default_value_t = 1)]
     pub retries: u8,
@@ -44,7 +48,8 @@ pub struct Options {
 impl Options {
     /// For transfers.
     pub(super) fn sdo(&self) -> sdo::Options {
-        sdo::Options { timeout: self.timeout(), retries: self.retries, ..sdo::Options::default() }
+        let limit = Duration::from_millis(u64::from(self.limit) * 1000);
+        sdo::Options { timeout: self.timeout(), limit, retries: self.retries, ..sdo::Options::default() }
     }
 
     /// How long to wait for an answer.

@@ -5,6 +5,8 @@ use std::io::{self, IsTerminal, Write};
 
 use serde::Serialize;
 
+use crate::text::visible_lines;
+
 /// Where results go, and how.
 pub struct Output {
     to: Box<dyn Write>,
@@ -33,9 +35,16 @@ impl Output {
         if self.json {
             serde_json::to_writer(&mut self.to, result)?;
         } else {
-            write!(self.to, "{result}")?;
+            // What a device, a file or a network has put into it must not reach the terminal as it is.
+            write!(self.to, "{}", visible_lines(&result.to_string()))?;
         }
         writeln!(self.to)?;
+        self.to.flush()
+    }
+
+    /// Prints a line of JSON.
+    pub(super) fn json(&mut self, value: &serde_json::Value) -> io::Result<()> {
+        writeln!(self.to, "{value}")?;
         self.to.flush()
     }
 

@@ -10,7 +10,12 @@ use super::output::hex;
 use super::{Failure, Session};
 use crate::object::at;
 use crate::scan::{Presence, scan};
+use crate::text::visible;
 use crate::{heartbeat, value};
+
+/// What may be wrong when nobody answers.
+const NOBODY: &str = "nobody answers: is the bus the right one, with the right bit rate, and are the nodes on? \
+                      Nodes without a node-ID are found by `nodectl lss scan`";
 
 /// Lists the nodes that answer, or that send a heartbeat.
 #[derive(Debug, Args)]
@@ -41,9 +46,15 @@ impl Scan {
         let found = scan(&mut session.network, time)?;
         let mut nodes = Vec::new();
         for (node, presence) in found {
+            session.begin();
             nodes.push(row(session, node, presence)?);
         }
-        session.print(&Found { nodes })
+        let is_empty = nodes.is_empty();
+        session.print(&Found { nodes })?;
+        if is_empty {
+            return Err(Failure::Silence(NOBODY.to_owned()));
+        }
+        Ok(())
     }
 }
 
@@ -72,7 +83,7 @@ impl fmt::Display for Found {
             let Row { node, state, device_type, vendor, product, name } = row;
             write!(f, "\n{node:>4}  {:<15}  ", state.unwrap_or("-"))?;
             write!(f, "{:<11}  {:<9}  {:<9}  ", hex(*device_type), hex(*vendor), hex(*product))?;
-            write!(f, "{}", name.as_deref().unwrap_or("-"))?;
+            write!(f, "{}", visible(name.as_deref().unwrap_or("-")))?;
         }
         Ok(())
     }

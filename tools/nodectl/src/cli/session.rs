@@ -5,22 +5,31 @@ use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
-use canopen::NodeId;
+use canopen::nmt::State;
 use canopen::sdo::Multiplexer;
+use canopen::{Instant, NodeId};
 use eds::Eds;
 use serde::Serialize;
 
 use super::{Failure, Options, Output};
 use crate::object::at;
 use crate::sdo::{self, Client};
+use crate::text::visible_lines;
 use crate::{Catalogue, Network};
+
+/// The data sheets of the largest devices have a quarter of this.
+const LARGEST_SHEET: u64 = 4 << 20;
 
 /// An open bus, and what is known about the nodes on it.
 pub struct Session {
     pub(super) network: Network,
     pub(super) options: Options,
     pub(super) output: Output,
+    /// The data sheet of the options, once it is read.
+    sheet: Option<Eds>,
     catalogues: BTreeMap<NodeId, Catalogue>,
+    /// Until when the transfers have to be over that are made for one node.
+    deadline: Instant,
 }
 
 impl Session {
@@ -29,20 +38,36 @@ impl Session {
     /// # Errors
     /// The bus cannot be opened.
     pub fn open(options: &Options, output: Output) -> Result<Session, Failure> {
+        // A data sheet that cannot be used is told before anything happens.
+        let sheet = options.eds.as_deref().map(sheet).transpose()?;
         let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
         let network = Network::open(move || address.open(bit_rate))?;
-        Ok(Session::with(network, options, output))
+        Ok(Session { sheet, ..Session::with(network, options, output) })
     }
 
     /// On a bus that is open.
     #[must_use]
     pub fn with(network: Network, options: &Options, output: Output) -> Session {
-        Session { network, options: options.clone(), output, catalogues: BTreeMap::new() }
+        Session {
+            network,
+            options: options.clone(),
+            output,
+            sheet: None,
+            catalogues: BTreeMap::new(),
+            deadline: Instant::NEVER,
+        }
     }
 
     /// The client of a node.
     pub(super) fn client(&mut self, node: NodeId) -> Client<'_> {
-        Client::new(&mut self.network, node, self.options.sdo())
+        let deadline = self.deadline;
+        Client::new(&mut self.network, node, self.options.sdo()).by(deadline)
+    }
+
+    /// The next transfers are about one node: together they may take as long as one. A node that is slow on purpose costs
+    /// no more, however much it is asked.
+    pub(super) fn begin(&mut self) {
+        self.deadline = self.network.now() + self.options.sdo().limit;
     }
 
     /// What is known about a node: from the file of the options, else by its identity.
@@ -50,8 +75,11 @@ impl Session {
         if let Some(known) = self.catalogues.get(&node) {
             return Ok(known.clone());
         }
-        let catalogue = match self.options.eds.clone() {
-            Some(path) => Catalogue::new(sheet(&path)?),
+        if self.sheet.is_none() {
+            self.sheet = self.options.eds.as_deref().map(sheet).transpose()?;
+        }
+        let catalogue = match self.sheet.clone() {
+            Some(sheet) => Catalogue::new(sheet),
             None => self.identify(node)?.unwrap_or_else(Catalogue::unknown),
         };
         Ok(self.catalogues.entry(node).or_insert(catalogue).clone())
@@ -72,7 +100,7 @@ impl Session {
         match self.client(node).upload(at) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if error.abort().is_some() => Ok(None),
-            Err(error) => Err(error.into()),
+            Err(error) => Err(self.named(error)),
         }
     }
 
@@ -82,10 +110,43 @@ impl Session {
         found.map_err(|error| Failure::Usage(error.to_string()))
     }
 
-    /// The error of a transfer with the name of its object.
+    /// The error of a transfer with the name of its object, and what helps.
     pub(super) fn named(&mut self, error: sdo::Error) -> Failure {
         let name = self.catalogues.get(&error.node).and_then(|catalogue| catalogue.name(error.at));
-        sdo::Error { name: error.name.clone().or(name), ..error }.into()
+        let hint = self.hint(&error);
+        sdo::Error { name: error.name.clone().or(name), hint, ..error }.into()
+    }
+
+    /// What helps against an error.
+    fn hint(&self, error: &sdo::Error) -> Option<String> {
+        if error.is_silence() && self.network.last_state(error.node) == Some(State::Stopped) {
+            return Some("the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned());
+        }
+        let code = error.abort()?.0;
+        let catalogue = self.catalogues.get(&error.node);
+        match (code, error.at.index) {
+            (0x0609_0030..=0x0609_0032, _) => {
+                catalogue?.range(error.at, error.node).map(|range| format!("it takes {range}"))
+            }
+            (_, 0x1400..=0x1BFF) if code >> 24 == 6 || code >> 24 == 8 => {
+                let communication = error.at.index & !0x0200;
+                Some(format!(
+                    "a PDO is changed while it is switched off (bit 31 of {communication:04X}h:1) and its mapping is \
+                     empty (sub-index 0 is 0)"
+                ))
+            }
+            (0x0609_0011, 0x1010 | 0x1011) => Some("the node has no such group of parameters".to_owned()),
+            _ => None,
+        }
+    }
+
+    /// Tells a failure after which the command goes on.
+    pub(super) fn tell(&mut self, failure: &Failure) -> Result<(), Failure> {
+        if self.options.json {
+            return Ok(self.output.json(&failure.to_json())?);
+        }
+        eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
+        Ok(())
     }
 
     /// Prints a result.
@@ -95,6 +156,14 @@ impl Session {
 }
 
 fn sheet(path: &Path) -> Result<Eds, Failure> {
+    let size = fs::metadata(path).map_err(|error| Failure::file(path, error))?.len();
+    if size > LARGEST_SHEET {
+        return Err(Failure::file(path, "it is larger than any data sheet (4 MiB)"));
+    }
     let bytes = fs::read(path).map_err(|error| Failure::file(path, error))?;
-    Eds::from_bytes(&bytes).map_err(|error| Failure::file(path, error))
+    let sheet = Eds::from_bytes(&bytes).map_err(|error| Failure::file(path, error))?;
+    if sheet.objects.is_empty() {
+        return Err(Failure::file(path, "it is no data sheet: there is no object in it"));
+    }
+    Ok(sheet)
 }

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::failure::update_code;
 use super::output::hex;
 use super::{Failure, Session};
+use crate::text::visible;
 use crate::update::{Error, Image, Options, Outcome, Step, Watcher, update};
 
 /// Replaces the program of nodes (CiA 302-3), one after the other.
@@ -69,6 +70,10 @@ impl Update {
         if self.raw {
             return Ok(Image::opaque(bytes));
         }
+        if bytes.starts_with(b"\x7fELF") {
+            let message = "it is an ELF file; nodes take the signed image that `cargo xtask sign` makes of it (firmware.img)";
+            return Err(Failure::file(&self.image, message));
+        }
         Image::parse(bytes).map_err(|error| Failure::file(&self.image, error))
     }
 }
@@ -112,7 +117,7 @@ impl fmt::Display for Report {
             return write!(f, "{error}");
         }
         let program = |version: &Option<String>, identification| {
-            format!("{} ({})", version.as_deref().unwrap_or("no program"), hex(identification))
+            format!("{} ({})", visible(version.as_deref().unwrap_or("no program")), hex(identification))
         };
         let old = program(&self.old_version, self.old_identification);
         let new = program(&self.new_version, self.new_identification);
@@ -123,15 +128,21 @@ impl fmt::Display for Report {
     }
 }
 
-/// The progress on the standard error output.
+/// The progress on the standard error output: one line that fits 80 columns.
 struct Bar(ProgressBar);
+
+/// Of a step that takes no known time, and of a download.
+const WAITING: &str = "{prefix} {msg:<20} {elapsed}";
+const LOADING: &str = "{prefix} {msg:<20} [{bar:14}] {percent:>3} % {bytes_per_sec:>13} {eta:>4} left";
+
+fn style(template: &str) -> ProgressStyle {
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    style.progress_chars("=> ")
+}
 
 impl Bar {
     fn new() -> Bar {
-        let template =
-            "{prefix} {msg:<21} [{bar:30}] {percent:>3} % {bytes}/{total_bytes} {bytes_per_sec} {eta} left";
-        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        Bar(ProgressBar::no_length().with_style(style.progress_chars("=> ")))
+        Bar(ProgressBar::no_length().with_style(style(WAITING)))
     }
 }
 
@@ -139,10 +150,10 @@ impl Watcher for Bar {
     fn step(&mut self, node: NodeId, step: Step) {
         self.0.set_prefix(format!("node {:>3}", node.get()));
         self.0.set_message(step.to_string());
-        // The rate is that of the download.
-        if matches!(step, Step::Download | Step::DownloadSegments) {
-            self.0.reset();
-        }
+        let is_loading = matches!(step, Step::Download | Step::DownloadSegments);
+        self.0.set_style(style(if is_loading { LOADING } else { WAITING }));
+        // The rate is that of the download, the time that of the step.
+        self.0.reset();
         // Where no bar can be drawn, the steps are told.
         if self.0.is_hidden() {
             eprintln!("node {}: {step}", node.get());

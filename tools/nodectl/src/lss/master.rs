@@ -105,10 +105,21 @@ impl<'n> Master<'n> {
 
     /// Finds a slave without a node-ID, and selects it; `None` when there is none. It takes up to 133 times the time-out.
     ///
+    /// `progress` is told how many of [`Fastscan::QUESTIONS`] have been asked.
+    ///
     /// # Errors
     /// The bus is lost, or a slave that answered before does no more.
-    pub fn fastscan(&mut self) -> Result<Option<Identity>, Error> {
-        self.run(Fastscan::new(self.options))
+    pub fn fastscan(&mut self, mut progress: impl FnMut(u8)) -> Result<Option<Identity>, Error> {
+        let mut scan = Fastscan::new(self.options);
+        Ok(self.network.run_with(&mut scan, |scan| progress(scan.asked()))??)
+    }
+
+    /// Whether there is a slave without a node-ID.
+    ///
+    /// # Errors
+    /// The bus is lost.
+    pub fn is_anybody_unconfigured(&mut self) -> Result<bool, Error> {
+        Ok(self.network.run(&mut lss::identify_unconfigured(self.options))?.is_ok())
     }
 
     /// Runs a service that has an answer.

@@ -3,7 +3,7 @@
 use canopen::client::Service;
 use canopen::client::sdo::{self, BlockDownload, BlockUpload, Download, Upload};
 use canopen::sdo::Multiplexer;
-use canopen::{Duration, NodeId};
+use canopen::{Duration, Instant, NodeId};
 
 use super::memory::Memory;
 use super::{Cause, Error, Options};
@@ -17,12 +17,19 @@ pub struct Client<'n> {
     network: &'n mut Network,
     node: NodeId,
     options: Options,
+    deadline: Instant,
 }
 
 impl<'n> Client<'n> {
     /// The client of a node.
     pub fn new(network: &'n mut Network, node: NodeId, options: Options) -> Client<'n> {
-        Client { network, node, options }
+        Client { network, node, options, deadline: Instant::NEVER }
+    }
+
+    /// The same for several transfers that have to be over by then together, besides what the options say of each.
+    #[must_use]
+    pub fn by(self, deadline: Instant) -> Client<'n> {
+        Client { deadline, ..self }
     }
 
     /// Reads an object, expedited or segmented as the server likes.
@@ -30,7 +37,7 @@ impl<'n> Client<'n> {
     /// # Errors
     /// The node, the object and the reason.
     pub fn upload(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
-        let mut upload = Upload::new(self.node, at, Memory::default(), self.options);
+        let mut upload = Upload::new(self.node, at, Memory::default(), self.options());
         self.run(at, &mut upload, |_| ())?;
         Ok(upload.into_sink().0)
     }
@@ -55,7 +62,7 @@ impl<'n> Client<'n> {
     /// # Errors
     /// The node, the object and the reason.
     pub fn block_upload(&mut self, at: Multiplexer) -> Result<Vec<u8>, Error> {
-        let mut upload = BlockUpload::new(self.node, at, Memory::default(), self.options);
+        let mut upload = BlockUpload::new(self.node, at, Memory::default(), self.options());
         self.run(at, &mut upload, |_| ())?;
         Ok(upload.into_sink().0)
     }
@@ -83,8 +90,14 @@ impl<'n> Client<'n> {
     /// What takes long to write may take long: a segment in a frame of its own, and its answer, on the slowest bus.
     fn patience(&self, value: &[u8]) -> Options {
         let segments = u64::try_from(value.len() / 7).unwrap_or(u64::MAX);
-        let limit = Duration(self.options.limit.0.saturating_add(segments.saturating_mul(SEGMENT.0)));
-        Options { limit, ..self.options }
+        let options = self.options();
+        let limit = Duration(options.limit.0.saturating_add(segments.saturating_mul(SEGMENT.0)));
+        Options { limit, ..options }
+    }
+
+    fn options(&self) -> Options {
+        let left = self.deadline.0.saturating_sub(self.network.now().0);
+        Options { limit: Duration(self.options.limit.0.min(left)), ..self.options }
     }
 
     fn run<S>(&mut self, at: Multiplexer, service: &mut S, progress: impl FnMut(&S)) -> Result<(), Error>
@@ -93,7 +106,7 @@ impl<'n> Client<'n> {
     {
         let result = self.network.run_with(service, progress);
         let result = result.map_err(Cause::from).and_then(|result| result.map_err(Cause::from));
-        result.map_err(|cause| Error { node: self.node, at, name: None, cause })
+        result.map_err(|cause| Error { node: self.node, at, name: None, hint: None, cause })
     }
 }
 

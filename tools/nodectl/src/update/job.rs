@@ -16,8 +16,8 @@ const POLL: Duration = Duration::from_millis(100);
 const RESTART: Duration = Duration::from_millis(15_000);
 /// How long it may take to erase, or to check.
 const FLASH: Duration = Duration::from_millis(60_000);
-/// How often clearing is tried.
-const CLEARS: usize = 3;
+/// How often clearing is tried, when it is refused although the flash is not busy.
+const CLEARS: usize = 5;
 /// How often one run goes on with a node that was lost.
 const RESUMES: usize = 10;
 
@@ -117,6 +117,7 @@ impl<'a> Job<'a> {
             self.replace(network, now.is_running, watcher)?;
         }
         if !(is_there && now.is_running) {
+            self.wait_while_busy(network, watcher)?;
             watcher.step(self.node, Step::Start);
             self.program(network).restart(Command::Start)?;
             self.wait_until_running(network, true, "start the new program")?;
@@ -172,18 +173,32 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Clears the program. Some nodes are still busy with themselves when they are asked first.
+    /// Clears the program. A node that was interrupted may still be busy with its flash; it refuses until it is done.
     fn clear(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+        self.wait_while_busy(network, watcher)?;
         watcher.step(self.node, Step::Clear);
+        let until = network.now() + FLASH;
         let mut tries = CLEARS;
         while let Err(error) = self.program(network).command(Command::Clear) {
             tries -= 1;
-            if tries == 0 || error.abort().is_none() {
+            let is_late = network.now() >= until;
+            if tries == 0 || is_late || error.abort().is_none() {
                 return Err(error.into());
             }
             network.pause(POLL)?;
+            self.wait_while_busy(network, watcher)?;
         }
         self.wait_for_flash(network, is_cleared)
+    }
+
+    /// Waits until the flash is no longer busy, whatever it was busy with.
+    fn wait_while_busy(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
+        let is_busy = self.program(network).status()?.is_some_and(|status| status.busy);
+        if is_busy {
+            watcher.step(self.node, Step::Busy);
+            self.wait_for_flash(network, |_| true)?;
+        }
+        Ok(())
     }
 
     /// In blocks; in segments where the node does not know those.

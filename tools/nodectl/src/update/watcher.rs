@@ -20,6 +20,8 @@ pub enum Step {
     Identify,
     /// It is stopped.
     Stop,
+    /// The flash is busy with what an earlier master has begun.
+    Busy,
     /// It is cleared.
     Clear,
     /// The new one is on its way.
@@ -41,6 +43,7 @@ impl fmt::Display for Step {
         f.pad(match self {
             Step::Identify => "identify",
             Step::Stop => "stop",
+            Step::Busy => "wait for the flash",
             Step::Clear => "clear",
             Step::Download => "download in blocks",
             Step::DownloadSegments => "download in segments",

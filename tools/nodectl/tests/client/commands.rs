@@ -9,7 +9,10 @@ use crate::pressure::Pressure;
 use crate::wire::Wire;
 
 /// Does a command; what it printed and how it ended.
-fn run<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (String, Result<(), Failure>) {
+pub(crate) fn run<S: nodectl::bus::Station + 'static>(
+    wire: &Wire<S>,
+    line: &[&str],
+) -> (String, Result<(), Failure>) {
     let cli = Cli::try_parse_from(std::iter::once(&"nodectl").chain(line)).expect("a command line");
     let paper = Paper::default();
     let output = Output::new(paper.clone(), cli.options.json);
@@ -17,14 +20,14 @@ fn run<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (St
     (paper.take(), result)
 }
 
-fn printed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> String {
+pub(crate) fn printed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> String {
     let (printed, result) = run(wire, line);
     result.unwrap_or_else(|failure| panic!("{line:?}: {failure}"));
     printed
 }
 
-fn failed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (u8, String) {
-    let failure = run(wire, line).1.expect_err("a failure");
+pub(crate) fn failed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (u8, String) {
+    let failure = run(wire, line).1.expect_err(&format!("{line:?} fails"));
     (failure.exit_code(), failure.to_string())
 }
 
@@ -76,7 +79,11 @@ fn write_is_checked_here_and_there() {
     let refused = failed(&wire, &["write", "1019", "250"]);
     assert_eq!(
         refused,
-        (1, "node 1, 1019h:0 \"Synchronous counter overflow value\": 0609 0031h, value too high".to_owned())
+        (
+            1,
+            "node 1, 1019h:0 \"Synchronous counter overflow value\": 0609 0031h, value too high; it takes 0 to 240"
+                .to_owned()
+        )
     );
 }
 

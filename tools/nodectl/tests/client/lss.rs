@@ -10,7 +10,7 @@ use crate::pressure::Pressure;
 use crate::wire::{Wire, client};
 
 fn identity(serial: u32) -> Identity {
-    Identity { vendor: node::VENDOR_ID, product: 1, revision: node::REVISION, serial }
+    Identity { vendor: product::VENDOR_ID, product: 1, revision: product::REVISION, serial }
 }
 
 fn master(network: &mut Network) -> Master<'_> {
@@ -26,7 +26,7 @@ fn fastscan_finds_one_after_the_other_and_gives_them_node_ids() {
     let serials = [0xFFFF_FFFF, 0x1234_5678, 0x1234_5679, 0];
     let mut network = unconfigured(&serials).network();
     let mut found = Vec::new();
-    while let Some(identity) = master(&mut network).fastscan().unwrap() {
+    while let Some(identity) = master(&mut network).fastscan(|_| ()).unwrap() {
         found.push(identity.serial);
         let id = NodeId::new(10 + u8::try_from(found.len()).unwrap());
         let mut master = master(&mut network);
@@ -45,7 +45,7 @@ fn fastscan_finds_one_after_the_other_and_gives_them_node_ids() {
 #[test]
 fn a_bus_without_unconfigured_nodes_has_nothing_to_find() {
     let mut network = Wire::new(vec![Pressure::new(5)]).network();
-    assert_eq!(master(&mut network).fastscan().unwrap(), None);
+    assert_eq!(master(&mut network).fastscan(|_| ()).unwrap(), None);
 }
 
 #[test]

@@ -1,11 +1,15 @@
 //! The library against nodes in this process, in virtual time.
 
+mod bad_input;
 mod blocks;
 mod commands;
+mod hostile;
 mod loader;
 mod lss;
+mod meanings;
 mod pressure;
 mod process;
+mod safety;
 mod transfers;
 mod update;
 mod wire;

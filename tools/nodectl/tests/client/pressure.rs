@@ -1,7 +1,7 @@
 //! The node of this project on the simulated bus, with its parameter store.
 
 use canopen::{Action, Frame, Instant, Next, NodeId, Transmit};
-use node::{BitRate, Parcel, Personality, Protocol, Setup};
+use node::{BitRate, Personality, Protocol, Setup, StoreJob};
 use nodectl::bus::Station;
 use storage::{Memory, Pages, Store, View};
 
@@ -42,7 +42,14 @@ impl Pressure {
 
     fn with_flash(setup: Setup, flash: Vec<u8>) -> Pressure {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
-        let mut protocol = Protocol::new(&setup);
+        let record = view.device().expect("a record or none");
+        // What LSS has stored of the device comes before what the factory has set.
+        let stored = record.map_or(setup, |record| Setup {
+            node_id: NodeId::new(record.node_id()),
+            bit_rate: BitRate::from_kbit(record.bit_rate_kbit()).expect("a bit rate"),
+            ..setup
+        });
+        let mut protocol = Protocol::new(&stored);
         protocol.load(&mut view);
         let store = Store::prepare(view).expect("a store");
         Pressure { setup, protocol, store, is_started: false }
@@ -69,10 +76,10 @@ impl Pressure {
     }
 
     fn save(&mut self, now: Instant, out: &mut impl Transmit) {
-        let mut parcel = Parcel::new(Personality::default());
-        if self.protocol.pack(&mut parcel) {
-            let result = parcel.deliver(&mut self.store);
-            let _ = self.protocol.finish(&parcel, result, now, out);
+        let mut job = StoreJob::new(Personality::default());
+        if self.protocol.take_job(&mut job) {
+            let result = job.run(&mut self.store);
+            let _ = self.protocol.finish(&job, result, now, out);
         }
     }
 }

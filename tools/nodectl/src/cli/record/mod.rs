@@ -3,8 +3,8 @@
 mod plot;
 mod table;
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::error::Error;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,15 +16,17 @@ pub(super) use self::plot::range;
 use self::table::Table;
 pub(super) use self::table::seconds as seconds_between;
 use super::monitor::Source;
+use super::replacement::Replacement;
 use super::{Failure, Session};
-use crate::acquisition::{Acquisition, Sample};
+use crate::acquisition::{Acquisition, Sample, Signal};
 
 /// How often the end of the recording is looked for while nothing arrives.
 const WAKE: Duration = Duration::from_millis(50);
 
 /// Records values over time, as CSV and as a plot.
 ///
-/// Times are those of the bus, where the adapter tells them.
+/// Times are those of the bus, where the adapter tells them. What has come is kept however the recording ends: by its
+/// duration, Ctrl-C, SIGTERM or the loss of the bus. A file that is there already is replaced when the new one is complete.
 #[derive(Debug, Args)]
 pub(super) struct Record {
     #[command(flatten)]
@@ -54,44 +56,97 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 impl Record {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
-        let mut table = self.open_table()?;
+        // All files are opened before anything is recorded: what cannot be written is told at once.
+        let csv = self.csv.as_deref().map(Replacement::open).transpose()?;
+        let svg = self.svg.as_deref().map(Replacement::open).transpose()?;
         let (mut acquisition, _) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
-        if let Some(table) = &mut table {
-            table.head(&signals)?;
-        }
-        let mut samples = Vec::new();
-        acquire(&mut acquisition, self.duration, |sample| {
-            if self.svg.is_some() {
+        let mut table = Table::new(Target::new(csv, svg.is_some()));
+        table.head(&signals)?;
+        let (mut samples, mut count) = (Vec::new(), 0_usize);
+        let ended = acquire(&mut acquisition, self.duration, |sample| {
+            count += 1;
+            if svg.is_some() {
                 samples.push(sample.clone());
             }
-            table.as_mut().map_or(Ok(()), |table| table.take(sample))
-        })?;
-        if let Some(table) = table {
-            table.finish()?;
+            table.take(sample)
+        });
+        if count == 0 {
+            ended?;
+            let hint = acquisition.hint().unwrap_or_else(|| "no value has come".to_owned());
+            return Err(Failure::Silence(format!("nothing is recorded: {hint}")));
         }
-        acquisition.hint().iter().for_each(|hint| eprintln!("{hint}"));
-        match &self.svg {
-            Some(path) => plot::draw(path, &signals, &samples).map_err(|error| Failure::file(path, error)),
-            None => Ok(()),
+        // Whatever has ended the recording: what has come is kept.
+        table.end_row()?;
+        let rows = table.rows();
+        table.into_inner()?.complete()?;
+        if let (Some(path), Some(file)) = (&self.svg, svg) {
+            write_plot(file, &signals, &samples).map_err(|error| Failure::file(path, error))?;
         }
+        self.tell(rows);
+        ended
     }
 
-    /// Before anything is recorded: a file that cannot be written is told at once.
-    fn open_table(&self) -> Result<Option<Table>, Failure> {
-        let to: Box<dyn Write> = match &self.csv {
-            Some(path) => {
-                let file = File::create(path).map_err(|error| Failure::file(path, error))?;
-                Box::new(BufWriter::new(file))
-            }
-            None if self.svg.is_some() => return Ok(None),
-            None => Box::new(io::stdout()),
-        };
-        Ok(Some(Table::new(to)))
+    /// What has been written.
+    fn tell(&self, rows: usize) {
+        let csv = self.csv.iter().map(|path| format!("{rows} rows in {}", path.display()));
+        let svg = self.svg.iter().map(|path| format!("a plot in {}", path.display()));
+        let written: Vec<String> = csv.chain(svg).collect();
+        if !written.is_empty() {
+            eprintln!("{}", written.join(", "));
+        }
     }
 }
 
-/// Takes samples until the time is over or somebody presses Ctrl-C.
+fn write_plot(mut file: Replacement, signals: &[Signal], samples: &[Sample]) -> Result<(), Box<dyn Error>> {
+    file.write_all(plot::draw(signals, samples)?.as_bytes())?;
+    Ok(file.complete()?)
+}
+
+/// Where the table goes.
+enum Target {
+    File(Replacement),
+    Standard(io::Stdout),
+    /// Only a plot is wanted.
+    Nowhere,
+}
+
+impl Target {
+    fn new(csv: Option<Replacement>, has_plot: bool) -> Target {
+        match csv {
+            Some(file) => Target::File(file),
+            None if has_plot => Target::Nowhere,
+            None => Target::Standard(io::stdout()),
+        }
+    }
+
+    fn complete(self) -> Result<(), Failure> {
+        match self {
+            Target::File(file) => file.complete(),
+            Target::Standard(_) | Target::Nowhere => Ok(()),
+        }
+    }
+}
+
+impl Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Target::File(file) => file.write(bytes),
+            Target::Standard(out) => out.write(bytes),
+            Target::Nowhere => Ok(bytes.len()),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Target::File(file) => file.flush(),
+            Target::Standard(out) => out.flush(),
+            Target::Nowhere => Ok(()),
+        }
+    }
+}
+
+/// Takes samples until the time is over or a signal (Ctrl-C, SIGTERM) comes.
 fn acquire(
     acquisition: &mut Acquisition,
     duration: Option<Duration>,

@@ -2,7 +2,6 @@
 
 use std::error::Error;
 use std::ops::Range;
-use std::path::Path;
 
 use canopen::Instant;
 use plotters::coord::Shift;
@@ -27,17 +26,21 @@ struct Chart {
     lines: Vec<Line>,
 }
 
-/// Draws all signals that are numbers.
-pub(super) fn draw(path: &Path, signals: &[Signal], samples: &[Sample]) -> Result<(), Box<dyn Error>> {
+/// Draws all signals that are numbers, above one another on one time axis. The text of the file.
+pub(super) fn draw(signals: &[Signal], samples: &[Sample]) -> Result<String, Box<dyn Error>> {
     let charts = charts(signals, samples);
     let rows = charts.len().max(1);
     let size = (WIDTH, HEIGHT * u32::try_from(rows)?);
-    let root = SVGBackend::new(path, size).into_drawing_area();
+    let mut text = String::new();
+    let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
     root.fill(&WHITE)?;
+    let times = range(charts.iter().flat_map(Chart::points).map(|point| point.0), 0.0);
     for (chart, area) in charts.iter().zip(root.split_evenly((rows, 1))) {
-        chart.draw(&area)?;
+        chart.draw(&area, times.clone())?;
     }
-    Ok(root.present()?)
+    root.present()?;
+    drop(root);
+    Ok(text)
 }
 
 fn charts(signals: &[Signal], samples: &[Sample]) -> Vec<Chart> {
@@ -60,10 +63,12 @@ fn charts(signals: &[Signal], samples: &[Sample]) -> Vec<Chart> {
 }
 
 impl Chart {
-    fn draw(&self, area: &DrawingArea<SVGBackend, Shift>) -> Result<(), Box<dyn Error>> {
-        let points = || self.lines.iter().flat_map(|line| &line.points);
-        let times = range(points().map(|point| point.0), 0.0);
-        let values = range(points().map(|point| point.1), 0.05);
+    fn points(&self) -> impl Iterator<Item = &(f64, f64)> {
+        self.lines.iter().flat_map(|line| &line.points)
+    }
+
+    fn draw(&self, area: &DrawingArea<SVGBackend, Shift>, times: Range<f64>) -> Result<(), Box<dyn Error>> {
+        let values = range(self.points().map(|point| point.1), 0.05);
         let mut builder = ChartBuilder::on(area);
         builder.margin(10).x_label_area_size(40).y_label_area_size(70);
         if let [line] = &self.lines[..] {

@@ -7,13 +7,15 @@ use canopen::Instant;
 use crate::acquisition::{Sample, Signal};
 use crate::cli::Failure;
 use crate::object::Place;
+use crate::text::visible;
 
-/// A table that grows.
-pub(super) struct Table {
-    to: csv::Writer<Box<dyn Write>>,
+/// A table that grows, row by row: a row that is complete is written at once.
+pub(super) struct Table<W: Write> {
+    to: csv::Writer<W>,
     start: Option<Instant>,
     row: Option<Row>,
     columns: usize,
+    rows: usize,
 }
 
 /// Values of the same time: usually those of one PDO.
@@ -22,9 +24,14 @@ struct Row {
     values: Vec<String>,
 }
 
-impl Table {
-    pub(super) fn new(to: Box<dyn Write>) -> Table {
-        Table { to: csv::Writer::from_writer(to), start: None, row: None, columns: 0 }
+impl<W: Write> Table<W> {
+    pub(super) fn new(to: W) -> Table<W> {
+        Table { to: csv::Writer::from_writer(to), start: None, row: None, columns: 0, rows: 0 }
+    }
+
+    /// Rows below the titles so far.
+    pub(super) fn rows(&self) -> usize {
+        self.rows
     }
 
     /// The titles of the columns.
@@ -42,24 +49,27 @@ impl Table {
         }
         let place = self.row.as_mut().and_then(|row| row.values.get_mut(sample.signal));
         if let Some(place) = place {
-            *place = sample.value.to_string();
+            *place = visible(&sample.value.to_string());
         }
         Ok(())
     }
 
-    pub(super) fn finish(mut self) -> Result<(), Failure> {
-        self.end_row()?;
-        Ok(self.to.flush()?)
-    }
-
-    fn end_row(&mut self) -> Result<(), Failure> {
+    /// Writes what is left.
+    pub(super) fn end_row(&mut self) -> Result<(), Failure> {
         let (Some(row), Some(start)) = (self.row.take(), self.start) else { return Ok(()) };
         let time = seconds(start, row.at);
+        self.rows += 1;
         self.write(std::iter::once(format!("{time:.6}")).chain(row.values).collect())
     }
 
+    /// Where it was written to.
+    pub(super) fn into_inner(self) -> Result<W, Failure> {
+        self.to.into_inner().map_err(|error| Failure::Output(error.into_error()))
+    }
+
     fn write(&mut self, row: Vec<String>) -> Result<(), Failure> {
-        self.to.write_record(row).map_err(|error| Failure::Output(error.into()))
+        self.to.write_record(row).map_err(|error| Failure::Output(error.into()))?;
+        Ok(self.to.flush()?)
     }
 }
 
@@ -100,14 +110,15 @@ mod tests {
     #[test]
     fn values_of_one_time_share_a_row() {
         let paper = Rc::default();
-        let mut table = Table::new(Box::new(Paper(Rc::clone(&paper))));
+        let mut table = Table::new(Paper(Rc::clone(&paper)));
         table
             .head(&[Signal::polled(at(0x6130, 1), "a, b", "bar"), Signal::polled(at(0x1001, 0), "", "")])
             .unwrap();
         for (micros, signal, value) in [(500, 0, 1), (500, 1, 2), (2_000_500, 1, 3), (3_000_501, 0, 4)] {
             table.take(&Sample { at: Instant(micros), signal, value: Value::Integer(value) }).unwrap();
         }
-        table.finish().unwrap();
+        table.end_row().unwrap();
+        assert_eq!(table.rows(), 3);
         let expected = "time s,\"6130h:1 a, b [bar]\",1001h:0\n0.000000,1,2\n2.000000,,3\n3.000001,4,\n";
         assert_eq!(String::from_utf8(paper.take()).unwrap(), expected);
     }

@@ -1,0 +1,104 @@
+//! The power fails at random moments, also while the node starts, and the battery keeps the position.
+
+use canbus::Time;
+use fastrand::Rng;
+use host_tests::thorough;
+use sim::world::World;
+
+use crate::encoder::{COUNTS, POSITION, SENSOR_STATE, STEPS, start, start_absolute, stimulate, wait};
+use crate::support::{Master, SECOND, read, run, write};
+
+const PRESET: (u16, u8) = (0x6003, 0);
+const ALARMS: (u16, u8) = (0x6503, 0);
+/// Sensor state of an encoder whose index has not been seen.
+const UNREFERENCED: u32 = 1 << 5;
+const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
+
+/// Cycles of each kind of encoder.
+fn cycles() -> usize {
+    thorough::either(25, 500)
+}
+
+fn revolutions(world: &mut World) -> f64 {
+    let now = world.now();
+    world.machine(0).peripherals().plant().revolutions(now)
+}
+
+/// The power fails now and comes back after a random time. Now and then it fails again while the node starts.
+fn fail(world: &mut World, rng: &mut Rng) {
+    loop {
+        world.machine(0).power_off();
+        world.run_until(world.now() + Time::from_micros(rng.u64(1..200_000)));
+        let now = world.now();
+        world.machine(0).power_on(now);
+        if rng.u8(..) < 160 {
+            break;
+        }
+        world.run_until(world.now() + Time::from_micros(rng.u64(1..300_000)));
+    }
+    let before = run(world, Time::ZERO).nodes[0].heard.boot_ups;
+    let has_booted = (0..100).any(|_| run(world, Time::from_millis(10)).nodes[0].heard.boot_ups > before);
+    assert!(has_booted, "the node comes back");
+    wait(world, 30);
+}
+
+/// The absolute encoder turns while the power fails and while it is off: its position is preset and offset by what was kept.
+#[test]
+fn an_absolute_encoder_keeps_its_preset_through_power_that_fails_at_any_moment() {
+    const VALUE: u32 = 1000;
+    let mut rng = Rng::with_seed(14);
+    let (mut world, master) = start_absolute("--shaft const:7.125");
+    write(&mut world, &master, PRESET, 4, VALUE);
+    assert_eq!(master.ask(&mut world, 1, &SAVE)[0], 0x60);
+    let zero = revolutions(&mut world) * STEPS - f64::from(VALUE);
+    for cycle in 0..cycles() {
+        stimulate(&mut world, "shaft", &format!("rpm:{}", rng.i32(-600..600)));
+        world.run_until(world.now() + Time::from_micros(rng.u64(1..100_000)));
+        fail(&mut world, &mut rng);
+        let rest = (revolutions(&mut world) * STEPS).floor() / STEPS;
+        stimulate(&mut world, "shaft", &format!("const:{rest}"));
+        wait(&mut world, 10);
+        let expected = (rest * STEPS - zero) as i64 as u32 & 0x1FF_FFFF;
+        assert_eq!(read(&mut world, &master, POSITION), expected, "cycle {cycle}");
+        assert_eq!(read(&mut world, &master, ALARMS), 0, "cycle {cycle}");
+    }
+}
+
+/// An incremental encoder that stands while the power is off has its position again, and is still referenced.
+#[test]
+fn an_incremental_encoder_at_rest_keeps_its_position_through_power_that_fails_at_any_moment() {
+    let mut rng = Rng::with_seed(406);
+    let (mut world, master) = start("--shaft rpm:600");
+    wait(&mut world, 300);
+    assert_eq!(read(&mut world, &master, SENSOR_STATE) & UNREFERENCED, 0);
+    for cycle in 0..cycles() {
+        let from = revolutions(&mut world);
+        let rest = (from * COUNTS + f64::from(rng.i32(-20_000..20_000))).floor() / COUNTS;
+        stimulate(&mut world, "shaft", &format!("ramp:{from},{rest},0.2"));
+        // At rest for two milliseconds and more: the memory is written each millisecond.
+        wait(&mut world, 202);
+        world.run_until(world.now() + Time::from_micros(rng.u64(1..5_000)));
+        fail(&mut world, &mut rng);
+        let expected = (rest * COUNTS) as i64 as u32 & 0xFF_FFFF;
+        let found = read(&mut world, &master, POSITION);
+        assert!(found.abs_diff(expected) <= 1, "cycle {cycle}: {found} instead of {expected}");
+        assert_eq!(read(&mut world, &master, ALARMS), 0, "cycle {cycle}");
+    }
+}
+
+/// The next start knows that the memory was lost, and the one after it that it was not.
+#[test]
+fn a_start_tells_whether_the_battery_has_kept_the_memory() {
+    for (flags, said) in [("", "the battery has kept"), ("--fault battery-empty@0", "no battery has kept")] {
+        let (mut world, _): (World, Master) = start(flags);
+        world.take_log();
+        let now = world.now();
+        world.machine(0).power_off();
+        world.run_until(now + SECOND);
+        let now = world.now();
+        world.machine(0).power_on(now);
+        world.run_until(now + SECOND);
+        let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
+        assert!(log.concat().contains(said), "{log:?}");
+    }
+}

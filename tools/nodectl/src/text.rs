@@ -1,0 +1,55 @@
+//! Text that comes from a device, a file or a network, made fit for a terminal.
+
+use std::fmt::Write as _;
+
+/// The text with its control characters made visible: `\n`, `\x1b`. What turns the direction of a line or hides in it
+/// counts as control character too. A terminal obeys such characters, and a line break fakes a line of its own.
+#[must_use]
+pub fn visible(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for char in text.chars() {
+        match char {
+            '\n' => out.push_str("\\n"),
+            '\r' => out.push_str("\\r"),
+            '\t' => out.push_str("\\t"),
+            _ if is_control(char) => {
+                let code = u32::from(char);
+                // Writing to a string cannot fail.
+                let _ =
+                    if code < 0x100 { write!(out, "\\x{code:02x}") } else { write!(out, "\\u{{{code:x}}}") };
+            }
+            _ => out.push(char),
+        }
+    }
+    out
+}
+
+/// The same for several lines that are our own: each of them stays one.
+#[must_use]
+pub fn visible_lines(text: &str) -> String {
+    let lines: Vec<String> = text.split('\n').map(visible).collect();
+    lines.join("\n")
+}
+
+fn is_control(char: char) -> bool {
+    let hides = matches!(u32::from(char), 0x200B..=0x200F | 0x2028..=0x202E | 0x2060..=0x206F | 0xFEFF);
+    char.is_control() || hides
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_become_visible_and_nothing_else_changes() {
+        for (text, expected) in [
+            ("20 \u{b0}C, \"caf\u{e9}\"", "20 \u{b0}C, \"caf\u{e9}\""),
+            ("\u{1b}[2J\u{1b}]0;owned\u{7}", "\\x1b[2J\\x1b]0;owned\\x07"),
+            ("a\r\nnode 2: ok\t\u{7f}", "a\\r\\nnode 2: ok\\t\\x7f"),
+            ("\u{9b}31m\u{202e}txt", "\\x9b31m\\u{202e}txt"),
+        ] {
+            assert_eq!(visible(text), expected);
+        }
+        assert_eq!(visible_lines("one\ntwo\u{1b}"), "one\ntwo\\x1b");
+    }
+}
