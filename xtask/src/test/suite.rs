@@ -88,8 +88,12 @@ fn python(file: &Path, thorough: bool) -> Result<()> {
     setup::install(&[Need::Tshark])?;
     let mut command = Command::new(python::clients()?);
     command.args(["-m", "pytest", "-q", "--durations=3"]).arg(file).current_dir(root());
-    for (variable, tool) in [("SIM_COMMAND", "sim"), ("NODECTL_COMMAND", "nodectl"), ("SIGN_COMMAND", "sign")]
-    {
+    for (variable, tool) in [
+        ("SIM_COMMAND", "sim"),
+        ("NODECTL_COMMAND", "nodectl"),
+        ("SIGN_COMMAND", "sign"),
+        ("IO_MODULE_COMMAND", "examples/io_module"),
+    ] {
         let name = format!("{tool}{}", std::env::consts::EXE_SUFFIX);
         command.env(variable, target_dir().join("sim").join(name));
     }
