@@ -173,8 +173,5 @@ const PARTS: &[&[Object]] = &[
 ];
 
 const COUNT: usize = dictionary::count(PARTS);
-const ROWS: [Object; COUNT] = dictionary::gather(PARTS);
-/// Bytes of the values.
-pub(crate) const SIZE: usize = dictionary::image_size(&ROWS);
-
+pub(crate) const ROWS: [Object; COUNT] = dictionary::gather(PARTS);
 pub(crate) static DICTIONARY: Dictionary = canopen::dictionary!(&ROWS);

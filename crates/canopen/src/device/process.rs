@@ -2,7 +2,7 @@
 
 use super::{Application, Core, Device, Next, STALE};
 use crate::nmt::Command;
-use crate::pdo::{Chain, Direction, Rpdo, Tpdo};
+use crate::pdo::{Chain, Rpdo, Tpdo};
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
@@ -22,6 +22,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
+    #[inline(never)]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.turn(now, out);
         if frame.id() == CanId::NMT.get() {
@@ -53,16 +54,23 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             core.process_due = Instant::NEVER;
             return;
         }
-        if turn.now >= core.process_due {
-            core.poll_sync(turn.now);
-            let mut due = core.poll_rpdos(turn.now);
-            core.each_tpdo(Chain::Valid, |tpdo, image| {
-                tpdo.poll(image, turn);
-                due = due.min(tpdo.due());
-            });
-            core.scanner.poll(&core.image, turn);
-            core.process_due = due.min(core.scanner.due()).min(core.sync.due());
+        if turn.now < core.process_due {
+            return;
         }
+        self.run_process(turn);
+    }
+
+    #[inline(never)]
+    fn run_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        let core = &mut self.core;
+        core.poll_sync(turn.now);
+        let mut due = core.poll_rpdos(turn.now);
+        core.each_tpdo(Chain::Valid, |tpdo, image| {
+            tpdo.poll(image, turn);
+            due = due.min(tpdo.due());
+        });
+        core.scanner.poll(&core.image, turn);
+        core.process_due = due.min(core.scanner.due()).min(core.sync.due());
     }
 
     /// Lets the application update values in the image, and sends what their change triggers. The first call after a start
@@ -82,10 +90,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// found. `tpdo` is the number, 1 to 512; one that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.turn(now, out);
-        let mut numbers = self.core.dictionary.pdos(Direction::Transmit).map(|index| (index & 0x1FF) + 1);
-        let place = numbers.position(|number| number == tpdo);
+        let place = self.core.tpdo_place(tpdo);
         if self.core.state.has_pdos()
-            && let Some(tpdo) = place.and_then(|place| self.core.tpdos.get_mut(place))
+            && let Some(tpdo) = place.and_then(|place| self.core.tpdos.get_mut(usize::from(place)))
         {
             tpdo.on_event();
             self.core.process_due = STALE;

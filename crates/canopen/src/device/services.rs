@@ -16,6 +16,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     Device<A, N, T, R, W, M>
 {
     /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
+    #[inline(never)]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         if frame.id() == self.core.service(SDO_REQUEST).get() {
             self.on_sdo(frame, now, out);
