@@ -3,7 +3,7 @@
 use super::{Application, Core, STALE};
 use crate::dictionary::{Entry, Rule, little_endian};
 use crate::emcy::Fault;
-use crate::pdo::{Chain, MappedObject, Reception, Rpdo, RpdoFault};
+use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Instant};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
