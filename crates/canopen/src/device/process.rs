@@ -10,20 +10,29 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     Device<A, N, T, R, W, M>
 {
     /// Takes a frame, whatever half it is for.
+    #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        let _ = self.on_process_frame(frame, now, out);
+        self.take_process_frame(frame, now, out);
         self.on_service_frame(frame, now, out)
     }
 
     /// Sends what is due in both halves.
+    #[inline]
     pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let _ = self.poll_process(now, out);
         self.poll_services(now, out)
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
-    #[inline(never)]
+    // What follows is put together where the caller needs it; the work has its place once.
+    #[inline]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        self.take_process_frame(frame, now, out);
+        self.process_next()
+    }
+
+    #[inline(never)]
+    fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         let turn = &mut self.turn(now, out);
         if frame.id() == CanId::NMT.get() {
             self.on_nmt(frame);
@@ -31,7 +40,6 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             self.core.on_pdo_frame(frame, turn);
         }
         self.send_process(turn);
-        self.process_next()
     }
 
     #[inline(never)]
@@ -42,9 +50,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Sends what is due of process data.
+    #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        let turn = &mut self.turn(now, out);
-        self.send_process(turn);
+        if now >= self.core.process_due {
+            let turn = &mut self.turn(now, out);
+            self.send_process(turn);
+        }
         self.process_next()
     }
 

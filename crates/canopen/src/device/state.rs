@@ -38,6 +38,7 @@ impl Scope {
 
 /// What waits for the caller.
 #[derive(Debug)]
+#[allow(clippy::struct_excessive_bools)] // Each waits for its own.
 pub(super) struct Pending {
     /// An action waits to be handed over.
     is_waiting: bool,
@@ -124,12 +125,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// What follows from a call of the process half.
+    #[inline]
     pub(super) fn process_next(&self) -> Next {
         let Core { process_due, services_due, .. } = self.core;
         Next { process: process_due, services: services_due, action: None, parameters: false }
     }
 
     /// What follows from a call of the services half.
+    #[inline]
     pub(super) fn services_next(&mut self) -> Next {
         let parameters = core::mem::take(&mut self.core.pending.parameters);
         let action = if self.core.pending.is_waiting { self.hand_over() } else { None };
