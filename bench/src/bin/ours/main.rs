@@ -78,7 +78,7 @@ impl From<Bits> for Received {
 }
 
 struct Ours {
-    device: canopen::device!(Keeper, &dictionary::ROWS),
+    device: canopen::device!(Keeper, dictionary::ROWS),
     driver: Driver,
     /// When each half wants to be called, as the firmware keeps it.
     alarms: [Instant; 2],

@@ -25,8 +25,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn take_rpdo(&mut self, place: usize, frame: &Frame, now: Instant) {
-        let late = self.sync.is_window_over(now);
         let Some(rpdo) = self.rpdos.get_mut(place) else { return };
+        let late = rpdo.is_synchronous() && self.sync.is_window_over(now);
         let (reception, is_valid) = rpdo.take(frame, now, late);
         self.process_due = self.process_due.min(rpdo.due());
         let has_faults = rpdo.has_faults();
