@@ -86,7 +86,7 @@ fn device(row: &Pdo) -> (&'static Dictionary, Device<(), SIZE>) {
     let rows: [Object; ROWS] = rows.try_into().unwrap();
     let tables: &'static Tables<1, ROWS, ROWS, ROWS, SIZE> =
         Box::leak(Box::new(dictionary::compile(&[&rows])));
-    let [dictionary] = tables.dictionaries(&[&rows]);
+    let [dictionary] = tables.dictionaries();
     let dictionary: &'static Dictionary = Box::leak(Box::new(dictionary));
     (dictionary, Device::new(dictionary, NodeId::new(ID), ()))
 }

@@ -100,13 +100,25 @@ fn test_python() -> Result<()> {
         .args(tools.iter().flat_map(|tool| ["-p", tool])))?;
     let [nodectl, sign] =
         tools.map(|tool| sim.with_file_name(format!("{tool}{}", std::env::consts::EXE_SUFFIX)));
+    run(cargo().args([
+        "build",
+        "--quiet",
+        "--profile",
+        "sim",
+        "-p",
+        "canopen-device",
+        "--example",
+        "io_module",
+    ]))?;
+    let io_module = sim.with_file_name("examples").join(format!("io_module{}", std::env::consts::EXE_SUFFIX));
     let python = python::ensure()?;
     run(with_images(&mut Command::new(python))
         .args(["-m", "pytest", "-q", "host-tests/python"])
         .current_dir(root())
         .env("SIM_COMMAND", sim)
         .env("NODECTL_COMMAND", nodectl)
-        .env("SIGN_COMMAND", sign))
+        .env("SIGN_COMMAND", sign)
+        .env("IO_MODULE_COMMAND", io_module))
 }
 
 /// Tells tests where the ELF files are.

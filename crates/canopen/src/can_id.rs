@@ -2,6 +2,7 @@
 
 /// An 11-bit CAN-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CanId(u16);
 
 impl CanId {

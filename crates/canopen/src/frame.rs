@@ -5,6 +5,7 @@ use crate::copy::copy;
 
 /// A frame on the wire. CANopen services of this node use the CAN base frame format only (CiA 301, 7.3.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame {
     id: u16,
     remote: bool,

@@ -17,12 +17,16 @@ pub mod client;
 mod copy;
 mod device;
 pub mod dictionary;
+pub mod eds;
+#[cfg(feature = "embedded-can")]
+pub mod embedded_can;
 pub mod emcy;
 mod frame;
 mod heartbeat;
 pub mod lss;
 pub mod nmt;
 mod node_id;
+pub mod objects;
 pub mod pdo;
 pub mod sdo;
 mod sync;

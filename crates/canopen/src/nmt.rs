@@ -4,6 +4,7 @@ use crate::NodeId;
 
 /// The NMT state. The discriminant is its code in a heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum State {
     /// Before boot-up: the node is silent and hears nothing. Its code is that of the boot-up message.
@@ -38,6 +39,7 @@ impl State {
 
 /// A command of the NMT master. The discriminant is the command specifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Command {
     /// Go to Operational.

@@ -5,6 +5,7 @@ use core::num::NonZeroU8;
 
 /// A node-ID, 1 to 127 (CiA 301, 7.3.5). 0 addresses all nodes and is never a node's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NodeId(NonZeroU8);
 
 impl NodeId {

@@ -4,6 +4,7 @@ use core::ops::Add;
 
 /// A span in microseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Duration(pub u64);
 
 impl Duration {
@@ -29,6 +30,7 @@ impl Duration {
 /// Microseconds since start-up. 64 bits do not wrap in the life of a machine. Nothing comes after
 /// [`NEVER`](Instant::NEVER): adding to it gives no meaningful instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant(pub u64);
 
 impl Instant {

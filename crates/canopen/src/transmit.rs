@@ -4,7 +4,16 @@ use crate::{Duration, Frame, Instant};
 
 /// The queue has no room; the sender keeps what it wanted to send and tries again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct QueueFull;
+
+impl core::fmt::Display for QueueFull {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the transmit queue is full")
+    }
+}
+
+impl core::error::Error for QueueFull {}
 
 /// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others.
 pub trait Transmit {

@@ -30,7 +30,9 @@ pub enum LookupError {
 }
 
 /// How many names an error lists.
-const LISTED: usize = 5;
+const LISTED: usize = 16;
+/// Names that are less alike than this are no suggestion.
+const NEAR: f64 = 0.7;
 
 fn list(before: &str, names: &[String], after: &str) -> String {
     if names.is_empty() { String::new() } else { format!("{before}{}{after}", names.join(", ")) }
@@ -38,7 +40,8 @@ fn list(before: &str, names: &[String], after: &str) -> String {
 
 impl Eds {
     /// The entry that a person means: an [`address`], `Error register`, `Identity/Vendor-ID`, or only `Vendor-ID`
-    /// where no other entry is called so. The name of a record or an array is its sub-index 0. Case does not matter.
+    /// where no other entry is called so; else two or more words of its name in any order. The name of a record or an
+    /// array is its sub-index 0. Case does not matter.
     ///
     /// # Errors
     /// When there is none, or more than one.
@@ -47,12 +50,16 @@ impl Eds {
         let by_path =
             self.named(|entry| self.path(entry).to_lowercase() == name || self.is_head(entry, &name));
         let by_name = || self.named(|entry| entry.name.to_lowercase() == name);
-        let found = if by_path.is_empty() { by_name() } else { by_path };
+        let by_words = || if address(query).is_none() { self.with_words(&name) } else { Vec::new() };
+        let found =
+            [by_path, by_name(), by_words()].into_iter().find(|found| !found.is_empty()).unwrap_or_default();
         match (&found[..], address(query)) {
             ([entry], _) => Ok(entry),
             ([], Some(at)) => self.get(at.index, at.sub).ok_or(LookupError::Address(at)),
             ([], None) => Err(LookupError::Name { name: query.into(), similar: self.similar(&name) }),
-            _ => Err(LookupError::Ambiguous { name: query.into(), candidates: self.addresses(&found) }),
+            _ => {
+                Err(LookupError::Ambiguous { name: query.into(), candidates: self.addresses(&found, query) })
+            }
         }
     }
 
@@ -75,15 +82,66 @@ impl Eds {
         entry.sub == 0 && object.is_some_and(|object| object.name.to_lowercase() == name)
     }
 
-    fn similar(&self, name: &str) -> Vec<String> {
-        let paths = self.entries().map(|entry| self.path(entry));
-        paths.filter(|path| path.to_lowercase().contains(name)).take(LISTED).collect()
+    /// The entries whose path has all words of a text; the text has at least two.
+    fn with_words(&self, text: &str) -> Vec<&Entry> {
+        let wanted: Vec<&str> = words(text).collect();
+        let has_all = |entry: &Entry| {
+            let path = self.path(entry).to_lowercase();
+            let own: Vec<&str> = words(&path).collect();
+            wanted.iter().all(|word| own.contains(word))
+        };
+        if wanted.len() < 2 { Vec::new() } else { self.named(has_all) }
     }
 
-    fn addresses(&self, entries: &[&Entry]) -> Vec<String> {
-        let line = |entry: &&Entry| format!("{:04X}h:{} {}", entry.index, entry.sub, self.path(entry));
-        entries.iter().take(LISTED).map(line).collect()
+    /// Paths that contain a text, and where there is none those that look like it; nearest first.
+    fn similar(&self, text: &str) -> Vec<String> {
+        let near: Vec<(f64, String)> =
+            self.entries().map(|entry| (self.nearness(entry, text), self.path(entry))).collect();
+        let contain = |(_, path): &&(f64, String)| path.to_lowercase().contains(text);
+        let mut found: Vec<(f64, String)> = near.iter().filter(contain).cloned().collect();
+        if found.is_empty() {
+            found = near.into_iter().filter(|(nearness, _)| *nearness >= NEAR).collect();
+        }
+        // Of names that are equally near, the shorter one has less that was not asked for.
+        found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.len().cmp(&b.1.len())));
+        listed(found.into_iter().map(|(_, path)| path))
     }
+
+    /// How alike a text is to the name, the path or a word of an entry: 1 for equal.
+    fn nearness(&self, entry: &Entry, text: &str) -> f64 {
+        let (name, path) = (entry.name.to_lowercase(), self.path(entry).to_lowercase());
+        let whole =
+            [name.as_str(), path.as_str()].map(|own| strsim::normalized_damerau_levenshtein(own, text));
+        let word =
+            words(&path).map(|word| strsim::normalized_damerau_levenshtein(word, text)).fold(0.0, f64::max);
+        // A word alone is less than the whole name.
+        whole.into_iter().fold(0.95 * word, f64::max)
+    }
+
+    /// All of them, nearest to the query first.
+    fn addresses(&self, entries: &[&Entry], query: &str) -> Vec<String> {
+        let line = |entry: &&Entry| format!("{:04X}h:{} {}", entry.index, entry.sub, self.path(entry));
+        let text = query.trim().to_lowercase();
+        let mut sorted = entries.to_vec();
+        sorted.sort_by(|a, b| self.nearness(b, &text).total_cmp(&self.nearness(a, &text)));
+        listed(sorted.iter().map(line))
+    }
+}
+
+/// The first names, and how many more there are.
+fn listed(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut names: Vec<String> = names.collect();
+    let more = names.len().saturating_sub(LISTED);
+    if more > 0 {
+        names.truncate(LISTED);
+        names.push(format!("and {more} more"));
+    }
+    names
+}
+
+/// Words: letters and digits without what is between them.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|char: char| !char.is_alphanumeric()).filter(|word| !word.is_empty())
 }
 
 /// An index and a sub-index: `1018`, `0x1018`, `1018h`, each with `:1` (decimal, or `:0x1`) or `sub1` (hexadecimal, as

@@ -130,6 +130,10 @@ fn default(value: &Formula, data_type: DataType) -> String {
     match value {
         Formula::NodeId(base) => format!("ID + 0x{base:X}"),
         Formula::Constant(Value::Text(text)) => format!("\"{text}\""),
+        Formula::Constant(Value::Real(value)) if data_type.class() == Class::Real(32) => {
+            format!("{:?}", *value as f32)
+        }
+        Formula::Constant(Value::Real(value)) => format!("{value:?}"),
         Formula::Constant(_) => value.text(data_type),
     }
 }

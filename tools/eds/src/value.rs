@@ -44,20 +44,29 @@ impl Formula {
         }
     }
 
-    /// The text of a value of a type. A real number has a point: python-canopen and the CANopenNode editor read it
-    /// so, and Lely, which wants the bits, refuses it instead of taking `10` for them.
+    /// The text of a value of a type. A real number is written by its bits, as Lely's tools demand, which refuse the whole
+    /// file otherwise. All others read such a file: python-canopen has no default then for what is not 0, and the package
+    /// canopen of npm takes the bits for an integer.
     pub(crate) fn text(&self, data_type: DataType) -> String {
         match (self, data_type.class()) {
             (Formula::NodeId(base), _) => format!("$NODEID+0x{base:X}"),
             (Formula::Constant(Value::Text(text)), _) => text.clone(),
-            (Formula::Constant(Value::Real(value)), Class::Real(32)) => format!("{:?}", *value as f32),
-            (Formula::Constant(Value::Real(value)), _) => format!("{value:?}"),
+            (Formula::Constant(Value::Real(value)), Class::Real(32)) => bits((*value as f32).to_bits(), 8),
+            (Formula::Constant(Value::Real(value)), _) => bits(value.to_bits(), 16),
             // Identifiers, mapped objects and units are read digit by digit, short numbers as a whole.
             (Formula::Constant(Value::Integer(value)), Class::Unsigned(bits @ 32..)) => {
                 format!("0x{value:0width$X}", width = usize::from(bits / 4))
             }
             (Formula::Constant(Value::Integer(value)), _) => value.to_string(),
         }
+    }
+}
+
+/// Bits of a real number. Those of 0 are 0 for every reader.
+fn bits(bits: impl Into<u64>, digits: usize) -> String {
+    match bits.into() {
+        0 => "0".to_owned(),
+        bits => format!("0x{bits:0digits$X}"),
     }
 }
 
@@ -189,10 +198,20 @@ mod tests {
             ("0x004E0000", UNSIGNED32),
             ("0x0000000000000001", DataType(0x1B)),
             ("-7", INTEGER8),
-            ("0.1", REAL32),
-            ("1e38", REAL32),
+            ("0x3DCCCCCD", REAL32),
+            ("0x7E967699", REAL32),
+            ("0xC2200000", REAL32),
+            ("0", REAL32),
+            ("0x80000000", REAL32),
+            ("0x3FB999999999999A", DataType(0x11)),
         ] {
             assert_eq!(Formula::parse(text, data_type).unwrap().text(data_type), text);
+        }
+        // Vendors write real numbers with a point.
+        for (text, written) in
+            [("0.1", "0x3DCCCCCD"), ("1e38", "0x7E967699"), ("-40.0", "0xC2200000"), ("0.0", "0")]
+        {
+            assert_eq!(Formula::parse(text, REAL32).unwrap().text(REAL32), written);
         }
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::{self, Display, Write};
 use node::REVISION;
 
 use crate::read::BIT_RATES;
-use crate::{Device, DeviceInfo, Eds, Entry, Object};
+use crate::{Device, DeviceInfo, Eds, Entry, Object, ObjectType};
 
 /// Day of the release, month first as CiA 306 asks. A constant, so that every run writes the same; it moves with `REVISION`.
 const RELEASE_DATE: &str = "11-21-2026";
@@ -147,6 +147,10 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
             out.key(key, value.text(entry.data_type))?;
         }
     }
+    // CiA 306 has no such key for a domain, which no PDO carries, and the package canopen of npm refuses one.
+    if entry.object_type() == ObjectType::Domain {
+        return Ok(());
+    }
     out.key("PDOMapping", u8::from(entry.mappable))
 }
 
@@ -156,7 +160,8 @@ struct Sections<'a> {
 }
 
 impl Sections<'_> {
-    /// Begins a section. The unit stands above it: there every reader takes a comment.
+    /// Begins a section. The unit stands above it: there every reader takes a comment. A key `Unit`, which python-canopen
+    /// would read, makes Lely's tools refuse the whole file.
     fn section(&mut self, name: &str, unit: &str) -> fmt::Result {
         if !self.out.is_empty() {
             self.out.write_str("\r\n")?;

@@ -62,6 +62,30 @@ fn a_name_of_several_entries_is_ambiguous() {
 }
 
 #[test]
+fn words_are_found_in_any_order() {
+    let eds = DEVICES[0].eds();
+    assert_eq!(found(&eds, "heartbeat producer"), (0x1017, 0));
+    assert_eq!(found(&eds, "time heartbeat producer"), (0x1017, 0));
+    assert_eq!(found(&eds, "event timer TPDO 2"), (0x1801, 5));
+    assert!(
+        matches!(eds.find("event timer"), Err(LookupError::Ambiguous { candidates, .. }) if candidates.len() == 16)
+    );
+}
+
+#[test]
+fn near_misses_are_suggested_nearest_first() {
+    let similar = |query: &str| match DEVICES[0].eds().find(query).unwrap_err() {
+        LookupError::Name { similar, .. } => similar,
+        other => panic!("{other}"),
+    };
+    assert_eq!(similar("heartbet")[0], "Producer heartbeat time");
+    assert_eq!(similar("heartbeat")[0], "Producer heartbeat time");
+    assert_eq!(similar("Error registr")[0], "Error register");
+    assert_eq!(similar("vendor-jd")[0], "Identity/Vendor-ID");
+    assert_eq!(similar("completely else"), [""; 0]);
+}
+
+#[test]
 fn what_is_no_address_is_refused() {
     for text in [
         "",

@@ -11,10 +11,11 @@ use thiserror::Error;
 use crate::bus::{BusError, Received};
 use crate::heartbeat::{self, Heartbeat};
 use crate::object::at;
+use crate::quantity::Quantity;
 use crate::sdo::{self, Client, Options};
 use crate::tpdo::{self, Tpdo};
 use crate::value::{Value, guess};
-use crate::{Catalogue, Network, nmt, unit};
+use crate::{Catalogue, Network, nmt};
 
 /// Something whose value is followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,11 +24,14 @@ pub struct Signal {
     pub at: Multiplexer,
     /// Its name; empty where none is known.
     pub name: String,
+    /// Its name with that of its record; `None` where none is known.
+    pub path: Option<String>,
     /// Its unit; empty where none is known.
     pub unit: String,
     /// The TPDO that has it, from 1; `None` for one that is read.
     pub tpdo: Option<u16>,
     data_type: Option<DataType>,
+    quantity: Quantity,
 }
 
 /// A value at a time.
@@ -195,11 +199,31 @@ impl Signal {
     /// A signal that is read and not in a TPDO.
     #[must_use]
     pub fn polled(at: Multiplexer, name: &str, unit: &str) -> Signal {
-        Signal { at, name: name.to_owned(), unit: unit.to_owned(), tpdo: None, data_type: None }
+        let quantity = Quantity::plain(unit);
+        let path = Some(name.to_owned()).filter(|name| !name.is_empty());
+        Signal {
+            at,
+            name: name.to_owned(),
+            path,
+            unit: unit.to_owned(),
+            tpdo: None,
+            data_type: None,
+            quantity,
+        }
+    }
+
+    /// The name of its data type; that of the bytes of a value where none is known.
+    #[must_use]
+    pub fn data_type(&self, value: &Value) -> String {
+        let guessed = || match value {
+            Value::Bytes(_) => DataType::DOMAIN,
+            _ => DataType(0x07),
+        };
+        self.data_type.unwrap_or_else(guessed).to_string()
     }
 
     fn decode(&self, bytes: &[u8]) -> Value {
-        Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes)))
+        self.quantity.apply(Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes))))
     }
 }
 
@@ -223,11 +247,14 @@ fn signal(
 ) -> Result<Signal, sdo::Error> {
     let is_in =
         |tpdo: &&Tpdo| tpdo.mapping.iter().any(|mapped| (mapped.index, mapped.sub) == (at.index, at.sub));
+    let quantity = Quantity::of(client, catalogue, at)?;
     Ok(Signal {
         at,
         name: catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default(),
-        unit: unit::of(client, catalogue, at)?,
+        path: catalogue.name(at),
+        unit: quantity.unit.clone(),
         tpdo: tpdos.iter().find(is_in).map(|tpdo| tpdo.number),
         data_type: catalogue.data_type(at),
+        quantity,
     })
 }

@@ -1,5 +1,6 @@
 //! What is known about the objects of a node: names, types and units, from a data sheet.
 
+use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use eds::{DEVICES, DataType, Eds, Entry, LookupError};
 
@@ -63,6 +64,35 @@ impl Catalogue {
     pub fn name(&self, at: Multiplexer) -> Option<String> {
         let of = |eds: &Eds| eds.get(at.index, at.sub).map(|entry| eds.path(entry));
         of(&self.sheet).or_else(|| of(&self.common))
+    }
+
+    /// The values that a write of an object accepts, where the data sheet narrows its type: `0 to 240`.
+    #[must_use]
+    pub fn range(&self, at: Multiplexer, node: NodeId) -> Option<String> {
+        let entry = self.entry(at)?;
+        let text = |formula: &Option<eds::Formula>| match formula.as_ref()?.evaluate(node) {
+            eds::Value::Integer(value) => Some(value.to_string()),
+            eds::Value::Real(value) => Some(value.to_string()),
+            eds::Value::Text(_) => None,
+        };
+        match (text(&entry.low), text(&entry.high)) {
+            (Some(low), Some(high)) => Some(format!("{low} to {high}")),
+            (Some(low), None) => Some(format!("{low} and more")),
+            (None, Some(high)) => Some(format!("up to {high}")),
+            (None, None) => None,
+        }
+    }
+
+    /// All entries of a record or an array that can be read; none where nothing is known of it.
+    #[must_use]
+    pub fn subs(&self, index: u16) -> Vec<Multiplexer> {
+        let object = self.sheet.objects.get(&index).or_else(|| self.common.objects.get(&index));
+        let entries = object
+            .into_iter()
+            .filter(|object| object.object_type.has_subs())
+            .flat_map(|object| object.entries.values());
+        let readable = entries.filter(|entry| entry.access.is_readable());
+        readable.map(|entry| Multiplexer { index, sub: entry.sub }).collect()
     }
 
     /// Its data type.

@@ -7,7 +7,10 @@ use nodectl::cli::{Cli, Failure, Output};
 use nodectl::text::visible_lines;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage(&error),
+    };
     match cli.run(Output::standard(cli.options.json)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -17,9 +20,21 @@ fn main() -> ExitCode {
     }
 }
 
+/// A command line that is wrong, or asks for help. A script that asked for JSON gets the error as JSON too.
+fn usage(error: &clap::Error) -> ExitCode {
+    let wants_json = std::env::args_os().any(|argument| argument == "--json");
+    if wants_json && error.use_stderr() {
+        let text = error.to_string();
+        let reason = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
+        report(&Failure::Usage(reason.to_owned()), true);
+        return ExitCode::from(2);
+    }
+    error.exit()
+}
+
 fn report(failure: &Failure, json: bool) {
     if json {
-        println!("{}", serde_json::json!({ "error": failure.to_string(), "exit_code": failure.exit_code() }));
+        println!("{}", failure.to_json());
     } else {
         eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
     }

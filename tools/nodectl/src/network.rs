@@ -2,8 +2,10 @@
 
 use std::collections::VecDeque;
 
+use canopen::client::heartbeat::Heartbeat;
 use canopen::client::{Service, Step, Taken};
-use canopen::{Duration, Frame, Instant};
+use canopen::nmt::State;
+use canopen::{Duration, Frame, Instant, NodeId};
 
 use crate::bus::{Bus, BusError, Received};
 
@@ -62,6 +64,13 @@ impl Network {
     #[must_use]
     pub fn newest_stamp(&self) -> Option<Instant> {
         self.newest.map(|(at, _)| at)
+    }
+
+    /// The state that the newest heartbeat of a node told, of those that were passed over.
+    #[must_use]
+    pub fn last_state(&self, node: NodeId) -> Option<State> {
+        let heartbeats = self.kept.iter().rev().filter_map(|received| Heartbeat::parse(&received.frame));
+        heartbeats.filter(|heard| heard.node == node).map(|heard| heard.state).next()
     }
 
     /// The oldest of the frames that were passed over.

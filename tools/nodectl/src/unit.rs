@@ -1,26 +1,4 @@
-//! Physical units (CiA 303-2), where an object of the node tells them.
-
-use canopen::sdo::Multiplexer;
-
-use crate::Catalogue;
-use crate::object::at;
-use crate::sdo::{Client, Error};
-
-/// The unit of a value: what the data sheet says, or what the object says that it names (6131h in CiA 404).
-///
-/// # Errors
-/// Those of SDO, but for a node that has no such object.
-pub fn of(client: &mut Client, catalogue: &Catalogue, of: Multiplexer) -> Result<String, Error> {
-    let unit = catalogue.unit(of);
-    let Some(told_by) = eds::address(unit) else { return Ok(unit.to_owned()) };
-    match client.upload(at(told_by.index, of.sub)) {
-        Ok(bytes) => {
-            Ok(bytes.try_into().map_or_else(|_| String::new(), |bytes| symbol(u32::from_le_bytes(bytes))))
-        }
-        Err(error) if error.abort().is_some() => Ok(String::new()),
-        Err(error) => Err(error),
-    }
-}
+//! Physical units by their codes (CiA 303-2).
 
 /// The symbol of a code: unit in bits 16 to 23, prefix as a power of ten in bits 24 to 31.
 #[must_use]

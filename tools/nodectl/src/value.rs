@@ -18,6 +18,9 @@ pub enum Value {
     Real32(f32),
     /// Of REAL64.
     Real64(f64),
+    /// A number with its point so many digits from the right: what the integer of an object means. No object has it on
+    /// the wire.
+    Decimal(i128, u8),
     /// Of a string type.
     Text(String),
     /// Of any other type, or of none that fits.
@@ -68,7 +71,9 @@ impl Value {
     #[must_use]
     pub fn encode(&self, data_type: DataType) -> Vec<u8> {
         match self {
-            Value::Integer(value) => value.to_le_bytes()[..size(data_type.class())].to_vec(),
+            Value::Integer(value) | Value::Decimal(value, _) => {
+                value.to_le_bytes()[..size(data_type.class())].to_vec()
+            }
             Value::Real32(value) => value.to_le_bytes().to_vec(),
             Value::Real64(value) => value.to_le_bytes().to_vec(),
             Value::Text(text) if data_type == UNICODE_STRING => {
@@ -87,6 +92,8 @@ impl Value {
             Value::Integer(value) => Some(*value as f64),
             Value::Real32(value) => Some(f64::from(*value)),
             Value::Real64(value) => Some(*value),
+            // The text is exact, and read back it is rounded once.
+            Value::Decimal(..) => self.to_string().parse().ok(),
             Value::Text(_) | Value::Bytes(_) => None,
         }
     }
@@ -206,6 +213,17 @@ pub fn guess(bytes: &[u8]) -> DataType {
     }
 }
 
+/// A number whose point is so many digits from the right.
+fn decimal(mantissa: i128, digits: usize) -> String {
+    if digits == 0 {
+        return mantissa.to_string();
+    }
+    let sign = if mantissa < 0 { "-" } else { "" };
+    let all = format!("{:0>width$}", mantissa.unsigned_abs(), width = digits + 1);
+    let (whole, fraction) = all.split_at(all.len() - digits);
+    format!("{sign}{whole}.{fraction}")
+}
+
 /// Numbers in decimal, bytes in hexadecimal, a text as it is: for a terminal, [`visible`](crate::text::visible) makes it fit.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -213,6 +231,7 @@ impl fmt::Display for Value {
             Value::Integer(value) => f.pad(&value.to_string()),
             Value::Real32(value) => f.pad(&value.to_string()),
             Value::Real64(value) => f.pad(&value.to_string()),
+            Value::Decimal(mantissa, digits) => f.pad(&decimal(*mantissa, (*digits).into())),
             Value::Text(text) => f.pad(text),
             Value::Bytes(bytes) => {
                 let pairs: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
@@ -230,6 +249,7 @@ impl Serialize for Value {
             // As f32: its shortest text is what a person calls the number.
             Value::Real32(value) => serializer.serialize_f32(*value),
             Value::Real64(value) => serializer.serialize_f64(*value),
+            Value::Decimal(..) => serializer.serialize_f64(self.as_f64().unwrap_or(f64::NAN)),
             Value::Text(text) => serializer.serialize_str(text),
             Value::Bytes(_) => serializer.collect_str(self),
         }

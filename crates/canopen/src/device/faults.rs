@@ -13,6 +13,7 @@ const TO_STOPPED: u32 = 2;
 
 /// What the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BusEvent {
     /// A received frame was lost.
     Overrun,
@@ -26,7 +27,9 @@ pub enum BusEvent {
     Recovered,
 }
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// Takes what the CAN controller reports: sets and clears the faults 8110h, 8120h and 8140h, and treats bus-off as a
     /// communication error. A warning has no emergency code: the node works, and error passive would follow.
     pub fn on_bus(&mut self, event: BusEvent, now: Instant) -> Next {
@@ -78,7 +81,9 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// That the node was off the bus can only be said afterwards.
     fn recover(&mut self, now: Instant) {
         if core::mem::take(&mut self.is_bus_off) {

@@ -18,7 +18,9 @@ pub(super) enum Switching {
     After,
 }
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     #[inline(never)]
     pub(super) fn on_lss(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let Some(request) = frame.full().copied().and_then(Request::parse) else { return };
@@ -82,12 +84,14 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 
     /// One call. The way to the queue is shut while the bit rate changes.
-    pub(super) fn turn<'a, T: Transmit>(&self, now: Instant, out: &'a mut T) -> Turn<'a, T> {
+    pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
         Turn { now, out, is_open: self.switching == Switching::No }
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     fn identity(&self) -> Identity {
         Identity {
             vendor: self.number(IDENTITY, 1),

@@ -28,16 +28,24 @@ pub use store::{Job, Stored};
 use crate::dictionary::{Dictionary, Groups};
 use crate::lss::{BitRate, Configuration, Slave};
 use crate::nmt::State;
-use crate::pdo::{PdoSet, Rpdo, Scanner, Tpdo};
+use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
 use crate::sdo::Server;
 use crate::{Instant, NodeId, emcy, heartbeat, sync};
 
-/// How many PDOs a device can have each way; which of them it has, the dictionary says.
-pub(crate) const PDOS: usize = 8;
-
-/// A CANopen device with an application `A` and an image of `N` bytes, at least that of its dictionary.
+/// A CANopen device with an application `A`, and room for what its dictionary has: an image of `N` bytes, `T` TPDOs, `R`
+/// RPDOs, `W` heartbeats to watch, and `M` objects that a multiplexed TPDO sends.
+///
+/// [`device!`](crate::device!) gives the type of a table of rows. Of what a dictionary has beyond the room, the device
+/// does nothing.
 #[derive(Debug)]
-pub struct Device<A, const N: usize> {
+pub struct Device<
+    A,
+    const N: usize,
+    const T: usize = 8,
+    const R: usize = 8,
+    const W: usize = 4,
+    const M: usize = 48,
+> {
     server: Server,
     /// When to try again to send a reply of the server that found the queue full.
     reply_due: Instant,
@@ -50,12 +58,12 @@ pub struct Device<A, const N: usize> {
     switching: lss::Switching,
     /// When its next step is due.
     switching_due: Instant,
-    core: Core<A, N>,
+    core: Core<A, N, T, R, W, M>,
 }
 
 /// All but the SDO server: what the server serves.
 #[derive(Debug)]
-struct Core<A, const N: usize> {
+struct Core<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> {
     dictionary: &'static Dictionary,
     /// `None` for a device that waits to be given one.
     node_id: Option<NodeId>,
@@ -63,20 +71,18 @@ struct Core<A, const N: usize> {
     image: [u8; N],
     application: A,
     heartbeat: heartbeat::Producer,
-    watches: heartbeat::Consumer,
+    watches: heartbeat::Consumer<W>,
     sync: sync::Consumer,
     emcy: emcy::Producer,
-    tpdos: [Tpdo; PDOS],
-    rpdos: [Rpdo; PDOS],
-    /// What CAN-IDs those that are valid have, a bit for each value of five bits of them: it keeps away most frames of
-    /// anybody else.
+    tpdos: [Tpdo; T],
+    rpdos: [Rpdo; R],
+    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits: most frames for other nodes are not in
+    /// the set, and need no further look.
     rpdo_filter: u32,
-    scanner: Scanner,
-    /// The PDOs that are valid, and those of them that the SYNC concerns.
-    valid_tpdos: PdoSet,
-    synchronous_tpdos: PdoSet,
-    valid_rpdos: PdoSet,
-    synchronous_rpdos: PdoSet,
+    scanner: Scanner<M>,
+    /// Where the chains of PDOs begin.
+    first_tpdos: Links,
+    first_rpdos: Links,
     /// Cached next deadlines; `STALE` after a change that may have moved them.
     process_due: Instant,
     services_due: Instant,
@@ -90,14 +96,16 @@ struct Core<A, const N: usize> {
 /// A deadline in the past: the next poll looks at everything.
 const STALE: Instant = Instant(0);
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// A device that has not started: silent and deaf until [`start`](Device::start). It stores its bit rate for LSS
     /// only; 1 Mbit/s unless [`with_bit_rate`](Device::with_bit_rate) says otherwise.
     pub fn new(
         dictionary: &'static Dictionary,
         node_id: impl Into<Option<NodeId>>,
         application: A,
-    ) -> Device<A, N> {
+    ) -> Device<A, N, T, R, W, M> {
         let node_id = node_id.into();
         Device {
             server: Server::new(),
@@ -118,14 +126,12 @@ impl<A: Application, const N: usize> Device<A, N> {
                 watches: heartbeat::Consumer::new(),
                 sync: sync::Consumer::new(),
                 emcy: emcy::Producer::new(A::CONDITIONS),
-                tpdos: [const { Tpdo::new() }; PDOS],
-                rpdos: [const { Rpdo::new() }; PDOS],
+                tpdos: [const { Tpdo::new() }; T],
+                rpdos: [const { Rpdo::new() }; R],
                 rpdo_filter: 0,
                 scanner: Scanner::new(),
-                valid_tpdos: PdoSet::EMPTY,
-                synchronous_tpdos: PdoSet::EMPTY,
-                valid_rpdos: PdoSet::EMPTY,
-                synchronous_rpdos: PdoSet::EMPTY,
+                first_tpdos: Links::END,
+                first_rpdos: Links::END,
                 process_due: Instant::NEVER,
                 services_due: Instant::NEVER,
                 pending: state::Pending::new(),
@@ -138,7 +144,7 @@ impl<A: Application, const N: usize> Device<A, N> {
 
     /// Takes the bit rate that is configured, for LSS to store along with a new node-ID.
     #[must_use]
-    pub fn with_bit_rate(mut self, bit_rate: BitRate) -> Device<A, N> {
+    pub fn with_bit_rate(mut self, bit_rate: BitRate) -> Device<A, N, T, R, W, M> {
         self.lss = Slave::new(Configuration { bit_rate, ..self.lss.pending() });
         self
     }

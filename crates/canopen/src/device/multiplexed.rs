@@ -14,7 +14,9 @@ const DISPATCHING_LIST: u16 = 0x1FD0;
 /// The longest value that such a PDO carries.
 const LONGEST: u8 = 4;
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// Gives the producer its settings and its objects, after any change that may concern it.
     pub(super) fn configure_scanner(&mut self, settings: Option<ScannerSettings>) {
         self.scanner.configure(settings);

@@ -14,6 +14,7 @@ use crate::lss::BitRate;
 /// `poll`) and by no other call: where something waits after another call, the services are due at once.
 #[must_use = "the deadlines have moved, and an action may be left to the caller"]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Next {
     /// When `poll_process` has something to do.
     pub process: Instant,
@@ -35,6 +36,7 @@ impl Next {
 
 /// Something that is left to the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
     /// NMT reset node: restart everything, or at least call [`Device::start`](super::Device::start).
     ResetNode,

@@ -7,7 +7,9 @@ use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Instant, emcy, sync};
 
-impl<A: Application, const N: usize> Objects for Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> Objects
+    for Core<A, N, T, R, W, M>
+{
     const IS_SMALL: bool = A::SERVICES_ONLY;
 
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
@@ -69,7 +71,9 @@ impl<A: Application, const N: usize> Objects for Core<A, N> {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     fn write_domain(&mut self, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
         self.stream(at, Part::Begin(Some(bytes.len())))?;
         self.stream(at, Part::Data(0, bytes))?;

@@ -3,11 +3,12 @@
 //! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
 //! entries, count, COB-ID valid.
 
+use super::rpdos::filter_bit;
 use super::{Application, Core};
 use crate::dictionary::{Dictionary, Entry, Rule};
 use crate::pdo::{
-    Addressing, Content, Direction, Layout, MappedObject, RpdoSettings, ScannerSettings, Settings,
-    Transmission, locate,
+    Addressing, Chain, Content, Direction, Layout, Links, MappedObject, RpdoSettings, ScannerSettings,
+    Settings, Transmission, locate,
 };
 use crate::sdo::Abort;
 use crate::{CobId, Instant};
@@ -45,11 +46,13 @@ impl Pdo {
 
     /// Those that a dictionary has, one way.
     fn all(dictionary: &Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
-        dictionary.pdos(direction).iter().map(|&communication| Pdo { communication })
+        dictionary.pdos(direction).map(|communication| Pdo { communication })
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// Gives every PDO its settings.
     pub(super) fn configure_pdos(&mut self, now: Instant) {
         for direction in [Direction::Transmit, Direction::Receive] {
@@ -57,6 +60,7 @@ impl<A: Application, const N: usize> Core<A, N> {
                 self.apply(pdo, place, now);
             }
         }
+        self.link_pdos();
         self.configure_scanner(self.scanner_settings());
     }
 
@@ -66,27 +70,25 @@ impl<A: Application, const N: usize> Core<A, N> {
         if let Some(place) = self.place(pdo) {
             self.apply(pdo, place, now);
         }
+        self.link_pdos();
         self.configure_scanner(self.scanner_settings());
     }
 
     /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
-    fn place(&self, pdo: Pdo) -> Option<u8> {
+    fn place(&self, pdo: Pdo) -> Option<u16> {
         let mut ranked = (0..).zip(self.dictionary.pdos(pdo.direction()));
-        ranked.find(|(_, index)| **index == pdo.communication).map(|(place, _)| place)
+        ranked.find(|(_, index)| *index == pdo.communication).map(|(place, _)| place)
     }
 
-    fn apply(&mut self, pdo: Pdo, place: u8, now: Instant) {
+    fn apply(&mut self, pdo: Pdo, place: u16, now: Instant) {
         match pdo.direction() {
             Direction::Transmit => self.configure_tpdo(pdo, place),
             Direction::Receive => self.configure_rpdo(pdo, place, now),
         }
     }
 
-    fn configure_tpdo(&mut self, pdo: Pdo, place: u8) {
+    fn configure_tpdo(&mut self, pdo: Pdo, place: u16) {
         let settings = self.tpdo_settings(pdo);
-        self.valid_tpdos.set(place, settings.is_some());
-        let is_synchronous = settings.as_ref().is_some_and(|settings| settings.transmission.is_synchronous());
-        self.synchronous_tpdos.set(place, is_synchronous);
         if let Some(tpdo) = self.tpdos.get_mut(usize::from(place)) {
             tpdo.configure(settings);
             if self.state.has_pdos() {
@@ -95,15 +97,36 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    fn configure_rpdo(&mut self, pdo: Pdo, place: u8, now: Instant) {
+    fn configure_rpdo(&mut self, pdo: Pdo, place: u16, now: Instant) {
         let settings = self.rpdo_settings(pdo);
-        self.valid_rpdos.set(place, settings.is_some());
-        self.synchronous_rpdos.set(place, settings.as_ref().is_some_and(RpdoSettings::is_synchronous));
         if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
             rpdo.configure(settings);
         }
-        self.update_rpdo_filter();
         self.forget_rpdo_faults(place, now);
+    }
+
+    /// Chains the PDOs that are valid, after a change of their settings.
+    fn link_pdos(&mut self) {
+        (self.first_tpdos, self.first_rpdos) = (Links::END, Links::END);
+        for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
+            tpdo.links = self.first_tpdos;
+            let Some(settings) = tpdo.settings() else { continue };
+            let is_synchronous = settings.transmission.is_synchronous();
+            self.first_tpdos.prepend(Chain::Valid, place);
+            if is_synchronous {
+                self.first_tpdos.prepend(Chain::Synchronous, place);
+            }
+        }
+        self.rpdo_filter = 0;
+        for (place, rpdo) in self.rpdos.iter_mut().enumerate().rev() {
+            rpdo.links = self.first_rpdos;
+            let Some(id) = rpdo.id() else { continue };
+            self.rpdo_filter |= filter_bit(id.get());
+            self.first_rpdos.prepend(Chain::Valid, place);
+            if rpdo.is_synchronous() {
+                self.first_rpdos.prepend(Chain::Synchronous, place);
+            }
+        }
     }
 
     fn tpdo_settings(&self, pdo: Pdo) -> Option<Settings> {

@@ -2,11 +2,13 @@
 
 use super::{Application, Core, Device, Next, STALE};
 use crate::nmt::Command;
-use crate::pdo::{PdoSet, Rpdo, Tpdo};
+use crate::pdo::{Chain, Direction, Rpdo, Tpdo};
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// Takes a frame, whatever half it is for.
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         let _ = self.on_process_frame(frame, now, out);
@@ -54,7 +56,7 @@ impl<A: Application, const N: usize> Device<A, N> {
         if turn.now >= core.process_due {
             core.poll_sync(turn.now);
             let mut due = core.poll_rpdos(turn.now);
-            core.each_tpdo(core.valid_tpdos, |tpdo, image| {
+            core.each_tpdo(Chain::Valid, |tpdo, image| {
                 tpdo.poll(image, turn);
                 due = due.min(tpdo.due());
             });
@@ -76,11 +78,27 @@ impl<A: Application, const N: usize> Device<A, N> {
         self.process_next()
     }
 
+    /// Sends a TPDO of type 254 or 255 now, or as soon as its inhibit time is over: an event that the application has
+    /// found. `tpdo` is the number, 1 to 512; one that is not valid, or of another type, is not sent.
+    pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
+        let turn = &mut self.turn(now, out);
+        let mut numbers = self.core.dictionary.pdos(Direction::Transmit).map(|index| (index & 0x1FF) + 1);
+        let place = numbers.position(|number| number == tpdo);
+        if self.core.state.has_pdos()
+            && let Some(tpdo) = place.and_then(|place| self.core.tpdos.get_mut(place))
+        {
+            tpdo.on_event();
+            self.core.process_due = STALE;
+        }
+        self.send_process(turn);
+        self.process_next()
+    }
+
     fn send_changes(&mut self, now: Instant, out: &mut impl Transmit) {
         let turn = &mut self.turn(now, out);
         self.start_by_itself(turn);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
-            self.core.each_tpdo(self.core.valid_tpdos, |tpdo, image| tpdo.on_change(image, turn));
+            self.core.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, turn));
             self.core.scanner.on_change(&self.core.image, turn);
             self.core.process_due = self.core.process_due.min(self.core.scanner.due());
         }
@@ -95,12 +113,14 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     fn on_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         if self.sync.accepts(frame) {
             self.on_sync(frame, turn);
         } else if frame.is_remote() {
-            self.each_tpdo(self.valid_tpdos, |tpdo, image| {
+            self.each_tpdo(Chain::Valid, |tpdo, image| {
                 if tpdo.settings().is_some_and(|settings| settings.id.get() == frame.id()) {
                     tpdo.on_remote(image, turn);
                 }
@@ -110,14 +130,15 @@ impl<A: Application, const N: usize> Core<A, N> {
         }
     }
 
-    /// Visits some TPDOs. What one of them could not send at once moves the next deadline.
-    pub(super) fn each_tpdo(&mut self, tpdos: PdoSet, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
-        for number in tpdos.iter() {
-            let Some(tpdo) = self.tpdos.get_mut(usize::from(number)) else { return };
+    /// Visits the TPDOs of a chain. What one of them could not send at once moves the next deadline.
+    pub(super) fn each_tpdo(&mut self, chain: Chain, mut visit: impl FnMut(&mut Tpdo, &[u8])) {
+        let mut links = self.first_tpdos;
+        while let Some(tpdo) = self.tpdos.get_mut(links.next(chain)) {
             visit(tpdo, &self.image);
             if tpdo.is_pending() {
                 self.process_due = STALE;
             }
+            links = tpdo.links;
         }
     }
 }

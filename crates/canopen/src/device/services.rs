@@ -12,7 +12,9 @@ const ERROR_CONTROL: u16 = 0x700;
 /// Frames for which a block upload leaves room in the queue: all PDOs of a SYNC, a heartbeat, an EMCY.
 const RESERVED_ROOM: usize = 10;
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         if frame.id() == self.core.service(SDO_REQUEST).get() {

@@ -88,7 +88,9 @@ impl Pending {
     }
 }
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// Initialises what the last reset covers (at first everything) and boots up; if 1F80h says so, the device starts by
     /// itself with the next [`publish`](Device::publish). A node-ID that LSS has configured is taken now; without one, the
     /// device waits for LSS.
@@ -188,7 +190,9 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// A device that had no node-ID has got one. Whoever calls the device starts it again.
     pub(super) fn begin_join(&mut self) {
         self.begin_reset(Reset::Communication);

@@ -21,6 +21,7 @@ const RESET_PROGRAM: u32 = 2;
 
 /// Something to be stored or restored. The job is done when [`Device::finish`] says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Job {
     /// Store the present values of these groups.
     Store(Groups),
@@ -83,7 +84,9 @@ impl Jobs {
     }
 }
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// The job is done, or cannot be: whoever waits for it is answered.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
@@ -105,7 +108,9 @@ impl Default for Jobs {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     /// Begins the job that a write to 1010h or 1011h asks for.
     pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;

@@ -2,11 +2,14 @@
 
 use super::{Application, Core, STALE};
 use crate::emcy::Fault;
+use crate::pdo::Chain;
 use crate::sync::Settings;
 use crate::transmit::Turn;
 use crate::{Frame, Instant, Transmit};
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     pub(super) fn configure_sync(&mut self, now: Instant) {
         let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
         self.sync.configure(Settings {
@@ -27,14 +30,16 @@ impl<A: Application, const N: usize> Core<A, N> {
         if self.sync.is_back() {
             self.clear(Fault::SyncMissing, turn.now);
         }
-        for number in self.synchronous_rpdos.iter() {
-            let Some(rpdo) = self.rpdos.get_mut(usize::from(number)) else { return };
+        let mut links = self.first_rpdos;
+        while let Some(rpdo) = self.rpdos.get_mut(links.next(Chain::Synchronous)) {
+            let place = links.next(Chain::Synchronous);
+            links = rpdo.links;
             if let Some(data) = rpdo.take_waiting() {
-                self.store_rpdo(number, data);
+                self.store_rpdo(place, data);
             }
         }
         self.application.synchronised(sync.counter, &mut self.image);
-        self.each_tpdo(self.synchronous_tpdos, |tpdo, image| tpdo.on_sync(sync, image, turn));
+        self.each_tpdo(Chain::Synchronous, |tpdo, image| tpdo.on_sync(sync, image, turn));
         self.process_due = self.process_due.min(self.sync.due());
     }
 

@@ -3,13 +3,15 @@
 use super::{Application, Core, Device, ErrorClass};
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
-use crate::heartbeat::{Change, WATCHES, Watch};
+use crate::heartbeat::{Change, Watch};
 use crate::sdo::Abort;
 use crate::{Frame, Instant};
 
 const CONSUMER_TIME: u16 = 0x1016;
 
-impl<A: Application, const N: usize> Device<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Device<A, N, T, R, W, M>
+{
     /// Looks for heartbeats that are missing.
     pub(super) fn poll_watches(&mut self, now: Instant) {
         if self.core.is_initialising() {
@@ -22,7 +24,9 @@ impl<A: Application, const N: usize> Device<A, N> {
     }
 }
 
-impl<A: Application, const N: usize> Core<A, N> {
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Core<A, N, T, R, W, M>
+{
     #[inline(never)]
     pub(super) fn on_heartbeat(&mut self, frame: &Frame, now: Instant) {
         if self.is_initialising() {
@@ -65,8 +69,8 @@ impl<A: Application, const N: usize> Core<A, N> {
     }
 
     pub(super) fn configure_watches(&mut self, now: Instant) {
-        for number in 0..WATCHES {
-            self.configure_watch(number + 1, now);
+        for sub in (1..=u8::MAX).take(W) {
+            self.configure_watch(sub, now);
         }
     }
 }

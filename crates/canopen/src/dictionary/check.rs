@@ -2,23 +2,18 @@
 
 use super::compile::{effective_limits, event_timer};
 use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};
-use crate::device::PDOS;
-use crate::pdo::WATCHED;
 use crate::sdo::BUFFER;
 
 /// Checks a table: sorted, no entry twice, every default of its type and within its limits, sub-index 0 where there
-/// are others, attributes that fit together, no more PDOs than a device has room for.
+/// are others, attributes that fit together.
 ///
 /// # Panics
 /// During compilation, when a row is wrong.
 pub const fn check(rows: &[Object]) {
     assert!(image_size(rows) <= u16::MAX as usize, "the image outgrows its offsets");
-    assert!(pdos(rows, 0x1400) <= PDOS, "more RPDOs than a device has");
-    assert!(pdos(rows, 0x1800) <= PDOS, "more TPDOs than a device has");
-    let (mut i, mut sent) = (0, 0);
+    let mut i = 0;
     while i < rows.len() {
         check_row(&rows[i]);
-        sent += rows[i].mapping.allows_tpdo() as usize;
         if i > 0 {
             assert!(rows[i - 1].key() < rows[i].key(), "rows are not sorted, or one is there twice");
         }
@@ -37,17 +32,6 @@ pub const fn check(rows: &[Object]) {
         }
         i += 1;
     }
-    assert!(sent <= WATCHED, "a multiplexed PDO cannot send them all");
-}
-
-/// PDOs with communication objects among the 512 indexes from `first` on.
-const fn pdos(rows: &[Object], first: u16) -> usize {
-    let (mut total, mut i) = (0, 0);
-    while i < rows.len() {
-        let is_one = rows[i].index & 0xFE00 == first && rows[i].sub == 1;
-        (total, i) = (total + is_one as usize, i + 1);
-    }
-    total
 }
 
 const fn has(rows: &[Object], key: u32) -> bool {

@@ -1,9 +1,7 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
 use super::filling::{Filling, attributes, is_same};
-use super::tables::{Pdos, Series};
 use super::{Access, Dictionary, Object, Tables, Type, check};
-use crate::device::PDOS;
 
 /// How many rows the parts of a table have together.
 #[must_use]
@@ -52,7 +50,9 @@ macro_rules! dictionaries {
         use $crate::dictionary as make;
         // Whatever is behind `$all` must not have one of these names.
         const ROWS_OF_ALL: &[&[make::Object]] = &$all;
+        #[allow(long_running_const_eval)]
         const ROOM: make::Counts = make::Counts::of(ROWS_OF_ALL);
+        #[allow(long_running_const_eval)]
         static COMPILED_TABLES: make::Tables<
             { ROWS_OF_ALL.len() },
             { ROOM.series },
@@ -60,7 +60,7 @@ macro_rules! dictionaries {
             { ROOM.attributes },
             { ROOM.defaults },
         > = make::compile(&$all);
-        COMPILED_TABLES.dictionaries(&$all)
+        COMPILED_TABLES.dictionaries()
     }};
 }
 
@@ -98,13 +98,15 @@ impl Counts {
 /// # Panics
 /// During compilation, when they are less.
 #[must_use]
+#[allow(clippy::cast_possible_truncation)] // `MOST` is less than 2^16.
 pub const fn compile<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize>(
     all: &[&[Object]; D],
 ) -> Tables<D, S, P, A, V> {
     let Filling { series, places, attributes, defaults, .. } = Filling::of(all);
-    let (mut tpdos, mut rpdos, mut i) = ([NO_PDOS; D], [NO_PDOS; D], 0);
+    let (mut ends, mut end, mut i) = ([0; D], 0, 0);
     while i < D {
-        (tpdos[i], rpdos[i]) = (pdos(all[i], 0x1800), pdos(all[i], 0x1400));
+        end += series_count(all[i]);
+        ends[i] = end as u16;
         i += 1;
     }
     Tables {
@@ -112,8 +114,7 @@ pub const fn compile<const D: usize, const S: usize, const P: usize, const A: us
         places: beginning(&places),
         attributes: beginning(&attributes),
         defaults: beginning(&defaults),
-        tpdos,
-        rpdos,
+        ends,
     }
 }
 
@@ -123,38 +124,19 @@ const fn beginning<T: Copy, const N: usize>(all: &[T]) -> [T; N] {
 
 impl<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize> Tables<D, S, P, A, V> {
     /// The dictionaries of the tables of rows that these tables were made of.
-    ///
-    /// # Panics
-    /// During compilation, when they were not.
     #[must_use]
-    pub const fn dictionaries(&'static self, all: &[&[Object]; D]) -> [Dictionary; D] {
-        let Tables { series, places, attributes, defaults, tpdos, rpdos } = self;
-        let any = Dictionary { series, places, attributes, defaults, tpdos: &NO_PDOS, rpdos: &NO_PDOS };
-        let mut dictionaries = [any; D];
-        let (mut i, mut rest): (usize, &'static [Series]) = (0, series);
+    pub const fn dictionaries(&'static self) -> [Dictionary; D] {
+        let Tables { series, places, attributes, defaults, ends } = self;
+        let mut dictionaries = [Dictionary { series, places, attributes, defaults }; D];
+        let (mut i, mut begin) = (0, 0);
         while i < D {
-            (dictionaries[i].series, rest) = rest.split_at(series_count(all[i]));
-            (dictionaries[i].tpdos, dictionaries[i].rpdos) = (&tpdos[i], &rpdos[i]);
+            let (before, _) = series.split_at(ends[i] as usize);
+            dictionaries[i].series = before.split_at(begin).1;
+            begin = ends[i] as usize;
             i += 1;
         }
         dictionaries
     }
-}
-
-const NO_PDOS: Pdos = Pdos { count: 0, indexes: [0; PDOS] };
-
-/// Of the PDOs whose communication objects are among the 512 indexes from `first` on.
-const fn pdos(rows: &[Object], first: u16) -> Pdos {
-    let mut pdos = NO_PDOS;
-    let mut row = 0;
-    while row < rows.len() {
-        if rows[row].index & 0xFE00 == first && rows[row].sub == 0 {
-            pdos.indexes[pdos.count as usize] = rows[row].index;
-            pdos.count += 1;
-        }
-        row += 1;
-    }
-    pdos
 }
 
 /// The row of the event timer of a TPDO.
@@ -234,4 +216,81 @@ pub const fn image_size(rows: &[Object]) -> usize {
         i += 1;
     }
     total
+}
+
+/// How much room a device needs for a table of rows: the parameters of [`Device`](crate::Device).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// Bytes of the image of all values.
+    pub image: usize,
+    /// TPDOs.
+    pub tpdos: usize,
+    /// RPDOs.
+    pub rpdos: usize,
+    /// Heartbeats that can be watched: entries of 1016h.
+    pub watches: usize,
+    /// Objects that a multiplexed TPDO can send: 0 where no TPDO can be one.
+    pub scanned: usize,
+}
+
+impl Sizes {
+    /// The room that these rows need.
+    #[must_use]
+    pub const fn of(rows: &[Object]) -> Sizes {
+        let mut sizes = Sizes { image: image_size(rows), tpdos: 0, rpdos: 0, watches: 0, scanned: 0 };
+        let (mut i, mut is_multiplexed) = (0, false);
+        while i < rows.len() {
+            let row = &rows[i];
+            sizes.tpdos += (row.sub == 0 && row.index & 0xFE00 == 0x1800) as usize;
+            sizes.rpdos += (row.sub == 0 && row.index & 0xFE00 == 0x1400) as usize;
+            sizes.watches += (row.sub > 0 && row.index == 0x1016) as usize;
+            sizes.scanned += (row.mapping.allows_tpdo() && row.kind.size() <= 4) as usize;
+            is_multiplexed |= row.sub == 0 && row.index & 0xFE00 == 0x1A00 && can_be_multiplexed(row);
+            i += 1;
+        }
+        sizes.scanned = if is_multiplexed { sizes.scanned } else { 0 };
+        sizes
+    }
+
+    /// Whether a device of the other sizes is large enough.
+    #[must_use]
+    pub const fn fits(self, room: Sizes) -> bool {
+        self.image <= room.image
+            && self.tpdos <= room.tpdos
+            && self.rpdos <= room.rpdos
+            && self.watches <= room.watches
+            && self.scanned <= room.scanned
+    }
+}
+
+/// Whether a number of mapped objects can be 254 or 255.
+const fn can_be_multiplexed(count: &Object) -> bool {
+    let (_, high) = effective_limits(count);
+    match count.default {
+        _ if count.access.is_writable() => high >= 0xFE,
+        super::DefaultValue::Integer(value) => value >= 0xFE,
+        _ => false,
+    }
+}
+
+/// The type of a device with just the room that a table of rows needs.
+///
+/// ```
+/// use canopen::dictionary::{Access, Object, Type};
+///
+/// const ROWS: &[Object] = &[Object::new(0x1000, 0, "Device type", Type::Unsigned32, Access::ReadOnly)];
+/// type Node = canopen::device!((), ROWS);
+/// ```
+#[macro_export]
+macro_rules! device {
+    ($application:ty, $rows:expr) => {
+        $crate::Device<
+            $application,
+            { $crate::dictionary::Sizes::of($rows).image },
+            { $crate::dictionary::Sizes::of($rows).tpdos },
+            { $crate::dictionary::Sizes::of($rows).rpdos },
+            { $crate::dictionary::Sizes::of($rows).watches },
+            { $crate::dictionary::Sizes::of($rows).scanned },
+        >
+    };
 }

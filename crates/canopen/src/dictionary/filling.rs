@@ -12,12 +12,14 @@ pub(super) struct Filling {
     pub(super) series: [Series; MOST],
     pub(super) places: [Place; MOST],
     pub(super) attributes: [Attributes; MOST_ATTRIBUTES],
-    pub(super) defaults: [u8; 4 * MOST],
+    pub(super) defaults: [u8; MOST_DEFAULTS],
     pub(super) filled: Counts,
 }
 
 /// More series or places than these do not compile.
 const MOST: usize = 1024;
+/// As large as the largest image.
+const MOST_DEFAULTS: usize = 1 << 16;
 /// A place names its attributes in a byte.
 const MOST_ATTRIBUTES: usize = 256;
 
@@ -29,7 +31,7 @@ impl Filling {
                 MOST],
             places: [Place { sub: 0, attributes: 0, offset: 0 }; MOST],
             attributes: [attributes(&all[0][0]); MOST_ATTRIBUTES],
-            defaults: [0; 4 * MOST],
+            defaults: [0; MOST_DEFAULTS],
             filled: Counts { series: 0, places: 0, attributes: 0, defaults: 0 },
         };
         let mut i = 0;

@@ -2,6 +2,7 @@
 
 /// A storage group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Group {
     /// Communication parameters, sub-index 2 of 1010h and 1011h.
@@ -19,6 +20,7 @@ impl Group {
 
 /// A set of storage groups.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Groups(u8);
 
 impl Groups {

@@ -21,7 +21,7 @@ mod tables;
 mod types;
 
 pub use check::check;
-pub use compile::{Counts, compile, count, gather, image_size};
+pub use compile::{Counts, Sizes, compile, count, gather, image_size};
 pub use entry::Entry;
 pub(crate) use entry::little_endian;
 pub use field::Field;

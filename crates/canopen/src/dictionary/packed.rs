@@ -25,6 +25,14 @@ const HEAD: usize = 5;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferFull;
 
+impl core::fmt::Display for BufferFull {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the buffer has no room for all values of the group")
+    }
+}
+
+impl core::error::Error for BufferFull {}
+
 /// The most bytes that the group of a table takes when packed.
 #[must_use]
 pub const fn packed_size(rows: &[Object], group: Group) -> usize {

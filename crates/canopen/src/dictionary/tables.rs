@@ -17,7 +17,6 @@ use super::entry::{Attributes, little_endian};
 use super::{Entry, Field};
 use crate::NodeId;
 use crate::copy::copy;
-use crate::device::PDOS;
 use crate::pdo::Direction;
 use crate::sdo::Abort;
 
@@ -48,19 +47,6 @@ pub(crate) struct Place {
     pub(crate) offset: u16,
 }
 
-/// The communication objects of the PDOs of a dictionary one way, ascending.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pdos {
-    pub(crate) count: u8,
-    pub(crate) indexes: [u16; PDOS],
-}
-
-impl Pdos {
-    fn as_slice(&self) -> &[u16] {
-        self.indexes.get(..usize::from(self.count)).unwrap_or(&self.indexes)
-    }
-}
-
 /// What [`compile`](super::compile) makes of `D` tables of rows: room for `S` series, `P` places, `A` attributes and `V`
 /// bytes of default values.
 #[derive(Clone, Copy, Debug)]
@@ -70,8 +56,8 @@ pub struct Tables<const D: usize, const S: usize, const P: usize, const A: usize
     pub(crate) places: [Place; P],
     pub(crate) attributes: [Attributes; A],
     pub(crate) defaults: [u8; V],
-    pub(crate) tpdos: [Pdos; D],
-    pub(crate) rpdos: [Pdos; D],
+    /// Where the series of each dictionary end.
+    pub(crate) ends: [u16; D],
 }
 
 /// One dictionary.
@@ -81,8 +67,6 @@ pub struct Dictionary {
     pub(super) places: &'static [Place],
     pub(super) attributes: &'static [Attributes],
     pub(super) defaults: &'static [u8],
-    pub(super) tpdos: &'static Pdos,
-    pub(super) rpdos: &'static Pdos,
 }
 
 impl Dictionary {
@@ -121,12 +105,16 @@ impl Dictionary {
         self.defaults.get(first..first + usize::from(series.given)).unwrap_or_default()
     }
 
-    /// The indexes of the communication objects of its PDOs one way.
-    pub(crate) fn pdos(&self, direction: Direction) -> &'static [u16] {
-        match direction {
-            Direction::Transmit => self.tpdos.as_slice(),
-            Direction::Receive => self.rpdos.as_slice(),
-        }
+    /// The indexes of the communication objects of its PDOs one way, ascending.
+    pub(crate) fn pdos(&self, direction: Direction) -> impl Iterator<Item = u16> {
+        let first = match direction {
+            Direction::Transmit => 0x1800,
+            Direction::Receive => 0x1400,
+        };
+        let begin = self.series.partition_point(|series| series.index < first);
+        let series = self.series.get(begin..).unwrap_or_default().iter();
+        let of_pdos = series.take_while(move |series| series.index & 0xFE00 == first);
+        of_pdos.flat_map(|series| (0..series.objects.into()).map(|number| series.index.wrapping_add(number)))
     }
 
     /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.

@@ -4,6 +4,7 @@ use crate::dictionary::Group;
 
 /// A fault that the device signals by EMCY.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Fault {
     /// A received frame was lost (8110h).
     Overrun,
@@ -34,6 +35,7 @@ pub enum Fault {
 
 /// What a fault of the application looks like on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Condition {
     /// Emergency error code (CiA 301, table 26, and the device profile).
     pub code: u16,

@@ -2,6 +2,7 @@
 
 /// An emergency message: eight bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
     /// Emergency error code; 0 reports that the last fault is gone.
     pub code: u16,

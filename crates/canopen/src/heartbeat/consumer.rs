@@ -2,9 +2,6 @@
 
 use crate::{CanId, Duration, Frame, Instant, NodeId};
 
-/// How many nodes can be watched: entries of 1016h.
-pub(crate) const WATCHES: u8 = 4;
-
 /// An entry of 1016h: whose heartbeat must come how often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Watch {
@@ -43,16 +40,16 @@ struct Entry {
     is_lost: bool,
 }
 
-/// Watches up to [`WATCHES`] nodes. Each is watched from its first heartbeat on.
+/// Watches up to `W` nodes. Each is watched from its first heartbeat on.
 #[derive(Debug)]
-pub(crate) struct Consumer {
-    entries: [Entry; WATCHES as usize],
+pub(crate) struct Consumer<const W: usize> {
+    entries: [Entry; W],
 }
 
-impl Consumer {
-    pub(crate) const fn new() -> Consumer {
+impl<const W: usize> Consumer<W> {
+    pub(crate) const fn new() -> Consumer<W> {
         let unused = Entry { watch: None, due: Instant::NEVER, is_lost: false };
-        Consumer { entries: [unused; WATCHES as usize] }
+        Consumer { entries: [unused; W] }
     }
 
     /// Takes an entry of 1016h, from 0. The watch starts afresh; whether its node was lost.

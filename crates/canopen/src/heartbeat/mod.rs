@@ -3,5 +3,5 @@
 mod consumer;
 mod producer;
 
-pub(crate) use consumer::{Change, Consumer, WATCHES, Watch};
+pub(crate) use consumer::{Change, Consumer, Watch};
 pub(crate) use producer::Producer;

@@ -2,6 +2,7 @@
 
 /// A bit rate of CiA 301, or automatic detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BitRate(u16);
 
 /// Bit rates in kbit/s by index. Index 5 was 100 kbit/s once and is reserved; the last one is automatic detection.

@@ -6,6 +6,7 @@ use crate::{Duration, NodeId};
 
 /// Node-ID and bit rate as the next reset communication, the next activation or the next start brings them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
     /// `None` for a device that waits to be given one.
     pub node_id: Option<NodeId>,

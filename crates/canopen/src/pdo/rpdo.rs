@@ -3,7 +3,7 @@
 //! The types 0 to 240 take it with the next SYNC, the types 254 and 255 at once. With an event timer, it must come
 //! again within that time.
 
-use super::{Addressing, Content, Layout, Transmission};
+use super::{Addressing, Content, Layout, Links, Transmission};
 use crate::{CanId, Duration, Frame, Instant};
 
 /// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
@@ -30,11 +30,6 @@ impl RpdoSettings {
 }
 
 impl RpdoSettings {
-    /// Whether its data waits for the SYNC.
-    pub(crate) fn is_synchronous(&self) -> bool {
-        self.is_synchronous
-    }
-
     /// Bytes that it must have.
     fn len(&self) -> usize {
         match &self.content {
@@ -69,6 +64,8 @@ pub(crate) enum RpdoFault {
 /// An RPDO. Without settings it does not exist.
 #[derive(Debug)]
 pub(crate) struct Rpdo {
+    /// The PDOs that follow in the chains.
+    pub(crate) links: Links,
     settings: Option<RpdoSettings>,
     /// Data that waits for SYNC, the newest.
     waiting: Option<[u8; 8]>,
@@ -80,7 +77,12 @@ pub(crate) struct Rpdo {
 
 impl Rpdo {
     pub(crate) const fn new() -> Rpdo {
-        Rpdo { settings: None, waiting: None, due: Instant::NEVER, faults: 0 }
+        Rpdo { links: Links::END, settings: None, waiting: None, due: Instant::NEVER, faults: 0 }
+    }
+
+    /// Whether its data waits for the SYNC.
+    pub(crate) fn is_synchronous(&self) -> bool {
+        self.settings.as_ref().is_some_and(|settings| settings.is_synchronous)
     }
 
     /// Takes new settings and starts afresh.

@@ -11,9 +11,6 @@ use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
-/// Objects that it can watch, one bit each: all that a dictionary can send (`dictionary::check`).
-pub(crate) const WATCHED: usize = 48;
-
 /// What the dictionary says about the PDO.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScannerSettings {
@@ -42,11 +39,15 @@ pub(crate) struct Watched {
     at: Multiplexer,
     field: Field,
     sent: [u8; 4],
+    /// No other TPDO carries it.
+    is_own: bool,
+    /// It is to be sent.
+    is_pending: bool,
 }
 
 impl Watched {
     pub(crate) fn new(at: Multiplexer, field: Field) -> Watched {
-        Watched { at, field, sent: [0; 4] }
+        Watched { at, field, sent: [0; 4], is_own: true, is_pending: false }
     }
 
     fn value(&self, image: &[u8]) -> [u8; 4] {
@@ -58,26 +59,23 @@ impl Watched {
     }
 }
 
-/// The producer. Without settings there is none.
+/// The producer, with room for `M` objects. Without settings there is none.
 #[derive(Debug)]
-pub(crate) struct Scanner {
+pub(crate) struct Scanner<const M: usize> {
     settings: Option<ScannerSettings>,
-    watched: Vec<Watched, WATCHED>,
-    /// Which of them no other TPDO carries, a bit each.
-    own: u64,
-    /// Which of these are to be sent.
-    pending: u64,
+    watched: Vec<Watched, M>,
+    /// Some of them are to be sent.
+    is_pending: bool,
     event_due: Instant,
     inhibited_until: Instant,
 }
 
-impl Scanner {
-    pub(crate) const fn new() -> Scanner {
+impl<const M: usize> Scanner<M> {
+    pub(crate) const fn new() -> Scanner<M> {
         Scanner {
             settings: None,
             watched: Vec::new(),
-            own: 0,
-            pending: 0,
+            is_pending: false,
             event_due: Instant::NEVER,
             inhibited_until: Instant(0),
         }
@@ -87,7 +85,6 @@ impl Scanner {
     pub(crate) fn configure(&mut self, settings: Option<ScannerSettings>) {
         self.settings = settings;
         self.watched.clear();
-        self.own = u64::MAX;
         self.stop();
     }
 
@@ -98,10 +95,8 @@ impl Scanner {
 
     /// No longer watches what a TPDO carries.
     pub(crate) fn leave_out(&mut self, layout: &Layout) {
-        for (number, watched) in (0..).zip(&self.watched) {
-            if layout.contains(watched.field) {
-                self.own &= !bit(number);
-            }
+        for watched in &mut self.watched {
+            watched.is_own &= !layout.contains(watched.field);
         }
     }
 
@@ -109,45 +104,55 @@ impl Scanner {
     pub(crate) fn start(&mut self) {
         self.stop();
         if self.settings.is_some() {
-            self.pending = self.own;
+            self.send_all();
+        }
+    }
+
+    fn send_all(&mut self) {
+        self.is_pending = false;
+        for watched in &mut self.watched {
+            watched.is_pending = watched.is_own;
+            self.is_pending |= watched.is_own;
         }
     }
 
     /// Leaving Operational.
     pub(crate) fn stop(&mut self) {
-        (self.pending, self.event_due, self.inhibited_until) = (0, Instant::NEVER, Instant(0));
+        self.watched.iter_mut().for_each(|watched| watched.is_pending = false);
+        (self.is_pending, self.event_due, self.inhibited_until) = (false, Instant::NEVER, Instant(0));
     }
 
     /// The next instant at which something is due.
     pub(crate) fn due(&self) -> Instant {
-        if self.pending == 0 { self.event_due } else { self.inhibited_until.min(self.event_due) }
+        if self.is_pending { self.inhibited_until.min(self.event_due) } else { self.event_due }
     }
 
     /// Watched values may have changed.
     pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
-            let changed = |watched: &Watched| watched.value(image) != watched.sent;
-            let bits = self.watched.iter().zip(0..).filter(|(watched, _)| changed(watched));
-            self.pending |= bits.fold(0, |pending, (_, number)| pending | bit(number)) & self.own;
+            for watched in self.watched.iter_mut().filter(|watched| watched.is_own) {
+                watched.is_pending |= watched.value(image) != watched.sent;
+                self.is_pending |= watched.is_pending;
+            }
         }
         self.poll(image, turn);
     }
 
     /// Sends what is due: one after the other, as the inhibit time and the queue allow.
     pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let Some(settings) = &self.settings else { return };
+        let Some(settings) = self.settings else { return };
         let elapsed = turn.now >= self.event_due;
         if elapsed {
-            self.pending = self.own;
+            self.send_all();
         }
-        if self.pending != 0 && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
+        if self.is_pending && settings.event != 0 && (elapsed || self.event_due == Instant::NEVER) {
             self.event_due = turn.now + Duration::from_millis(settings.event.into());
         }
-        for (number, watched) in (0..).zip(&mut self.watched) {
-            if self.pending & bit(number) == 0 {
-                continue;
-            }
+        if !self.is_pending {
+            return;
+        }
+        for watched in self.watched.iter_mut().filter(|watched| watched.is_pending) {
             if turn.now < self.inhibited_until {
                 return;
             }
@@ -157,16 +162,11 @@ impl Scanner {
                 self.inhibited_until = turn.now + RETRY;
                 return;
             }
-            watched.sent = data;
-            self.pending &= !bit(number);
+            (watched.sent, watched.is_pending) = (data, false);
             if settings.inhibit != 0 {
                 self.inhibited_until = turn.now + Duration::from_inhibit(settings.inhibit);
             }
         }
-        self.pending = 0;
+        self.is_pending = false;
     }
-}
-
-fn bit(number: u32) -> u64 {
-    1_u64.checked_shl(number).unwrap_or(0)
 }

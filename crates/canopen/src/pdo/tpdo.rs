@@ -4,7 +4,7 @@
 //! type 255 is sent with every change of a mapped value, at most once per inhibit time. With one, the timer alone sends: a
 //! measured value changes a thousand times a second.
 
-use super::{Layout, Transmission};
+use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
 use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
@@ -36,6 +36,8 @@ impl Settings {
 /// A TPDO and its timers. Without settings it does not exist.
 #[derive(Debug)]
 pub(crate) struct Tpdo {
+    /// The PDOs that follow in the chains.
+    pub(crate) links: Links,
     settings: Option<Settings>,
     /// Something waits to be sent: an event within the inhibit time, or a frame that found the queue full.
     pending: bool,
@@ -54,6 +56,7 @@ pub(crate) struct Tpdo {
 impl Tpdo {
     pub(crate) const fn new() -> Tpdo {
         Tpdo {
+            links: Links::END,
             settings: None,
             pending: false,
             syncs: 0,
@@ -133,6 +136,12 @@ impl Tpdo {
             }
             _ => (),
         }
+    }
+
+    /// The application has found an event.
+    pub(crate) fn on_event(&mut self) {
+        self.pending |=
+            self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
     }
 
     /// Mapped values may have changed.

@@ -2,6 +2,7 @@
 
 /// Why a transfer was refused or given up. A byte in the code that passes it on; only the message has 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Abort {
     /// The toggle bit did not alternate.
     Toggle,
@@ -87,4 +88,45 @@ impl Abort {
             Abort::NoData => 0x0800_0024,
         }
     }
+
+    /// What the code means (CiA 301, table 22).
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Abort::Toggle => "toggle bit not alternated",
+            Abort::TimeOut => "SDO protocol timed out",
+            Abort::Command => "command specifier not valid or unknown",
+            Abort::BlockSize => "invalid block size",
+            Abort::Sequence => "invalid sequence number",
+            Abort::Crc => "CRC error",
+            Abort::Access => "unsupported access to an object",
+            Abort::WriteOnly => "attempt to read a write-only object",
+            Abort::ReadOnly => "attempt to write a read-only object",
+            Abort::NoObject => "object does not exist in the object dictionary",
+            Abort::NotMappable => "object cannot be mapped to the PDO",
+            Abort::PdoLength => "mapped objects exceed the length of the PDO",
+            Abort::Parameter => "general parameter incompatibility",
+            Abort::Hardware => "access failed due to a hardware error",
+            Abort::Length => "data type or length does not match",
+            Abort::TooLong => "data type does not match, length too high",
+            Abort::TooShort => "data type does not match, length too low",
+            Abort::NoSubIndex => "sub-index does not exist",
+            Abort::InvalidValue => "invalid value for parameter",
+            Abort::ValueTooHigh => "value of parameter written too high",
+            Abort::ValueTooLow => "value of parameter written too low",
+            Abort::General => "general error",
+            Abort::NotStored => "data cannot be transferred or stored to the application",
+            Abort::DeviceState => "data cannot be transferred or stored because of the present device state",
+            Abort::NoData => "no data available",
+        }
+    }
 }
+
+/// The meaning and the code.
+impl core::fmt::Display for Abort {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} ({:08X}h)", self.meaning(), self.code())
+    }
+}
+
+impl core::error::Error for Abort {}

@@ -26,8 +26,15 @@ impl Transmit for Sent {
 }
 
 /// Writes up to four bytes by SDO; the abort code where the device refuses them.
-pub(crate) fn download<const N: usize>(
-    device: &mut Device<Nothing, N>,
+pub(crate) fn download<
+    A: Application,
+    const N: usize,
+    const T: usize,
+    const R: usize,
+    const W: usize,
+    const M: usize,
+>(
+    device: &mut Device<A, N, T, R, W, M>,
     (index, sub): (u16, u8),
     bytes: &[u8],
     now: Instant,

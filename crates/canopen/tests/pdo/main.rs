@@ -2,4 +2,5 @@
 
 mod bench;
 mod interlocks;
+mod many;
 mod places;

@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use crate::acquisition::Interruption;
 use crate::bus::BusError;
+use crate::object::Place;
 use crate::sdo::{self, Cause};
 use crate::{lss, update};
 
@@ -52,6 +53,16 @@ pub enum Failure {
         /// Of the first that was not.
         exit_code: u8,
     },
+    /// Some objects could not be read; each was told already.
+    #[error("{failed} of {all} objects could not be read")]
+    Objects {
+        /// How many could not.
+        failed: usize,
+        /// How many there are.
+        all: usize,
+        /// Of the first that could not.
+        exit_code: u8,
+    },
     /// Somebody did not answer.
     #[error("{0}")]
     Silence(String),
@@ -74,6 +85,24 @@ impl Failure {
         Failure::File { path: path.to_owned(), reason: reason.to_string() }
     }
 
+    /// Whether the node is not there: there is nothing to go on with.
+    pub(super) fn is_silence(&self) -> bool {
+        matches!(self, Failure::Sdo(error) if error.is_silence())
+    }
+
+    /// As JSON: one schema for all commands.
+    #[must_use]
+    pub fn to_json(&self) -> serde_json::Value {
+        let mut value = serde_json::json!({ "error": self.to_string(), "exit_code": self.exit_code() });
+        if let Failure::Sdo(error) = self {
+            value["node"] = error.node.get().into();
+            value["object"] = Place(error.at).to_string().into();
+            value["name"] = error.name.clone().into();
+            value["abort"] = error.abort().map(|code| code.0).into();
+        }
+        value
+    }
+
     /// The exit code of the process.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
@@ -84,7 +113,7 @@ impl Failure {
             Failure::Lss(lss::Error::Service(Service::NoAnswer(_))) | Failure::Silence(_) => 3,
             Failure::Bus(_) | Failure::Lss(lss::Error::Bus(_)) => 4,
             Failure::Update(error) => update_code(error),
-            Failure::Nodes { exit_code, .. } => *exit_code,
+            Failure::Nodes { exit_code, .. } | Failure::Objects { exit_code, .. } => *exit_code,
             Failure::File { .. } | Failure::Output(_) => 7,
         }
     }

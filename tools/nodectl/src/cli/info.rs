@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::output::hex;
 use super::{Failure, Session};
 use crate::heartbeat;
+use crate::meaning;
 use crate::object::at;
 use crate::text::visible;
 use crate::update::{Program, Status};
@@ -138,7 +139,13 @@ impl fmt::Display for Report {
         write!(f, "\n  error register    {register}")?;
         for error in &self.errors {
             // CiA 301, 7.5.2.4: the error code is the low half, the rest is the manufacturer's.
-            write!(f, "\n  error             {:04X}h, {:04X}h", error & 0xFFFF, error >> 16)?;
+            let code = u16::try_from(error & 0xFFFF).unwrap_or(0);
+            write!(
+                f,
+                "\n  error             {code:04X}h {}, {:04X}h",
+                meaning::error_code(code),
+                error >> 16
+            )?;
         }
         self.program.iter().try_for_each(|program| write!(f, "\n  program           {program}"))
     }

@@ -42,6 +42,12 @@ impl Output {
         self.to.flush()
     }
 
+    /// Prints a line of JSON.
+    pub(super) fn json(&mut self, value: &serde_json::Value) -> io::Result<()> {
+        writeln!(self.to, "{value}")?;
+        self.to.flush()
+    }
+
     /// Writes bytes as they are.
     pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.to.write_all(bytes)?;

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use clap::Args;
 use eds::{Class, DataType};
@@ -11,14 +12,16 @@ use serde::{Serialize, Serializer};
 use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::object::Place;
+use crate::quantity::Quantity;
 use crate::text::visible;
 use crate::value::{Value, data_type, guess};
-use crate::{Catalogue, unit};
+use crate::{Catalogue, meaning};
 
 /// Reads objects.
 #[derive(Debug, Args)]
 pub(super) struct Read {
-    /// Objects by index (1018:1, 0x1018sub1) or by name ("Producer heartbeat time").
+    /// Objects by index (1018:1, 0x1018sub1), by name ("Producer heartbeat time") or by words of it in any order. A record
+    /// or an array without a sub-index is read as a whole.
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
 
@@ -51,6 +54,12 @@ pub(super) struct Reading {
     data_type: String,
     value: Value,
     unit: String,
+    /// The number on the wire, where the value is another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    raw: Option<Value>,
+    /// What the number stands for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    meaning: Option<String>,
     #[serde(skip)]
     class: Class,
 }
@@ -58,32 +67,73 @@ pub(super) struct Reading {
 impl Read {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let node = session.options.node.one()?;
+        let mut objects = Vec::new();
         for query in &self.objects {
-            let at = session.find(node, query)?;
-            let mut client = session.client(node);
-            let bytes = if self.block { client.block_upload(at) } else { client.upload(at) };
-            let bytes = bytes.map_err(|error| session.named(error))?;
-            match &self.out {
-                Some(path) => write_out(session, path, &bytes)?,
-                None => {
-                    let reading = self.reading(session, at, &bytes)?;
-                    session.print(&reading)?;
+            objects.extend(self.meant(session, node, query)?);
+        }
+        let mut failures = Vec::new();
+        for at in objects.iter().copied() {
+            match self.read(session, node, at) {
+                // One that cannot be read does not keep the others from it.
+                Err(failure @ Failure::Sdo(_)) if objects.len() > 1 && !failure.is_silence() => {
+                    session.tell(&failure)?;
+                    failures.push(failure);
                 }
+                result => result?,
             }
         }
-        Ok(())
+        match failures.first() {
+            None => Ok(()),
+            Some(first) => Err(Failure::Objects {
+                failed: failures.len(),
+                all: objects.len(),
+                exit_code: first.exit_code(),
+            }),
+        }
     }
 
-    fn reading(&self, session: &mut Session, at: Multiplexer, bytes: &[u8]) -> Result<Reading, Failure> {
-        let node = session.options.node.one()?;
+    /// The object that a person means, or all of a record or an array whose sub-index is not given.
+    fn meant(&self, session: &mut Session, node: NodeId, query: &str) -> Result<Vec<Multiplexer>, Failure> {
+        let at = session.find(node, query)?;
+        let catalogue = session.catalogue(node)?;
+        let subs = catalogue.subs(at.index);
+        let is_whole = at.sub == 0 && self.out.is_none() && self.data_type.is_none() && names_no_sub(query);
+        Ok(if is_whole && subs.len() > 1 { subs } else { vec![at] })
+    }
+
+    fn read(&self, session: &mut Session, node: NodeId, at: Multiplexer) -> Result<(), Failure> {
+        let mut client = session.client(node);
+        let bytes = if self.block { client.block_upload(at) } else { client.upload(at) };
+        let bytes = bytes.map_err(|error| session.named(error))?;
+        match &self.out {
+            Some(path) => write_out(session, path, &bytes),
+            None => {
+                let reading = self.reading(session, node, at, &bytes)?;
+                session.print(&reading)
+            }
+        }
+    }
+
+    fn reading(
+        &self,
+        session: &mut Session,
+        node: NodeId,
+        at: Multiplexer,
+        bytes: &[u8],
+    ) -> Result<Reading, Failure> {
         let catalogue = session.catalogue(node)?;
         // The unit is that of the type of the data sheet.
-        let unit = match self.data_type {
-            Some(_) => String::new(),
-            None => unit::of(&mut session.client(node), &catalogue, at)?,
+        let quantity = match self.data_type {
+            Some(_) => Quantity::default(),
+            None => Quantity::of(&mut session.client(node), &catalogue, at)?,
         };
-        Ok(Reading::new(node.get(), at, bytes, &catalogue, unit, self.data_type))
+        Ok(Reading::new(node.get(), at, bytes, &catalogue, &quantity, self.data_type))
     }
+}
+
+/// Whether a query gives no sub-index: an index alone, or a name without a path.
+fn names_no_sub(query: &str) -> bool {
+    !query.contains(':') && !query.to_ascii_lowercase().contains("sub") && !query.contains('/')
 }
 
 impl Reading {
@@ -92,17 +142,42 @@ impl Reading {
         at: Multiplexer,
         bytes: &[u8],
         catalogue: &Catalogue,
-        unit: String,
+        quantity: &Quantity,
         data_type: Option<DataType>,
     ) -> Reading {
         let data_type = data_type.or_else(|| catalogue.data_type(at)).unwrap_or_else(|| guess(bytes));
+        let raw = Value::decode(bytes, data_type);
+        Reading::of(
+            node,
+            at,
+            catalogue.name(at),
+            data_type,
+            raw.clone(),
+            quantity,
+            meaning::of(catalogue, at, &raw),
+        )
+    }
+
+    /// Of a value that is decoded.
+    pub(super) fn of(
+        node: u8,
+        at: Multiplexer,
+        name: Option<String>,
+        data_type: DataType,
+        raw: Value,
+        quantity: &Quantity,
+        meaning: Option<String>,
+    ) -> Reading {
+        let value = quantity.apply(raw.clone());
         Reading {
             node,
             at,
-            name: catalogue.name(at),
+            name,
             data_type: data_type.to_string(),
-            value: Value::decode(bytes, data_type),
-            unit,
+            raw: (value != raw).then_some(raw),
+            value,
+            unit: quantity.unit.clone(),
+            meaning,
             class: data_type.class(),
         }
     }
@@ -135,6 +210,6 @@ impl fmt::Display for Reading {
         if !self.unit.is_empty() {
             write!(f, " {}", self.unit)?;
         }
-        Ok(())
+        self.meaning.iter().try_for_each(|meaning| write!(f, " [{meaning}]"))
     }
 }

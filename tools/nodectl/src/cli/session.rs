@@ -5,6 +5,7 @@ use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
+use canopen::nmt::State;
 use canopen::sdo::Multiplexer;
 use canopen::{Instant, NodeId};
 use eds::Eds;
@@ -13,6 +14,7 @@ use serde::Serialize;
 use super::{Failure, Options, Output};
 use crate::object::at;
 use crate::sdo::{self, Client};
+use crate::text::visible_lines;
 use crate::{Catalogue, Network};
 
 /// The data sheets of the largest devices have a quarter of this.
@@ -98,7 +100,7 @@ impl Session {
         match self.client(node).upload(at) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if error.abort().is_some() => Ok(None),
-            Err(error) => Err(error.into()),
+            Err(error) => Err(self.named(error)),
         }
     }
 
@@ -108,10 +110,43 @@ impl Session {
         found.map_err(|error| Failure::Usage(error.to_string()))
     }
 
-    /// The error of a transfer with the name of its object.
+    /// The error of a transfer with the name of its object, and what helps.
     pub(super) fn named(&mut self, error: sdo::Error) -> Failure {
         let name = self.catalogues.get(&error.node).and_then(|catalogue| catalogue.name(error.at));
-        sdo::Error { name: error.name.clone().or(name), ..error }.into()
+        let hint = self.hint(&error);
+        sdo::Error { name: error.name.clone().or(name), hint, ..error }.into()
+    }
+
+    /// What helps against an error.
+    fn hint(&self, error: &sdo::Error) -> Option<String> {
+        if error.is_silence() && self.network.last_state(error.node) == Some(State::Stopped) {
+            return Some("the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned());
+        }
+        let code = error.abort()?.0;
+        let catalogue = self.catalogues.get(&error.node);
+        match (code, error.at.index) {
+            (0x0609_0030..=0x0609_0032, _) => {
+                catalogue?.range(error.at, error.node).map(|range| format!("it takes {range}"))
+            }
+            (_, 0x1400..=0x1BFF) if code >> 24 == 6 || code >> 24 == 8 => {
+                let communication = error.at.index & !0x0200;
+                Some(format!(
+                    "a PDO is changed while it is switched off (bit 31 of {communication:04X}h:1) and its mapping is \
+                     empty (sub-index 0 is 0)"
+                ))
+            }
+            (0x0609_0011, 0x1010 | 0x1011) => Some("the node has no such group of parameters".to_owned()),
+            _ => None,
+        }
+    }
+
+    /// Tells a failure after which the command goes on.
+    pub(super) fn tell(&mut self, failure: &Failure) -> Result<(), Failure> {
+        if self.options.json {
+            return Ok(self.output.json(&failure.to_json())?);
+        }
+        eprintln!("nodectl: {}", visible_lines(&failure.to_string()));
+        Ok(())
     }
 
     /// Prints a result.

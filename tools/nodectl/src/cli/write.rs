@@ -10,6 +10,7 @@ use eds::DataType;
 use super::read::{Reading, parse_type};
 use super::{Failure, Session};
 use crate::object::Place;
+use crate::quantity::Quantity;
 use crate::value::Value;
 
 /// Writes an object, and prints what was written.
@@ -18,7 +19,8 @@ pub(super) struct Write {
     /// Object by index (1017, 0x1018sub1) or by name ("Producer heartbeat time").
     object: String,
 
-    /// The value: decimal or after 0x hexadecimal; text; bytes as pairs of hexadecimal digits.
+    /// The value: decimal or after 0x hexadecimal; text; bytes as pairs of hexadecimal digits. An integer that stands for a
+    /// value in a unit is taken as that value where it has a point (2.5).
     #[arg(required_unless_present = "file", conflicts_with = "file", allow_hyphen_values = true)]
     value: Option<String>,
 
@@ -41,7 +43,8 @@ impl Write {
         let at = session.find(node, &self.object)?;
         let catalogue = session.catalogue(node)?;
         let data_type = self.data_type.or_else(|| catalogue.data_type(at));
-        let bytes = self.bytes(at, data_type)?;
+        let quantity = Quantity::of(&mut session.client(node), &catalogue, at)?;
+        let bytes = self.bytes(at, data_type, &quantity)?;
         let mut client = session.client(node);
         let written = if self.block {
             client.block_download(at, &bytes, |_| ())
@@ -49,11 +52,17 @@ impl Write {
             client.download(at, &bytes, |_| ())
         };
         written.map_err(|error| session.named(error))?;
-        let unit = crate::unit::of(&mut session.client(node), &catalogue, at)?;
-        session.print(&Reading::new(node.get(), at, &bytes, &catalogue, unit, data_type))
+        // A unit that was written is in force now.
+        let quantity = Quantity::of(&mut session.client(node), &catalogue, at)?;
+        session.print(&Reading::new(node.get(), at, &bytes, &catalogue, &quantity, data_type))
     }
 
-    fn bytes(&self, at: Multiplexer, data_type: Option<DataType>) -> Result<Vec<u8>, Failure> {
+    fn bytes(
+        &self,
+        at: Multiplexer,
+        data_type: Option<DataType>,
+        quantity: &Quantity,
+    ) -> Result<Vec<u8>, Failure> {
         if let Some(path) = &self.file {
             return fs::read(path).map_err(|error| Failure::file(path, error));
         }
@@ -61,7 +70,9 @@ impl Write {
         let data_type = data_type.ok_or_else(|| {
             Failure::Usage(format!("no data sheet tells the type of {}: give it with --type", Place(at)))
         })?;
-        match Value::parse(text, data_type) {
+        // A number with a point is the value as it is meant; without one it is the number on the wire.
+        let text = quantity.number(text).map_or_else(|| text.to_owned(), |number| number.to_string());
+        match Value::parse(&text, data_type) {
             Ok(value) => Ok(value.encode(data_type)),
             Err(error) => Err(Failure::Usage(format!("{}: {error}", Place(at)))),
         }

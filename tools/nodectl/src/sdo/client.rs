@@ -106,7 +106,7 @@ impl<'n> Client<'n> {
     {
         let result = self.network.run_with(service, progress);
         let result = result.map_err(Cause::from).and_then(|result| result.map_err(Cause::from));
-        result.map_err(|cause| Error { node: self.node, at, name: None, cause })
+        result.map_err(|cause| Error { node: self.node, at, name: None, hint: None, cause })
     }
 }
 

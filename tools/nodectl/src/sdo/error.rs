@@ -20,6 +20,8 @@ pub struct Error {
     pub at: Multiplexer,
     /// Its name, where it is known.
     pub name: Option<String>,
+    /// What helps, where that is known.
+    pub hint: Option<String>,
     /// Why.
     #[source]
     pub cause: Cause,
@@ -66,6 +68,7 @@ impl fmt::Display for Error {
         if let Some(name) = &self.name {
             write!(f, " \"{name}\"")?;
         }
-        write!(f, ": {}", self.cause)
+        write!(f, ": {}", self.cause)?;
+        self.hint.iter().try_for_each(|hint| write!(f, "; {hint}"))
     }
 }

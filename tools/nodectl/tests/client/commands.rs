@@ -27,7 +27,7 @@ pub(crate) fn printed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: 
 }
 
 pub(crate) fn failed<S: nodectl::bus::Station + 'static>(wire: &Wire<S>, line: &[&str]) -> (u8, String) {
-    let failure = run(wire, line).1.expect_err("a failure");
+    let failure = run(wire, line).1.expect_err(&format!("{line:?} fails"));
     (failure.exit_code(), failure.to_string())
 }
 
@@ -79,7 +79,11 @@ fn write_is_checked_here_and_there() {
     let refused = failed(&wire, &["write", "1019", "250"]);
     assert_eq!(
         refused,
-        (1, "node 1, 1019h:0 \"Synchronous counter overflow value\": 0609 0031h, value too high".to_owned())
+        (
+            1,
+            "node 1, 1019h:0 \"Synchronous counter overflow value\": 0609 0031h, value too high; it takes 0 to 240"
+                .to_owned()
+        )
     );
 }
 

@@ -1,10 +1,12 @@
 //! The library against nodes in this process, in virtual time.
 
+mod bad_input;
 mod blocks;
 mod commands;
 mod hostile;
 mod loader;
 mod lss;
+mod meanings;
 mod pressure;
 mod process;
 mod safety;

@@ -82,11 +82,16 @@ impl Source {
 #[derive(Serialize)]
 struct Line<'a> {
     time: f64,
+    node: u8,
     #[serde(rename = "object", serialize_with = "place")]
     at: Multiplexer,
-    name: &'a str,
+    name: Option<&'a str>,
+    #[serde(rename = "type")]
+    data_type: String,
     value: &'a Value,
     unit: &'a str,
+    #[serde(skip)]
+    short: &'a str,
 }
 
 impl Monitor {
@@ -103,6 +108,7 @@ impl Monitor {
     }
 
     fn print_lines(&self, session: &mut Session) -> Result<(), Failure> {
+        let node = session.options.node.one()?.get();
         let (mut acquisition, output) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
         let (mut start, mut left, mut hinted) = (None, self.count.unwrap_or(usize::MAX), false);
@@ -114,26 +120,29 @@ impl Monitor {
                 continue;
             };
             let start = *start.get_or_insert(sample.at);
-            output.print(&line(&signals[sample.signal], &sample, start))?;
+            output.print(&line(node, &signals[sample.signal], &sample, start))?;
             left -= 1;
         }
         Ok(())
     }
 }
 
-fn line<'a>(signal: &'a Signal, sample: &'a Sample, start: Instant) -> Line<'a> {
+fn line<'a>(node: u8, signal: &'a Signal, sample: &'a Sample, start: Instant) -> Line<'a> {
     Line {
         time: super::record::seconds_between(start, sample.at),
+        node,
         at: signal.at,
-        name: &signal.name,
+        name: signal.path.as_deref(),
+        data_type: signal.data_type(&sample.value),
         value: &sample.value,
         unit: &signal.unit,
+        short: &signal.name,
     }
 }
 
 impl fmt::Display for Line<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Line { time, at, name, value, unit } = self;
-        write!(f, "{time:10.6} {} {name} = {} {unit}", Place(*at), visible(&value.to_string()))
+        let Line { time, at, short, value, unit, .. } = self;
+        write!(f, "{time:10.6} {} {short} = {} {unit}", Place(*at), visible(&value.to_string()))
     }
 }

@@ -1,0 +1,58 @@
+//! [`Frame`] as a frame of embedded-can, for drivers that speak it.
+
+use embedded_can::{Frame as Driver, Id, StandardId};
+
+use crate::Frame;
+
+/// Base frames only: an extended identifier gives `None`.
+impl Driver for Frame {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Frame> {
+        match id.into() {
+            Id::Standard(id) => Frame::new(id.as_raw(), data),
+            Id::Extended(_) => None,
+        }
+    }
+
+    fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Frame> {
+        match id.into() {
+            Id::Standard(id) => Frame::remote(id.as_raw(), u8::try_from(dlc).ok()?),
+            Id::Extended(_) => None,
+        }
+    }
+
+    fn is_extended(&self) -> bool {
+        false
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        self.is_remote()
+    }
+
+    fn id(&self) -> Id {
+        Id::Standard(StandardId::new(Frame::id(self)).unwrap_or(StandardId::ZERO))
+    }
+
+    fn dlc(&self) -> usize {
+        self.len()
+    }
+
+    fn data(&self) -> &[u8] {
+        Frame::data(self)
+    }
+}
+
+/// A frame of a driver; `None` for an extended identifier, which CANopen does not use here.
+pub fn from_driver(frame: &impl Driver) -> Option<Frame> {
+    if frame.is_remote_frame() {
+        <Frame as Driver>::new_remote(frame.id(), frame.dlc())
+    } else {
+        <Frame as Driver>::new(frame.id(), frame.data())
+    }
+}
+
+/// The frame of a driver.
+#[must_use]
+pub fn to_driver<F: Driver>(frame: &Frame) -> Option<F> {
+    let id = StandardId::new(frame.id())?;
+    if frame.is_remote() { F::new_remote(id, frame.len()) } else { F::new(id, frame.data()) }
+}

@@ -1,0 +1,318 @@
+//! The objects of CiA 301 and 302 as rows, ready for a table.
+//!
+//! Each function gives one row or the rows of one object. [`rows!`](crate::rows!) puts them in order. What an object does
+//! follows from its index, so a row cannot lack its rule; what it is by default is said here.
+//!
+//! ```
+//! use canopen::dictionary::{Access, Dictionary, Mapping, Object, Type};
+//! use canopen::objects;
+//!
+//! const INPUTS: Object =
+//!     Object::new(0x6000, 1, "Inputs 1 to 8", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo);
+//!
+//! const ROWS: &[Object] = canopen::rows!(
+//!     [objects::device_type(0x0001_0191), objects::error_register()],
+//!     objects::identity(0, 1, 0x0001_0000),
+//!     [objects::heartbeat_producer(1000)],
+//!     objects::tpdo(1, &[INPUTS]),
+//!     [Object::highest(0x6000, 1, "Read inputs"), INPUTS],
+//! );
+//! static DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
+//!
+//! assert_eq!(DICTIONARY.find(0x1A00, 1).map(|entry| entry.index()), Ok(0x1A00));
+//! ```
+
+use crate::dictionary::{Access, DefaultValue, Group, Object, Type};
+use crate::pdo::MappedObject;
+
+/// A value that the device gives.
+const fn fixed(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadOnly)
+}
+
+/// A communication parameter.
+const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Communication)
+}
+
+/// A command that reads 1.
+const fn command(index: u16, sub: u8, name: &'static str) -> Object {
+    Object::new(index, sub, name, Type::Unsigned32, Access::ReadWrite).value(1)
+}
+
+/// An object of `N` rows: the number of entries, and the same entry again and again.
+const fn list<const N: usize>(number: Object, entry: Object) -> [Object; N] {
+    let mut rows = [entry; N];
+    rows[0] = number;
+    let mut sub = 1;
+    while sub < N {
+        rows[sub].sub = sub as u8;
+        // A rule may depend on the sub-index.
+        rows[sub] = Object {
+            rule: Object::new(entry.index, sub as u8, "", entry.kind, entry.access).rule,
+            ..rows[sub]
+        };
+        sub += 1;
+    }
+    rows
+}
+
+/// 1000h: the device profile in the low word, what of it the device has in the high word.
+#[must_use]
+pub const fn device_type(code: u32) -> Object {
+    fixed(0x1000, 0, "Device type", Type::Unsigned32).value(code as i64)
+}
+
+/// 1001h.
+#[must_use]
+pub const fn error_register() -> Object {
+    fixed(0x1001, 0, "Error register", Type::Unsigned8)
+}
+
+/// 1003h with room for `N` - 1 errors, at most ten.
+///
+/// # Panics
+/// During compilation, for more.
+#[must_use]
+pub const fn error_field<const N: usize>() -> [Object; N] {
+    assert!(N >= 2 && N <= 11, "the list has one to ten errors");
+    let number = Object::new(0x1003, 0, "Pre-defined error field", Type::Unsigned8, Access::ReadWrite);
+    list(number, fixed(0x1003, 1, "Standard error field", Type::Unsigned32))
+}
+
+/// 1005h, 1006h, 1007h and 1019h: the SYNC with CAN-ID 80h and without counter, period and window.
+#[must_use]
+pub const fn sync_consumer() -> [Object; 4] {
+    [
+        parameter(0x1005, 0, "COB-ID SYNC", Type::Unsigned32).value(0x80),
+        parameter(0x1006, 0, "Communication cycle period", Type::Unsigned32).unit("us"),
+        parameter(0x1007, 0, "Synchronous window length", Type::Unsigned32).unit("us"),
+        parameter(0x1019, 0, "Synchronous counter overflow value", Type::Unsigned8).limits(0, 240),
+    ]
+}
+
+/// A text of at most `capacity` characters; an empty one is filled in by the application.
+const fn text(index: u16, name: &'static str, capacity: u8, text: &'static str) -> Object {
+    Object::new(index, 0, name, Type::VisibleString(capacity), Access::Const)
+        .default(DefaultValue::Text(text))
+}
+
+/// 1008h, at most 32 characters.
+#[must_use]
+pub const fn device_name(name: &'static str) -> Object {
+    text(0x1008, "Manufacturer device name", 32, name)
+}
+
+/// 1009h, at most 32 characters. The application fills in an empty one.
+#[must_use]
+pub const fn hardware_version(version: &'static str) -> Object {
+    text(0x1009, "Manufacturer hardware version", 32, version)
+}
+
+/// 100Ah, at most 50 characters. The application fills in an empty one.
+#[must_use]
+pub const fn software_version(version: &'static str) -> Object {
+    text(0x100A, "Manufacturer software version", 50, version)
+}
+
+/// 1010h: store all, the communication and the application parameters.
+#[must_use]
+pub const fn store_parameters() -> [Object; 4] {
+    [
+        Object::new(0x1010, 0, "Store parameters", Type::Unsigned8, Access::Const).value(3),
+        command(0x1010, 1, "Save all"),
+        command(0x1010, 2, "Save communication"),
+        command(0x1010, 3, "Save application"),
+    ]
+}
+
+/// 1011h: restore the defaults of the same groups.
+#[must_use]
+pub const fn restore_parameters() -> [Object; 4] {
+    [
+        Object::new(0x1011, 0, "Restore default parameters", Type::Unsigned8, Access::Const).value(3),
+        command(0x1011, 1, "Restore all"),
+        command(0x1011, 2, "Restore communication"),
+        command(0x1011, 3, "Restore application"),
+    ]
+}
+
+/// 1014h and 1015h: EMCY with CAN-ID 80h plus the node-ID, and no inhibit time.
+#[must_use]
+pub const fn emergency() -> [Object; 2] {
+    [
+        parameter(0x1014, 0, "COB-ID EMCY", Type::Unsigned32).default(DefaultValue::NodeId(0x80)),
+        parameter(0x1015, 0, "Inhibit time EMCY", Type::Unsigned16).unit("100 us"),
+    ]
+}
+
+/// 1016h for `N` - 1 nodes, at most 127.
+///
+/// # Panics
+/// During compilation, for more.
+#[must_use]
+pub const fn heartbeat_consumer<const N: usize>() -> [Object; N] {
+    assert!(N >= 2 && N <= 128, "one to 127 nodes are watched");
+    let number = Object::highest(0x1016, (N - 1) as u8, "Consumer heartbeat time");
+    list(number, parameter(0x1016, 1, "Watched node and time", Type::Unsigned32))
+}
+
+/// 1017h, in ms; 0 for no heartbeat.
+#[must_use]
+pub const fn heartbeat_producer(period: u16) -> Object {
+    parameter(0x1017, 0, "Producer heartbeat time", Type::Unsigned16).value(period as i64).unit("ms")
+}
+
+/// 1018h. The serial number, sub-index 4, is the application's to fill in.
+#[must_use]
+pub const fn identity(vendor: u32, product: u32, revision: u32) -> [Object; 5] {
+    [
+        Object::highest(0x1018, 4, "Identity"),
+        fixed(0x1018, 1, "Vendor-ID", Type::Unsigned32).value(vendor as i64),
+        fixed(0x1018, 2, "Product code", Type::Unsigned32).value(product as i64),
+        fixed(0x1018, 3, "Revision number", Type::Unsigned32).value(revision as i64),
+        fixed(0x1018, 4, "Serial number", Type::Unsigned32),
+    ]
+}
+
+/// 1029h for communication errors and for those of the device: 0 leads to Pre-operational, 1 changes nothing, 2 leads to
+/// Stopped. The first is 0 by default, the second what is given.
+#[must_use]
+pub const fn error_behaviour(device_error: u8) -> [Object; 3] {
+    [
+        Object::highest(0x1029, 2, "Error behaviour"),
+        // 255 is refused, 3 to 254 are kept and change nothing.
+        parameter(0x1029, 1, "Communication error", Type::Unsigned8).limits(0, 254),
+        parameter(0x1029, 2, "Device error", Type::Unsigned8).limits(0, 2).value(device_error as i64),
+    ]
+}
+
+/// 1F80h: 8 makes the device start by itself.
+#[must_use]
+pub const fn start_up() -> Object {
+    parameter(0x1F80, 0, "NMT start-up", Type::Unsigned32)
+}
+
+/// The default COB-ID of a PDO: one of the four of the pre-defined connection set (CiA 301, 7.3.5); any other is off.
+const fn cob_id(base: u32, number: u16, is_on: bool) -> DefaultValue {
+    let off = if is_on { 0 } else { 1 << 31 };
+    match number {
+        1..=4 => DefaultValue::NodeId(off + base + 0x100 * (number as u32 - 1)),
+        _ => DefaultValue::Integer(1 << 31),
+    }
+}
+
+/// An RPDO, 1 to 512, taken when it comes: 1400h + `number` - 1 and 1600h + `number` - 1. It writes these objects and has
+/// eight places for them; without objects it is off.
+///
+/// # Panics
+/// During compilation, for a number that no RPDO has, and for objects that do not fit.
+#[must_use]
+pub const fn rpdo(number: u16, objects: &[Object]) -> [Object; 13] {
+    assert!(number >= 1 && number <= 512, "an RPDO has a number from 1 to 512");
+    let index = 0x1400 + number - 1;
+    let mapped = mapping(index + 0x200, "RPDO mapping parameter", objects, false);
+    [
+        Object::highest(index, 5, "RPDO communication parameter"),
+        parameter(index, 1, "COB-ID", Type::Unsigned32).default(cob_id(0x200, number, !objects.is_empty())),
+        parameter(index, 2, "Transmission type", Type::Unsigned8).value(255),
+        parameter(index, 5, "Event timer", Type::Unsigned16).unit("ms"),
+        mapped[0],
+        mapped[1],
+        mapped[2],
+        mapped[3],
+        mapped[4],
+        mapped[5],
+        mapped[6],
+        mapped[7],
+        mapped[8],
+    ]
+}
+
+/// A TPDO, 1 to 512, sent with every change of these objects: 1800h + `number` - 1 and 1A00h + `number` - 1. It has eight
+/// places for objects; without objects it is off.
+///
+/// # Panics
+/// During compilation, for a number that no TPDO has, and for objects that do not fit.
+#[must_use]
+pub const fn tpdo(number: u16, objects: &[Object]) -> [Object; 15] {
+    assert!(number >= 1 && number <= 512, "a TPDO has a number from 1 to 512");
+    let index = 0x1800 + number - 1;
+    let mapped = mapping(index + 0x200, "TPDO mapping parameter", objects, true);
+    [
+        Object::highest(index, 6, "TPDO communication parameter"),
+        parameter(index, 1, "COB-ID", Type::Unsigned32).default(cob_id(0x180, number, !objects.is_empty())),
+        parameter(index, 2, "Transmission type", Type::Unsigned8).value(255),
+        parameter(index, 3, "Inhibit time", Type::Unsigned16).unit("100 us"),
+        parameter(index, 5, "Event timer", Type::Unsigned16).unit("ms"),
+        parameter(index, 6, "SYNC start value", Type::Unsigned8).limits(0, 240),
+        mapped[0],
+        mapped[1],
+        mapped[2],
+        mapped[3],
+        mapped[4],
+        mapped[5],
+        mapped[6],
+        mapped[7],
+        mapped[8],
+    ]
+}
+
+const fn mapping(index: u16, name: &'static str, objects: &[Object], is_sent: bool) -> [Object; 9] {
+    assert!(objects.len() <= 8, "a PDO has eight places");
+    let number = parameter(index, 0, name, Type::Unsigned8).value(objects.len() as i64);
+    let mut rows: [Object; 9] = list(number, parameter(index, 1, "Mapped object", Type::Unsigned32));
+    let (mut i, mut len) = (0, 0);
+    while i < objects.len() {
+        let (object, mapping) = (&objects[i], objects[i].mapping);
+        assert!(!is_sent || mapping.allows_tpdo(), "an object cannot be mapped into a TPDO");
+        assert!(is_sent || mapping.allows_rpdo(), "an object cannot be mapped into an RPDO");
+        len += object.kind.size();
+        let mapped = MappedObject { index: object.index, sub: object.sub, bits: object.kind.size() * 8 };
+        rows[i + 1] = rows[i + 1].value(mapped.encode() as i64);
+        i += 1;
+    }
+    assert!(len <= 8, "the objects are longer than a PDO");
+    rows
+}
+
+/// The default of a row of a PDO's communication parameter replaced: for a transmission type (`sub` 2), an inhibit time
+/// (3, TPDO only) or an event timer (5) of its own.
+///
+/// # Panics
+/// During compilation, when there is no such row.
+#[must_use]
+pub const fn with<const N: usize>(mut rows: [Object; N], sub: u8, value: i64) -> [Object; N] {
+    let mut i = 0;
+    while rows[i].sub != sub || rows[i].index != rows[0].index {
+        i += 1;
+    }
+    rows[i] = rows[i].value(value);
+    rows
+}
+
+/// Sorts rows by index and sub-index.
+#[must_use]
+pub const fn sorted<const N: usize>(mut rows: [Object; N]) -> [Object; N] {
+    let mut end = 1;
+    while end < N {
+        let mut at = end;
+        while at > 0 && rows[at - 1].key() > rows[at].key() {
+            (rows[at - 1], rows[at]) = (rows[at], rows[at - 1]);
+            at -= 1;
+        }
+        end += 1;
+    }
+    rows
+}
+
+/// A table of rows from its parts, in any order: arrays and slices of [`Object`](crate::dictionary::Object).
+#[macro_export]
+macro_rules! rows {
+    ($($part:expr),+ $(,)?) => {{
+        const PARTS: &[&[$crate::dictionary::Object]] = &[$(&$part),+];
+        const SORTED: [$crate::dictionary::Object; $crate::dictionary::count(PARTS)] =
+            $crate::objects::sorted($crate::dictionary::gather(PARTS));
+        &SORTED as &[$crate::dictionary::Object]
+    }};
+}

@@ -1,0 +1,107 @@
+//! Numbers that stand for something: units, emergency error codes, status bits.
+
+use canopen::sdo::Multiplexer;
+
+use crate::Catalogue;
+use crate::unit::symbol;
+use crate::value::Value;
+
+/// What the value of an object says in words; `None` where the number says all.
+#[must_use]
+pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<String> {
+    if let Value::Real32(number) = value {
+        return number.is_nan().then(|| "no valid value".to_owned());
+    }
+    let Value::Integer(number) = value else { return None };
+    let name = catalogue.name(at).unwrap_or_default().to_lowercase();
+    if at.index == 0x1003 && at.sub > 0 {
+        let code = u16::try_from(number & 0xFFFF).ok()?;
+        return Some(format!("{code:04X}h {}", error_code(code)));
+    }
+    if at.sub > 0 && name.contains("physical unit") {
+        return Some(symbol(u32::try_from(*number).ok()?));
+    }
+    (at.sub > 0 && name.contains("ai status")).then(|| status(*number))
+}
+
+/// Status of an analogue input (CiA 404, 6150h).
+fn status(bits: i128) -> String {
+    let words = [(1, "not valid"), (2, "positive overload"), (4, "negative overload")];
+    let set: Vec<&str> = words.into_iter().filter(|(bit, _)| bits & bit != 0).map(|(_, word)| word).collect();
+    if set.is_empty() { "valid".to_owned() } else { set.join(", ") }
+}
+
+/// Emergency error codes (CiA 301, table 26): those with a name of their own, then the classes.
+const CODES: [(u16, u16, &str); 31] = [
+    (0x8110, 0xFFFF, "CAN overrun"),
+    (0x8120, 0xFFFF, "error passive"),
+    (0x8130, 0xFFFF, "heartbeat or life guarding error"),
+    (0x8140, 0xFFFF, "recovered from bus-off"),
+    (0x8150, 0xFFFF, "CAN-ID collision"),
+    (0x8210, 0xFFFF, "PDO not processed because of its length"),
+    (0x8220, 0xFFFF, "PDO length exceeded"),
+    (0x8230, 0xFFFF, "MPDO not processed"),
+    (0x8240, 0xFFFF, "unexpected SYNC data length"),
+    (0x8250, 0xFFFF, "RPDO time-out"),
+    (0x0000, 0xFF00, "no error"),
+    (0x1000, 0xFF00, "generic error"),
+    (0x2100, 0xFF00, "current at the input"),
+    (0x2200, 0xFF00, "current inside the device"),
+    (0x2300, 0xFF00, "current at the output"),
+    (0x3100, 0xFF00, "mains voltage"),
+    (0x3200, 0xFF00, "voltage inside the device"),
+    (0x3300, 0xFF00, "output voltage"),
+    (0x4100, 0xFF00, "ambient temperature"),
+    (0x4200, 0xFF00, "device temperature"),
+    (0x5000, 0xFF00, "device hardware"),
+    (0x6100, 0xFF00, "internal software"),
+    (0x6200, 0xFF00, "user software"),
+    (0x6300, 0xFF00, "data set"),
+    (0x7000, 0xFF00, "additional modules"),
+    (0x8100, 0xFF00, "communication"),
+    (0x8200, 0xFF00, "protocol error"),
+    (0x8000, 0xF000, "monitoring"),
+    (0x9000, 0xFF00, "external error"),
+    (0xF000, 0xFF00, "additional functions"),
+    (0xFF00, 0xFF00, "device specific"),
+];
+
+/// An emergency error code in words.
+#[must_use]
+pub fn error_code(code: u16) -> &'static str {
+    CODES.iter().find(|row| code & row.1 == row.0).map_or("not defined by CiA 301", |row| row.2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::at;
+
+    #[test]
+    fn codes_in_words() {
+        for (code, words) in [
+            (0x0000, "no error"),
+            (0x1000, "generic error"),
+            (0x8130, "heartbeat or life guarding error"),
+            (0x8199, "communication"),
+            (0x6302, "data set"),
+            (0x7ABC, "not defined by CiA 301"),
+        ] {
+            assert_eq!(error_code(code), words, "{code:04X}h");
+        }
+    }
+
+    #[test]
+    fn what_numbers_of_a_pressure_transmitter_say() {
+        let catalogue = Catalogue::of_file("pressure.eds").expect("a data sheet");
+        let says = |index, sub, number| of(&catalogue, at(index, sub), &Value::Integer(number));
+        assert_eq!(says(0x6131, 1, 0xFD4E_0000).as_deref(), Some("mbar"));
+        assert_eq!(says(0x6150, 1, 0).as_deref(), Some("valid"));
+        assert_eq!(says(0x6150, 1, 3).as_deref(), Some("not valid, positive overload"));
+        assert_eq!(says(0x1003, 1, 0x0001_8130).as_deref(), Some("8130h heartbeat or life guarding error"));
+        assert_eq!(says(0x6131, 0, 2), None);
+        assert_eq!(says(0x1017, 0, 1000), None);
+        let nan = of(&catalogue, at(0x6130, 1), &Value::Real32(f32::NAN));
+        assert_eq!(nan.as_deref(), Some("no valid value"));
+    }
+}

@@ -1,0 +1,170 @@
+//! What the number of an object means: its unit and where its decimal point is.
+
+use canopen::sdo::Multiplexer;
+use eds::Class;
+
+use crate::Catalogue;
+use crate::object::at;
+use crate::sdo::{Client, Error};
+use crate::unit::symbol;
+use crate::value::Value;
+
+/// The unit of a value, and what its number is multiplied with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Quantity {
+    /// The unit; empty where there is none.
+    pub unit: String,
+    /// What the number is multiplied with; `None` where it is the value.
+    scale: Option<Scale>,
+}
+
+/// Times `factor`, the point so many digits from the right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Scale {
+    factor: u32,
+    digits: u8,
+}
+
+impl Quantity {
+    /// A number that is the value.
+    #[must_use]
+    pub fn plain(unit: &str) -> Quantity {
+        Quantity { unit: unit.to_owned(), scale: None }
+    }
+
+    /// What the data sheet says, or the objects of the node that it names: the unit (6131h in CiA 404) and the decimal
+    /// digits beside it (6132h), or a measuring step (6384h in CiA 417).
+    ///
+    /// # Errors
+    /// Those of SDO, but for a node that has no such object.
+    pub fn of(client: &mut Client, catalogue: &Catalogue, of: Multiplexer) -> Result<Quantity, Error> {
+        let unit = catalogue.unit(of);
+        let Some(told_by) = eds::address(unit) else { return Ok(Quantity::plain(unit)) };
+        let step = catalogue.unit(told_by);
+        if !step.is_empty() {
+            let steps = word(client, told_by)?.unwrap_or(1);
+            return Ok(Quantity::of_steps(steps, step));
+        }
+        let Some(code) = word(client, at(told_by.index, of.sub))? else { return Ok(Quantity::default()) };
+        let digits = match digits_object(catalogue, told_by.index, of) {
+            Some(object) => word(client, object)?.unwrap_or(0),
+            None => 0,
+        };
+        Ok(Quantity { unit: symbol(code), scale: Scale::new(1, digits) })
+    }
+
+    /// So many steps of `10 um` or `0.1 mm/s`.
+    fn of_steps(steps: u32, step: &str) -> Quantity {
+        let (number, unit) = step.split_once(' ').unwrap_or(("1", step));
+        let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
+        let factor = format!("{whole}{fraction}").parse::<u32>().unwrap_or(1).saturating_mul(steps);
+        let digits = u32::try_from(fraction.len()).unwrap_or(0);
+        let (unit, digits) = if unit == "um" { ("mm", digits + 3) } else { (unit, digits) };
+        Quantity { unit: unit.to_owned(), scale: Scale::new(factor, digits) }
+    }
+
+    /// The value as it is meant.
+    #[must_use]
+    pub fn apply(&self, value: Value) -> Value {
+        match (self.scale, value) {
+            (Some(Scale { factor, digits }), Value::Integer(number)) => {
+                Value::Decimal(number.saturating_mul(factor.into()), digits)
+            }
+            (_, value) => value,
+        }
+    }
+
+    /// The number of a value that is given with a point, as `2.5`; `None` for any other text, and where the number is the
+    /// value.
+    #[must_use]
+    pub fn number(&self, text: &str) -> Option<i128> {
+        let Scale { factor, digits } = self.scale?;
+        let (whole, fraction) = text.trim().split_once('.')?;
+        let missing = usize::from(digits).checked_sub(fraction.len())?;
+        let all = format!("{whole}{fraction}{}", "0".repeat(missing));
+        let mantissa: i128 = all.parse().ok()?;
+        (mantissa % i128::from(factor) == 0).then_some(mantissa / i128::from(factor))
+    }
+}
+
+impl Scale {
+    /// `None` for the scale that changes nothing. Zeros behind the point that are always there are left out.
+    fn new(mut factor: u32, digits: u32) -> Option<Scale> {
+        let mut digits = u8::try_from(digits.min(38)).unwrap_or(38);
+        while digits > 0 && factor != 0 && factor.is_multiple_of(10) {
+            (factor, digits) = (factor / 10, digits - 1);
+        }
+        (factor != 0 && (factor, digits) != (1, 0)).then_some(Scale { factor, digits })
+    }
+}
+
+/// The object with the decimal digits of an integer: beside the unit, where the data sheet says that it is that.
+fn digits_object(catalogue: &Catalogue, unit: u16, of: Multiplexer) -> Option<Multiplexer> {
+    let object = at(unit.checked_add(1)?, of.sub);
+    let is_integer = matches!(catalogue.data_type(of)?.class(), Class::Signed(_) | Class::Unsigned(_));
+    let name = catalogue.entry(object)?.name.to_lowercase();
+    (is_integer && name.contains("decimal digits")).then_some(object)
+}
+
+/// A number of up to four bytes; `None` where the node has none for us.
+fn word(client: &mut Client, at: Multiplexer) -> Result<Option<u32>, Error> {
+    match client.upload(at) {
+        Ok(bytes) => Ok(Some(bytes.iter().take(4).rev().fold(0, |word, &byte| word << 8 | u32::from(byte)))),
+        Err(error) if error.abort().is_some() => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quantity(factor: u32, digits: u32) -> Quantity {
+        Quantity { unit: "bar".to_owned(), scale: Scale::new(factor, digits) }
+    }
+
+    #[test]
+    fn the_point_is_where_the_digits_say() {
+        for (number, digits, text) in [
+            (250, 2, "2.50"),
+            (-250, 2, "-2.50"),
+            (5, 2, "0.05"),
+            (-5, 2, "-0.05"),
+            (0, 2, "0.00"),
+            (7, 0, "7"),
+            (1, 38, "0.00000000000000000000000000000000000001"),
+        ] {
+            let value = quantity(1, digits).apply(Value::Integer(number));
+            assert_eq!(value.to_string(), text);
+            assert_eq!(value.as_f64(), Some(text.parse().unwrap()));
+        }
+        assert_eq!(quantity(1, 2).apply(Value::Real32(2.5)), Value::Real32(2.5));
+    }
+
+    #[test]
+    fn steps_are_multiplied() {
+        for (steps, step, number, text) in [
+            (100, "10 um", 3000, "3000 mm"),
+            (50, "10 um", 3, "1.5 mm"),
+            (10, "0.1 mm/s", 7, "7 mm/s"),
+            (1, "ms", 9, "9 ms"),
+        ] {
+            let quantity = Quantity::of_steps(steps, step);
+            let value = quantity.apply(Value::Integer(number));
+            assert_eq!(format!("{value} {}", quantity.unit), text);
+        }
+    }
+
+    #[test]
+    fn a_number_with_a_point_is_the_value() {
+        let quantity = quantity(1, 2);
+        for (text, number) in
+            [("2.5", Some(250)), ("-0.05", Some(-5)), ("2.505", None), ("2", None), ("x.1", None)]
+        {
+            assert_eq!(quantity.number(text), number, "{text}");
+        }
+        assert_eq!(Quantity::plain("ms").number("2.0"), None);
+        assert_eq!(Quantity::of_steps(50, "10 um").number("1.5"), Some(3));
+        assert_eq!(Quantity::of_steps(50, "10 um").number("1.7"), None);
+    }
+}
