@@ -10,7 +10,8 @@ use bsp::losses::{EVENTS, Event, Losses};
 use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
-use node::{Action, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
+use node::fault::{PARAMETER_STORE, UNEXPECTED_RESET};
+use node::{Action, BusEvent, Next, NodeId, Parameters, Protocol};
 
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
@@ -136,9 +137,7 @@ impl Services {
 
     /// Listens for the bit rate; goes on the bus when it is found.
     fn search(&mut self, node: &mut impl Shared) {
-        let has_frame = self.frames.dequeue().is_some();
-        if self.rate.go_on(&mut self.can, has_frame, Clock::now()) {
-            while self.frames.dequeue().is_some() {}
+        if self.rate.go_on(&mut self.can, &mut self.frames, Clock::now()) {
             let next = self.join(node);
             let _ = self.settle(next, node);
         }
@@ -224,7 +223,7 @@ impl Services {
     fn go_on_bus(&mut self, node: &mut impl Shared) -> bool {
         node.call(|_, queue| queue.clear());
         let Rate::Known(timing) = self.rate else {
-            self.rate.search(&mut self.can, Clock::now());
+            self.rate.search(&mut self.can, &mut self.frames, Clock::now());
             return false;
         };
         defmt::info!("on the bus at {=u16} kbit/s", timing.kbit());
@@ -244,10 +243,10 @@ impl Services {
     fn report_findings(&mut self, node: &mut impl Shared) {
         let Findings { crashed, no_store } = self.findings;
         self.findings.crashed = false;
-        for (fault, found) in [(Fault::UnexpectedReset, crashed), (Fault::ParameterStore, no_store)] {
+        for (fault, found) in [(UNEXPECTED_RESET, crashed), (PARAMETER_STORE, no_store)] {
             if found {
                 // The message goes out with the next poll.
-                let _ = node.call(|protocol, _| protocol.set_fault(fault, true, Clock::now()));
+                let _ = node.call(|protocol, _| protocol.set_fault(&fault, true, Clock::now()));
             }
         }
     }

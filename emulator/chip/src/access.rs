@@ -39,17 +39,18 @@ impl Stm32f4 {
         Ok(value)
     }
 
-    /// A store by the core.
+    /// A store by the core; whether more may have changed than what was stored.
     pub(crate) fn core_store(
         &mut self,
         address: u32,
         size: u8,
         value: u32,
         now: Time,
-    ) -> Result<(), BusFault> {
-        let unit = map::find(self.variant, address).ok_or(BusFault)?.unit;
-        self.refresh(unit, now);
-        self.store(address, size, value, now)
+    ) -> Result<bool, BusFault> {
+        let block = map::find(self.variant, address).ok_or(BusFault)?;
+        self.refresh(block.unit, now);
+        self.store(address, size, value, now)?;
+        Ok(!block.unit.is_passive((address - block.base) & !3))
     }
 
     /// A load from a peripheral that is up to date.

@@ -1,5 +1,7 @@
 //! Which peripheral is at which address (RM0390 table 1, RM0090 table 1) and what gates its clock.
 
+use std::sync::LazyLock;
+
 use crate::backup_ram;
 use crate::clocks::Apb;
 use crate::dma::{Line, line};
@@ -77,6 +79,18 @@ const fn block(base: u32, name: &'static str, unit: Unit, gate: Option<Gate>) ->
 
 const fn absent(base: u32, name: &'static str, gate: Option<Gate>) -> Block {
     block(base, name, Unit::Absent, gate)
+}
+
+impl Unit {
+    /// Whether a store at this offset changes nothing that happens by itself, no interrupt line and nothing outside.
+    pub(crate) fn is_passive(self, offset: u32) -> bool {
+        match self {
+            Unit::Crc | Unit::BackupRam | Unit::Signature => true,
+            // ODR and BSRR.
+            Unit::Gpio(_) => matches!(offset, 0x14 | 0x18),
+            _ => false,
+        }
+    }
 }
 
 impl Block {
@@ -175,8 +189,34 @@ const BLOCKS: &[Block] = &[
     block(0xE004_2000, "DBGMCU", Unit::Dbgmcu, None),
 ];
 
+/// Where the peripherals of APB and AHB1 are, and the least length of a block there.
+const TABLE: std::ops::Range<u32> = 0x4000_0000..0x4004_0000;
+const STEP: u32 = 0x100;
+
+/// The blocks of a chip in these addresses, for a look-up in one step.
+type Table = Vec<Option<&'static Block>>;
+
 /// The block that answers at an address.
 pub(crate) fn find(variant: Variant, address: u32) -> Option<&'static Block> {
+    static TABLES: LazyLock<[Table; 3]> =
+        LazyLock::new(|| [Variant::F405, Variant::F407, Variant::F446].map(table));
+    if !TABLE.contains(&address) {
+        return search(variant, address);
+    }
+    let chip = match variant {
+        Variant::F405 => 0,
+        Variant::F407 => 1,
+        Variant::F446 => 2,
+    };
+    let block = TABLES[chip][((address - TABLE.start) / STEP) as usize]?;
+    (address - block.base < block.size).then_some(block)
+}
+
+fn table(variant: Variant) -> Table {
+    TABLE.step_by(STEP as usize).map(|address| search(variant, address)).collect()
+}
+
+fn search(variant: Variant, address: u32) -> Option<&'static Block> {
     let after = BLOCKS.partition_point(|block| block.base <= address);
     // At most two blocks share a base: those of different chips.
     let candidates = BLOCKS[..after].iter().rev().take(2);

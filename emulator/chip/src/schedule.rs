@@ -24,8 +24,9 @@ impl Peripherals for Stm32f4 {
 
     fn write(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault> {
         self.pass(now);
-        self.core_store(address, size, value, now)?;
-        self.settle(now);
+        if self.core_store(address, size, value, now)? {
+            self.settle(now);
+        }
         Ok(())
     }
 

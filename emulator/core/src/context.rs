@@ -128,7 +128,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         if !self.model().ram.contains(&top) {
             return Err(());
         }
-        self.cpu.mem_write(top.into(), &bytes).map_err(|_| ())
+        self.cpu.get_data_mut().memory.write(top, &bytes).ok_or(())
     }
 
     /// Ends the active exception: the core has branched to an EXC_RETURN value.

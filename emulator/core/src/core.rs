@@ -4,15 +4,18 @@
 use std::collections::VecDeque;
 
 use canbus::Time;
-use chip::{Effect, Memory, Peripherals};
+use chip::{Effect, Peripherals};
 
 use crate::cost::Costs;
 use crate::exception::Exception;
 use crate::mechanism::Mechanism;
+use crate::memory::Memory as Bytes;
+use crate::model::Model;
 use crate::nvic::{Masks, Nvic};
 use crate::profile::Profile;
 use crate::scb::Scb;
 use crate::stats::Stats;
+use crate::stepping::Stepping;
 use crate::systick::SysTick;
 
 /// Why the CPU library was stopped.
@@ -42,6 +45,7 @@ pub(crate) struct Unmapped {
 /// Everything but the registers and the memory.
 pub(crate) struct Core<P> {
     pub(crate) chip: P,
+    pub(crate) memory: Bytes,
     pub(crate) now: Time,
     /// Length of a core cycle.
     pub(crate) cycle: Time,
@@ -54,6 +58,8 @@ pub(crate) struct Core<P> {
     pub(crate) systick: SysTick,
     pub(crate) stats: Stats,
     pub(crate) profile: Profile,
+    /// Interrupts come between any two instructions.
+    pub(crate) stepping: Option<Stepping>,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
     pub(crate) effects: VecDeque<Effect>,
@@ -61,6 +67,8 @@ pub(crate) struct Core<P> {
     pub(crate) pended: [Time; Exception::COUNT],
     pub(crate) costs: Costs,
     pub(crate) reset_requested: bool,
+    /// The program has begun an exclusive access since the monitor was cleared.
+    pub(crate) exclusive: bool,
     /// The emulator itself runs code, not the program.
     pub(crate) clearing_monitor: bool,
     pub(crate) without: Option<Mechanism>,
@@ -79,9 +87,10 @@ struct Cyccnt {
 }
 
 impl<P: Peripherals> Core<P> {
-    pub(crate) fn new(chip: P) -> Core<P> {
+    pub(crate) fn new(chip: P, model: &Model) -> Core<P> {
         Core {
             chip,
+            memory: Bytes::new(model),
             now: Time::ZERO,
             cycle: Time::of_cycle(16_000_000),
             until: Time::ZERO,
@@ -91,12 +100,14 @@ impl<P: Peripherals> Core<P> {
             systick: SysTick::default(),
             stats: Stats::default(),
             profile: Profile::default(),
+            stepping: None,
             halt: None,
             unmapped: None,
             effects: VecDeque::new(),
             pended: [Time::ZERO; Exception::COUNT],
             costs: Costs::default(),
             reset_requested: false,
+            exclusive: false,
             clearing_monitor: false,
             without: None,
             flash_closed: false,
@@ -139,9 +150,9 @@ impl<P: Peripherals> Core<P> {
     }
 
     /// Lets everything due happen, and samples the interrupt lines.
-    pub(crate) fn advance(&mut self, memory: &dyn Memory) {
+    pub(crate) fn advance(&mut self) {
         if self.chip.deadline() <= self.now {
-            self.chip.advance(self.now, memory);
+            self.chip.advance(self.now, &self.memory);
         }
         if self.systick.advance(self.now) {
             self.pend(Exception::SYS_TICK);

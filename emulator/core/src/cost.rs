@@ -8,6 +8,8 @@
 pub(crate) struct Cost {
     pub(crate) instructions: u32,
     pub(crate) cycles: u32,
+    /// An exclusive access begins in it: LDREX, LDREXB or LDREXH.
+    pub(crate) exclusive: bool,
 }
 
 /// The costs of blocks that ran before, one place for each address modulo the size of the table.
@@ -58,11 +60,20 @@ fn of_block(code: &[u8]) -> Cost {
     while let Some(first) = halves.next() {
         cost.instructions += 1;
         cost.cycles += match first >> 11 {
-            0b11101..=0b11111 => wide(first, halves.next().unwrap_or(0)),
+            0b11101..=0b11111 => {
+                let second = halves.next().unwrap_or(0);
+                cost.exclusive |= begins_exclusive(first, second);
+                wide(first, second)
+            }
             _ => narrow(first),
         };
     }
     cost
+}
+
+/// LDREX, LDREXB or LDREXH (ARMv7-M, A5.3.6).
+fn begins_exclusive(first: u16, second: u16) -> bool {
+    first & 0xFFF0 == 0xE850 || first & 0xFFF0 == 0xE8D0 && matches!(second >> 4 & 0xF, 0b0100 | 0b0101)
 }
 
 /// A load takes two cycles, a store one.

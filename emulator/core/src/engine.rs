@@ -1,14 +1,16 @@
 //! The CPU library: memory map, hooks and registers. What it stops for is told in `Core::halt`.
 
 use chip::{Effect, Peripherals};
-use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, Unicorn};
+use unicorn_engine::{
+    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn, uc_error,
+};
 
 use crate::core::{Core, Halt, Unmapped};
 use crate::cost::Cost;
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::nvic::Masks;
-use crate::ppb;
+use crate::{ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
@@ -30,8 +32,14 @@ pub(crate) fn new<P: Peripherals + 'static>(model: &Model, core: Core<P>) -> Res
     let mut cpu = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, core)?;
     cpu.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
     let length = |range: &std::ops::Range<u32>| u64::from(range.end - range.start);
-    cpu.mem_map(model.flash.start.into(), length(&model.flash), Prot::READ | Prot::EXEC)?;
-    cpu.mem_map(model.ram.start.into(), length(&model.ram), Prot::ALL)?;
+    let (flash, ram) = (cpu.get_data().memory.flash.pointer(), cpu.get_data().memory.ram.pointer());
+    // SAFETY: both blocks have the length of their range and live in the core, which the library's handle does not outlive.
+    unsafe {
+        cpu.mem_map_ptr(model.flash.start.into(), length(&model.flash), Prot::READ | Prot::EXEC, flash)?;
+        cpu.mem_map_ptr(model.ram.start.into(), length(&model.ram), Prot::ALL, ram)?;
+    }
+    // Only this makes the library drop stores: to map memory so does not.
+    cpu.mem_protect(model.flash.start.into(), length(&model.flash), Prot::READ | Prot::EXEC)?;
     cpu.mem_map(HIDDEN, 0x1000, Prot::READ | Prot::EXEC)?;
     cpu.mem_write(HIDDEN, &CLREX)?;
     for range in &model.peripherals {
@@ -47,7 +55,13 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
     cpu.add_block_hook(1, 0, on_block)?;
     cpu.add_intr_hook(on_interrupt)?;
     cpu.add_insn_invalid_hook(on_invalid)?;
-    cpu.add_mem_hook(HookType::MEM_UNMAPPED, 1, 0, on_unmapped)?;
+    cpu.ctl_set_tlb_type(TlbType::VIRTUAL)?;
+    cpu.add_tlb_hook(1, 0, on_page)?;
+    // Not for RAM: where such a hook is, the library looks at every store.
+    let (below, above) = (u64::from(model.ram.start) - 1, u64::from(model.ram.end));
+    for (first, last) in [(0, below), (above, u64::from(u32::MAX))] {
+        cpu.add_mem_hook(HookType::MEM_UNMAPPED, first, last, on_unmapped)?;
+    }
     let flash = model.flash.clone();
     cpu.add_mem_hook(HookType::MEM_WRITE_PROT, flash.start.into(), (flash.end - 1).into(), on_flash_write)?;
     Ok(())
@@ -56,19 +70,55 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
 /// The clock: charges a block before it runs, or stops before it when something is due.
 fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
     if address & !0xFFF == HIDDEN {
-        return guard_hidden(cpu);
+        guard_hidden(cpu);
+    } else if cpu.get_data().stepping.is_none() {
+        pass(cpu, address, size);
     }
+}
+
+/// Has every instruction charged by itself from now on.
+pub(crate) fn step_instructions<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
+    cpu.add_code_hook(1, 0, on_instruction)?;
+    Ok(cpu.ctl_flush_tb()?)
+}
+
+/// The clock of the mode in which interrupts come between any two instructions.
+fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
+    let place = address as u32;
+    let Some(stepping) = &mut cpu.get_data_mut().stepping else { return };
+    if address & !0xFFF == HIDDEN || stepping.is_charged(place) {
+        return;
+    }
+    if let Some(exception) = stepping.arrived(place) {
+        cpu.get_data_mut().pend(exception);
+    }
+    let mut code = [0; 18];
+    let charged = cpu.get_data().memory.read(place, &mut code).map_or(size, |()| stepping::length(&code));
+    if pass(cpu, address, charged) {
+        let core = cpu.get_data_mut();
+        let wait = core.stepping.as_mut().map_or(0, |stepping| {
+            stepping.charged(place, size, charged);
+            stepping.wait()
+        });
+        core.spend(0, wait);
+    }
+}
+
+/// Charges code that is about to run, or stops before it when something is due.
+fn pass<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) -> bool {
     let core = cpu.get_data();
     let waits = core.flash_closed && address < u64::from(RAM);
     if waits || core.halt.is_some() || core.needs_attention() || core.nvic.could_preempt() && preempts(cpu) {
         cpu.get_data_mut().halt.get_or_insert(Halt::Attention);
         let _ = cpu.emu_stop();
-        return;
+        return false;
     }
     let cost = core.costs.get(address as u32, size).unwrap_or_else(|| learn(cpu, address, size));
     let core = cpu.get_data_mut();
+    core.exclusive |= cost.exclusive;
     core.profile.visit(address as u32, size);
     core.spend(cost.instructions, cost.cycles);
+    true
 }
 
 /// Lets loads from flash fail while it is busy, or lets them through again.
@@ -238,9 +288,43 @@ fn merged<P: Peripherals>(core: &mut Core<P>, address: u32, size: usize, value: 
     Some(core.ppb_read(address & !3, 0)? & !mask | value << shift & mask)
 }
 
-/// Clears the exclusive monitor, as exception entry and return do (ARMv7-M, A3.4).
+/// What may be done with a page, when the library asks. Stores into a page from which code may run are several times dearer,
+/// because the library looks whether they change code: so a page of RAM has code only once code was fetched from it.
+fn on_page<P>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType) -> Option<TlbEntry> {
+    let memory = &mut cpu.get_data_mut().memory;
+    let address = page as u32;
+    let has_code = !memory.ram.range.contains(&address) || memory.code_in_ram.contains(&address);
+    let fetched = matches!(kind, MemType::FETCH);
+    if fetched && !has_code {
+        memory.code_in_ram.push(address);
+    }
+    let perms = if has_code || fetched { Prot::ALL } else { Prot::READ | Prot::WRITE };
+    Some(TlbEntry { paddr: page, perms })
+}
+
+/// RAM is data again, once another program has begun and runs from flash.
+pub(crate) fn forget_code_in_ram<P: Peripherals>(cpu: &mut Cpu<P>, pc: u32) {
+    let memory = &mut cpu.get_data_mut().memory;
+    if !memory.code_is_old || pc >= RAM {
+        return;
+    }
+    memory.code_is_old = false;
+    if !memory.code_in_ram.is_empty() {
+        // What was translated from RAM is forgotten: from now on nobody looks whether it changes.
+        let ram = memory.ram.range.clone();
+        let _ = cpu.ctl_remove_cache(ram.start.into(), ram.end.into());
+        // To look for it is to fetch, for the library.
+        cpu.get_data_mut().memory.code_in_ram.clear();
+        let _ = cpu.ctl_flush_tlb();
+        cpu.get_data_mut().costs.forget();
+    }
+}
+
+/// Clears the exclusive monitor, as exception entry and return do (ARMv7-M, A3.4). Where no exclusive access has begun there
+/// is nothing to clear.
 pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Error> {
-    if !cpu.get_data().lacks(Mechanism::ExclusiveMonitor) {
+    let begun = std::mem::take(&mut cpu.get_data_mut().exclusive);
+    if begun && !cpu.get_data().lacks(Mechanism::ExclusiveMonitor) {
         cpu.get_data_mut().clearing_monitor = true;
         let result = cpu.emu_start(HIDDEN | 1, 0, 0, 0);
         cpu.get_data_mut().clearing_monitor = false;
@@ -251,15 +335,16 @@ pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Erro
 
 /// Writes memory behind the back of the CPU and forgets what was translated from it.
 pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]) -> Result<(), Error> {
-    cpu.mem_write(address.into(), bytes)?;
-    cpu.get_data_mut().flash_changes += u64::from(address < RAM);
-    if !cpu.get_data().lacks(Mechanism::Retranslation) {
+    let core = cpu.get_data_mut();
+    core.memory.write(address, bytes).ok_or(uc_error::WRITE_UNMAPPED)?;
+    core.flash_changes += u64::from(address < RAM);
+    let has_code = address < RAM || !core.memory.code_in_ram.is_empty();
+    if has_code && !core.lacks(Mechanism::Retranslation) {
+        if address < RAM {
+            core.costs.forget();
+        }
         let end = u64::from(address) + bytes.len() as u64;
         cpu.ctl_remove_cache(address.into(), end)?;
-        let flash = address < RAM;
-        if flash {
-            cpu.get_data_mut().costs.forget();
-        }
     }
     Ok(())
 }

@@ -8,16 +8,18 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `machine`, `model`, `incident` | the machine as its user sees it, and its run loop |
-//! | `engine` | the CPU library: memory map, hooks, registers |
+//! | `engine`, `memory` | the CPU library: memory map, hooks, registers; flash and RAM |
 //! | `core` | what hooks and run loop share |
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
 //! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
+//! | `stepping` | the mode in which interrupts come between any two instructions |
 //! | `cost`, `stats`, `profile` | cycles of a block; what was counted, and where |
 //! | `loader` | ELF files |
 //!
 //! # Simplifications
 //!
-//! * Interrupts are taken between blocks of code, not between instructions: up to a few dozen cycles late.
+//! * Interrupts are taken between blocks of code, not between instructions: up to a few dozen cycles late. After
+//!   [`Machine::interleave`] they are taken between any two instructions.
 //! * Floating-point registers are stacked at exception entry, never lazily; a higher interrupt that arrives within the
 //!   twelve cycles of an entry nests instead of going first.
 //! * A refused access to a peripheral is a precise bus fault with the right address, but with the program counter of
@@ -36,12 +38,14 @@ mod incident;
 mod loader;
 mod machine;
 mod mechanism;
+mod memory;
 mod model;
 mod nvic;
 mod ppb;
 mod profile;
 mod scb;
 mod stats;
+mod stepping;
 mod systick;
 
 pub use exception::Exception;

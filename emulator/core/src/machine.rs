@@ -1,7 +1,7 @@
 //! The machine: a core with its memory and a chip around it, run in virtual time.
 
 use canbus::Time;
-use chip::{BusFault, Effect, Memory, Peripherals};
+use chip::{BusFault, Effect, Peripherals};
 use unicorn_engine::{RegisterARM, uc_error};
 
 use crate::core::{Core, Halt};
@@ -14,6 +14,7 @@ use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::profile::Visits;
 use crate::stats::Stats;
+use crate::stepping::Stepping;
 
 /// The value of every byte of RAM after power-on: what still has it was never written.
 pub const RAM_PATTERN: u8 = 0xA5;
@@ -53,8 +54,8 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// # Errors
     /// When the CPU library refuses.
     pub fn new(model: Model, peripherals: P) -> Result<Machine<P>, Error> {
-        let mut cpu = engine::new(&model, Core::new(peripherals))?;
-        cpu.mem_write(model.flash.start.into(), &vec![0xFF; model.flash.len()])?;
+        let mut cpu = engine::new(&model, Core::new(peripherals, &model))?;
+        engine::store(&mut cpu, model.flash.start, &vec![0xFF; model.flash.len()])?;
         Ok(Machine {
             cpu,
             model,
@@ -94,7 +95,9 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     /// The flash array.
     pub fn flash(&self) -> Vec<u8> {
-        self.cpu.mem_read_as_vec(self.model.flash.start.into(), self.model.flash.len()).unwrap_or_default()
+        let mut bytes = vec![0; self.model.flash.len()];
+        let _ = self.read(self.model.flash.start, &mut bytes);
+        bytes
     }
 
     /// Replaces the flash array, from its start.
@@ -110,7 +113,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// # Errors
     /// [`BusFault`] where there is no memory.
     pub fn read(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
-        self.cpu.mem_read(address.into(), bytes).map_err(|_| BusFault)
+        self.cpu.get_data().memory.read(address, bytes).ok_or(BusFault)
     }
 
     /// Writes memory, not registers.
@@ -171,6 +174,25 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// Forgets the worst activation and latency of every exception: what comes now is judged by itself.
     pub fn forget_worst(&mut self) {
         self.cpu.get_data_mut().stats.forget_worst();
+    }
+
+    /// Lets interrupts come between any two instructions, and time advance with each of them, from now on and over resets.
+    /// With a seed some instructions take a few cycles longer, so that each seed gives another course. It is several times
+    /// slower than to look between blocks of code only.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn interleave(&mut self, seed: Option<u64>) -> Result<(), Error> {
+        let fresh = self.cpu.get_data_mut().stepping.replace(Stepping::new(seed)).is_none();
+        if fresh { engine::step_instructions(&mut self.cpu) } else { Ok(()) }
+    }
+
+    /// Pends an exception before the next time that the instruction at this address runs. Does nothing unless
+    /// [`Machine::interleave`] was called.
+    pub fn interrupt_before(&mut self, address: u32, exception: Exception) {
+        if let Some(stepping) = &mut self.cpu.get_data_mut().stepping {
+            stepping.interrupt_before(address, exception);
+        }
     }
 
     /// Counts how often each block of code runs, from now on or no longer.
@@ -242,10 +264,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     }
 
     fn advance_chip(&mut self) {
-        let core: *mut Core<P> = self.cpu.get_data_mut();
-        // SAFETY: `View` reads guest memory only, through the library's handle; it does not touch the user data
-        // that `core` points to, and nothing else holds a reference to it meanwhile.
-        unsafe { (*core).advance(&View(&self.cpu)) };
+        self.cpu.get_data_mut().advance();
     }
 
     fn carry_out(&mut self, effect: Effect) -> Option<Stop> {
@@ -318,6 +337,8 @@ impl<P: Peripherals + 'static> Machine<P> {
     fn run_code(&mut self) {
         let closed = self.now() < self.stall && !self.cpu.get_data().lacks(Mechanism::FlashLoads);
         engine::close_flash(&mut self.cpu, &self.model, closed);
+        let pc = self.pc();
+        engine::forget_code_in_ram(&mut self.cpu, pc);
         let core = self.cpu.get_data_mut();
         core.halt = None;
         core.unmapped = None;
@@ -369,6 +390,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// The core after any reset: stack pointer and program counter from the start of flash.
     fn restart(&mut self) {
         self.cpu.get_data_mut().reset();
+        self.cpu.get_data_mut().memory.code_is_old = true;
         self.sleeping = false;
         self.locked = None;
         self.stall = Time::ZERO;
@@ -381,7 +403,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     pub(crate) fn word(&self, address: u32) -> Option<u32> {
         let mut bytes = [0; 4];
-        self.cpu.mem_read(address.into(), &mut bytes).ok()?;
+        self.cpu.get_data().memory.read(address, &mut bytes)?;
         Some(u32::from_le_bytes(bytes))
     }
 
@@ -395,14 +417,5 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     pub(crate) fn pc(&self) -> u32 {
         self.register(RegisterARM::PC) & !1
-    }
-}
-
-/// Guest memory for a DMA transfer.
-struct View<'a, P: 'static>(&'a unicorn_engine::Unicorn<'static, Core<P>>);
-
-impl<P: 'static> Memory for View<'_, P> {
-    fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
-        self.0.mem_read(address.into(), bytes).map_err(|_| BusFault)
     }
 }

@@ -81,7 +81,10 @@ impl<P: Peripherals> Core<P> {
             0xE000_E280..=0xE000_E29C => self.nvic.clear_pending((address - 0xE000_E280) / 4, value),
             0xE000_E400..=0xE000_E4EF => self.set_priorities(16 + (address - 0xE000_E400), value),
             0xE000_ED04 => self.set_icsr(value),
-            0xE000_ED08 => self.scb.vtor = value & 0x3FFF_FF80,
+            0xE000_ED08 => {
+                self.scb.vtor = value & 0x3FFF_FF80;
+                self.memory.code_is_old = true;
+            }
             0xE000_ED0C => self.set_aircr(value),
             0xE000_ED10 => self.scb.scr = value & 0x16,
             0xE000_ED14 => self.scb.ccr = value,

@@ -15,6 +15,7 @@ use crate::console::{self, Command};
 use crate::display::Display;
 use crate::gateway::{BUS_NAME, Gateway, Protocol};
 use crate::greeting::Greeting;
+use crate::host_time::{HostTime, Work};
 use crate::keeper::Keeper;
 use crate::pace::Pace;
 use crate::setup;
@@ -34,6 +35,7 @@ struct App {
     candump: Option<BufWriter<File>>,
     interrupted: Arc<AtomicBool>,
     options: Options,
+    host_time: HostTime,
 }
 
 /// Runs until the time asked for is over, or the user ends it, and returns the summary.
@@ -44,7 +46,9 @@ pub fn run(options: Options) -> Result<Summary> {
     let host = started.elapsed().as_secs_f64();
     app.close()?;
     outcome?;
-    Ok(app.world.summary(host, app.gateway.lost()))
+    let mut summary = app.world.summary(host, app.gateway.lost());
+    summary.host_time = summary.host_time.map(|world| world.and(&app.host_time));
+    Ok(summary)
 }
 
 impl App {
@@ -70,9 +74,22 @@ impl App {
         } else {
             Display::open(&greeting.lines())?
         };
+        if options.speed == Speed::Max {
+            world.measure_host_time();
+        }
         let keeper = options.flash.clone().map(Keeper::new);
         let commands = (!display.takes_commands()).then(console::lines);
-        Ok(App { world, gateway, display, commands, keeper, candump, interrupted, options })
+        Ok(App {
+            world,
+            gateway,
+            display,
+            commands,
+            keeper,
+            candump,
+            interrupted,
+            options,
+            host_time: HostTime::default(),
+        })
     }
 
     fn run(&mut self) -> Result<()> {
@@ -89,14 +106,20 @@ impl App {
 
     /// One millisecond of everything.
     fn step(&mut self, end: Time) -> Result<()> {
+        let start = Instant::now();
         self.gateway.poll(&mut self.world);
+        self.host_time.count(Work::Clients, start);
         self.world.run_until(end.min(self.world.now() + STEP));
+        let start = Instant::now();
         self.gateway.deliver(&mut self.world);
+        let start = self.host_time.count(Work::Clients, start);
         self.write_candump()?;
         if let Some(keeper) = &mut self.keeper {
             keeper.look(self.world.boards(), Instant::now())?;
         }
-        self.show()
+        self.show()?;
+        self.host_time.count(Work::Output, start);
+        Ok(())
     }
 
     fn write_candump(&mut self) -> Result<()> {

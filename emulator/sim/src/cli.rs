@@ -62,6 +62,11 @@ pub struct Options {
     #[arg(long, requires = "flash")]
     pub reflash: bool,
 
+    /// Let interrupts come between any two instructions, and time advance with each of them; the number chooses one of the
+    /// possible courses. Several times slower.
+    #[arg(long, value_name = "SEED")]
+    pub interleave: Option<u64>,
+
     /// Write every frame to this file in the format of candump -l.
     #[arg(long, value_name = "FILE")]
     pub candump: Option<PathBuf>,
@@ -212,7 +217,7 @@ mod tests {
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
-             --reflash --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
+             --reflash --interleave 7 --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));

@@ -11,6 +11,7 @@ pub mod console;
 pub mod display;
 pub mod flash;
 pub mod gateway;
+pub mod host_time;
 pub mod image;
 pub mod log;
 pub mod personality;

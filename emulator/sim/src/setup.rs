@@ -29,6 +29,11 @@ pub fn world(options: &Options) -> Result<World> {
     let boards = options.nodes.iter().map(|node| board(node, options, &images));
     let boards = boards.collect::<Result<Vec<Board>>>()?;
     let mut world = World::new(boards, options.bitrate, options.load);
+    if let Some(seed) = options.interleave {
+        // Boards differ, or all of them would meet their interrupts at the same places.
+        (0..options.nodes.len())
+            .try_for_each(|board| world.machine(board).interleave(Some(seed + board as u64)))?;
+    }
     let Options { pressure, temperature, thermistor, shaft, button, fault, .. } = options;
     let stimuli = [pressure, temperature, thermistor, shaft, button, fault].into_iter().flatten();
     for stimulus in stimuli {

@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::host_time::HostTime;
 use crate::personality::Personality;
 use crate::traffic::Heard;
 
@@ -14,6 +15,9 @@ pub struct Summary {
     pub virtual_seconds: f64,
     /// Seconds that the host took.
     pub host_seconds: f64,
+    /// What they went to, where that was measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub host_time: Option<HostTime>,
     /// The bus.
     pub bus: BusSummary,
     /// The boards, in the order of the command line.
@@ -116,6 +120,9 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (span, host) = (self.virtual_seconds, self.host_seconds);
         writeln!(f, "{span:.3} s of virtual time in {host:.3} s ({:.2} x real time)", self.ratio())?;
+        if let Some(host_time) = &self.host_time {
+            writeln!(f, "  of it {host_time}")?;
+        }
         write!(f, "{}", self.bus)?;
         self.nodes.iter().try_for_each(|node| write!(f, "{node}"))
     }

@@ -3,11 +3,14 @@
 //! The loop is the one that the documentation of [`canbus`] describes. With one board it is exact; with several,
 //! a board may be ahead of a start of frame by less than the shortest frame, too little to miss anything of it.
 
+use std::time::Instant;
+
 use canbus::{Babbler, Bus, Controller, Event, Frame, HostNode, Stamped, StandardId, Time};
 use chip::Stm32f4;
 use emulator::Machine;
 
 use crate::board::Board;
+use crate::host_time::{HostTime, Work};
 use crate::log::Line;
 use crate::port::Port;
 use crate::retuning::Retuning;
@@ -44,6 +47,8 @@ pub struct World {
     /// Places are used again but never given up: the bus knows its participants by their order.
     ports: Vec<Place>,
     records: Records,
+    /// Measured only for who asks: the clock of the host costs time as well.
+    host_time: Option<HostTime>,
 }
 
 /// A port and whether a client has it.
@@ -77,7 +82,18 @@ impl World {
         let node_ids = boards.iter().map(Board::id).collect();
         let records = Records { node_ids, ..Records::default() };
         let (bus, host) = (Bus::new(), HostNode::new(bit));
-        World { now: Time::ZERO, bit_rate, bit, bus, boards, host, load, ports: Vec::new(), records }
+        World {
+            now: Time::ZERO,
+            bit_rate,
+            bit,
+            bus,
+            boards,
+            host,
+            load,
+            ports: Vec::new(),
+            records,
+            host_time: None,
+        }
     }
 
     /// Virtual time.
@@ -144,20 +160,37 @@ impl World {
     /// Lets everything up to `end` happen.
     pub fn run_until(&mut self, end: Time) {
         loop {
+            let start = self.host_time.is_some().then(Instant::now);
             let next = self.step_bus().min(self.start_nodes()).min(self.retune());
             if self.now >= end {
                 break;
             }
             let quantum =
                 if self.boards.len() > 1 { self.now + self.bit * QUANTUM_BITS } else { Time::NEVER };
+            let start = self.measure(Work::Bus, start);
             let mut limit = end.min(next).min(quantum);
             for board in &mut self.boards {
                 limit = limit.min(board.run_until(limit));
             }
+            self.measure(Work::Boards, start);
             self.now = limit;
         }
         while self.host.receive().is_some() {}
         self.boards.iter_mut().for_each(|board| board.read_log(&mut self.records.log));
+    }
+
+    /// Measures from now on what the host's time goes to.
+    pub fn measure_host_time(&mut self) {
+        self.host_time = Some(HostTime::default());
+    }
+
+    /// What the host's time went to since that is measured.
+    pub fn host_time(&self) -> Option<HostTime> {
+        self.host_time
+    }
+
+    fn measure(&mut self, work: Work, start: Option<Instant>) -> Option<Instant> {
+        Some(self.host_time.as_mut()?.count(work, start?))
     }
 
     /// Lets the bus catch up with the boards; returns when something will next happen on it.
@@ -227,7 +260,13 @@ impl World {
         };
         let nodes = self.boards.iter().zip(&self.records.node_ids);
         let nodes = nodes.map(|(board, &id)| board.summary(self.records.traffic.node(id)));
-        Summary { virtual_seconds: self.now.as_secs_f64(), host_seconds, bus, nodes: nodes.collect() }
+        Summary {
+            virtual_seconds: self.now.as_secs_f64(),
+            host_seconds,
+            bus,
+            nodes: nodes.collect(),
+            host_time: self.host_time,
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod lift;
 mod lost_events;
 mod measuring;
 mod power_cycles;
+mod races;
 mod running;
 mod saves;
 mod stack;

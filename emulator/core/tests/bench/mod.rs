@@ -90,6 +90,25 @@ impl Bench {
         self.run_in_slices(Time::from_millis(1))
     }
 
+    /// Runs for two seconds: for programs that count.
+    #[allow(dead_code)]
+    pub(crate) fn run_long(&mut self) -> Verdict {
+        while self.machine.now() < Time::from_millis(2000) && self.verdict() == Verdict::Silent {
+            let until = self.machine.now() + Time::from_millis(1);
+            self.machine.run_until(until);
+        }
+        self.verdict()
+    }
+
+    /// The address and the size of a function of a program.
+    #[allow(dead_code)]
+    pub(crate) fn function(program: &str, name: &str) -> (u32, u32) {
+        let file = std::fs::read(directory().join(program)).unwrap();
+        let elf = object::File::parse(file.as_slice()).unwrap();
+        let symbol = elf.symbols().find(|symbol| symbol.name() == Ok(name)).expect("the function");
+        (symbol.address() as u32 & !1, symbol.size() as u32)
+    }
+
     /// The same in slices, always to the end of the tenth.
     pub(crate) fn run_in_slices(&mut self, slice: Time) -> Verdict {
         let end = Time::from_millis(100);
@@ -97,6 +116,10 @@ impl Bench {
             let until = (self.machine.now() + slice).min(end);
             self.machine.run_until(until);
         }
+        self.verdict()
+    }
+
+    fn verdict(&self) -> Verdict {
         match self.word(0) {
             PASSED => Verdict::Passed,
             FAILED => Verdict::Failed(self.word(1)),

@@ -1,0 +1,82 @@
+//! Flash and RAM: bytes that the CPU library and the emulator both work on.
+
+use std::ffi::c_void;
+use std::ops::Range;
+use std::ptr::NonNull;
+
+use chip::BusFault;
+
+use crate::model::Model;
+
+/// The memory of a chip.
+pub(crate) struct Memory {
+    pub(crate) flash: Block,
+    pub(crate) ram: Block,
+    /// Pages of RAM that code was fetched from, by their addresses.
+    pub(crate) code_in_ram: Vec<u32>,
+    /// Another program has begun: what ran from RAM has probably ended.
+    pub(crate) code_is_old: bool,
+}
+
+impl Memory {
+    pub(crate) fn new(model: &Model) -> Memory {
+        let (flash, ram) = (Block::new(model.flash.clone()), Block::new(model.ram.clone()));
+        Memory { flash, ram, code_in_ram: Vec::new(), code_is_old: false }
+    }
+
+    /// Reads bytes; `None` where there is no memory.
+    pub(crate) fn read(&self, address: u32, bytes: &mut [u8]) -> Option<()> {
+        let block = if address < self.ram.range.start { &self.flash } else { &self.ram };
+        let from = block.place(address, bytes.len())?;
+        // SAFETY: `place` has checked that all of the bytes lie in the block, which nothing else in Rust refers to.
+        unsafe { from.copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len()) };
+        Some(())
+    }
+
+    /// Writes bytes; `None` where there is no memory.
+    pub(crate) fn write(&mut self, address: u32, bytes: &[u8]) -> Option<()> {
+        let block = if address < self.ram.range.start { &self.flash } else { &self.ram };
+        let to = block.place(address, bytes.len())?;
+        // SAFETY: as in `read`.
+        unsafe { to.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
+        Some(())
+    }
+}
+
+impl chip::Memory for Memory {
+    fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault> {
+        self.read(address, bytes).ok_or(BusFault)
+    }
+}
+
+/// One block of memory at a place that does not change, which the CPU library knows.
+pub(crate) struct Block {
+    pub(crate) range: Range<u32>,
+    bytes: NonNull<[u8]>,
+}
+
+impl Block {
+    fn new(range: Range<u32>) -> Block {
+        let bytes = vec![0_u8; range.len()].into_boxed_slice();
+        Block { range, bytes: NonNull::from(Box::leak(bytes)) }
+    }
+
+    /// For the CPU library, which must not use it for longer than the block lives.
+    pub(crate) fn pointer(&self) -> *mut c_void {
+        self.bytes.as_ptr().cast()
+    }
+
+    fn place(&self, address: u32, length: usize) -> Option<*mut u8> {
+        let offset = address.checked_sub(self.range.start)? as usize;
+        let end = offset.checked_add(length)?;
+        // SAFETY: the offset lies in the block.
+        (end <= self.range.len()).then(|| unsafe { self.bytes.as_ptr().cast::<u8>().add(offset) })
+    }
+}
+
+impl Drop for Block {
+    fn drop(&mut self) {
+        // SAFETY: it was leaked in `new` and is given up here only.
+        drop(unsafe { Box::from_raw(self.bytes.as_ptr()) });
+    }
+}

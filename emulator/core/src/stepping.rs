@@ -1,0 +1,119 @@
+//! The mode in which an interrupt can come between any two instructions, and time advances with each of them.
+//!
+//! The usual mode charges a block of code at once, before it runs, and looks for interrupts between blocks: several times as
+//! fast, and exact for everything but races. Here every instruction is charged and looked at. A seed lets some of them take
+//! longer, as waits on a bus do on silicon, so that interrupts meet the program elsewhere with each seed.
+//!
+//! An IT block counts as one instruction: the CPU library does not stop inside of it.
+
+use std::ops::Range;
+
+use crate::exception::Exception;
+
+/// An instruction takes up to so many cycles longer, one in eight of them.
+const LONGEST_WAIT: u64 = 7;
+
+/// What the mode remembers.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Stepping {
+    /// Never zero, or nothing waits.
+    random: u64,
+    /// The instructions of the IT block that was charged.
+    conditional: Range<u32>,
+    /// Pend this exception before this instruction.
+    place: Option<(u32, Exception)>,
+}
+
+impl Stepping {
+    /// Waits by `seed`; with `None` there are none.
+    pub(crate) fn new(seed: Option<u64>) -> Stepping {
+        let random = seed.map_or(0, |seed| seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+        Stepping { random, ..Stepping::default() }
+    }
+
+    /// Pends an exception before the next time that this instruction runs.
+    pub(crate) fn interrupt_before(&mut self, address: u32, exception: Exception) {
+        self.place = Some((address, exception));
+    }
+
+    /// What is to be pended before this instruction.
+    pub(crate) fn arrived(&mut self, address: u32) -> Option<Exception> {
+        self.place.take_if(|(place, _)| *place == address).map(|(_, exception)| exception)
+    }
+
+    /// Whether the instruction was charged with its IT block.
+    pub(crate) fn is_charged(&self, address: u32) -> bool {
+        self.conditional.contains(&address)
+    }
+
+    /// An IT instruction and its block are charged together.
+    pub(crate) fn charged(&mut self, first: u32, size: u32, block: u32) {
+        self.conditional = first + size..first + block;
+    }
+
+    /// Cycles that the next instruction takes longer (xorshift64).
+    pub(crate) fn wait(&mut self) -> u32 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        if self.random % 8 == 1 { (self.random >> 8 & LONGEST_WAIT) as u32 } else { 0 }
+    }
+}
+
+/// Bytes of the instruction at the start of `code`, and of its block where it is an IT instruction (ARMv7-M, A7.7.37).
+pub(crate) fn length(code: &[u8]) -> u32 {
+    let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
+    let first = halves.next().unwrap_or(0);
+    let conditional =
+        if first >> 8 == 0xBF && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 };
+    let mut size = width(first);
+    for _ in 0..conditional {
+        let Some(next) = halves.next() else { break };
+        if width(next) == 4 {
+            halves.next();
+        }
+        size += width(next);
+    }
+    size
+}
+
+/// Bytes of an instruction that begins with this halfword.
+fn width(first: u16) -> u32 {
+    if first >> 11 >= 0b11101 { 4 } else { 2 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(halves: &[u16]) -> Vec<u8> {
+        halves.iter().flat_map(|half| half.to_le_bytes()).collect()
+    }
+
+    #[test]
+    fn an_it_block_is_as_long_as_its_mask_says() {
+        for (halves, size, name) in [
+            (&[0xBF00, 0x2000][..], 2, "nop"),
+            (&[0xBF08, 0x2000, 0x2001], 4, "it eq"),
+            (&[0xBF0C, 0x2000, 0x2001, 0x2002], 6, "ite eq"),
+            (&[0xBF01, 0x2000, 0x2001, 0x2002, 0x2003, 0x2004], 10, "itttt eq"),
+            (&[0xBF0C, 0xF04F, 0x0001, 0x2001, 0x2002], 8, "ite eq, the first of its two wide"),
+            (&[0xF04F, 0x0001], 4, "mov.w"),
+        ] {
+            assert_eq!(length(&bytes(halves)), size, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_seed_decides_and_none_waits_never() {
+        let waits = |seed| {
+            let mut stepping = Stepping::new(seed);
+            (0..1000).map(|_| stepping.wait()).collect::<Vec<u32>>()
+        };
+        assert_eq!(waits(Some(0)), waits(Some(0)));
+        assert_ne!(waits(Some(0)), waits(Some(1)));
+        let of_one = waits(Some(1));
+        assert!(of_one.contains(&7) && of_one.iter().all(|&wait| wait <= 7));
+        assert!(waits(None).iter().all(|&wait| wait == 0));
+    }
+}

@@ -1,0 +1,99 @@
+//! Interrupts between any two instructions: what that mode finds, and that programs without races do not notice it.
+
+mod bench;
+
+use bench::{Bench, Verdict};
+use emulator::Exception;
+
+/// TIM2.
+const INTERRUPT: Exception = Exception::irq(28);
+
+/// Seeds that are tried; all of them with THOROUGH set.
+fn seeds() -> std::ops::Range<u64> {
+    0..if std::env::var_os("THOROUGH").is_some() { 200 } else { 5 }
+}
+
+/// What `lost_update` has noted: lost without an interrupt of its own, interrupts, lost to them, cycles of 100 NOPs.
+fn notes(bench: &mut Bench) -> [u32; 4] {
+    assert_eq!(bench.run_long(), Verdict::Passed);
+    std::array::from_fn(|index| bench.note(index as u32))
+}
+
+#[test]
+fn an_increment_against_an_interrupt_loses_counts() {
+    let [_, interrupts, lost, _] = notes(&mut Bench::new("lost_update"));
+    assert!(interrupts > 100);
+    assert_eq!(lost, 0, "between blocks nothing is lost: that is why there is the other mode");
+    for seed in seeds() {
+        let mut bench = Bench::new("lost_update");
+        bench.machine.interleave(Some(seed)).unwrap();
+        let [quiet, interrupts, lost, _] = notes(&mut bench);
+        assert_eq!(quiet, 0, "without interrupts nothing is lost");
+        assert!(lost > interrupts / 100 && lost < interrupts, "seed {seed}: {lost} lost of {interrupts}");
+    }
+}
+
+/// At each instruction of `x++`: the count is lost where the interrupt comes after the load and before the store is done.
+#[test]
+fn every_place_of_an_increment_is_tried() {
+    let (start, size) = Bench::function("lost_update", "bump");
+    let lost: Vec<u32> = (start..start + size)
+        .step_by(2)
+        .map(|address| {
+            let mut bench = Bench::new("lost_update");
+            bench.machine.interleave(None).unwrap();
+            bench.machine.interrupt_before(address, INTERRUPT);
+            notes(&mut bench)[0]
+        })
+        .collect();
+    assert_eq!(lost.first(), Some(&0), "before the load: {lost:?}");
+    assert_eq!(lost.last(), Some(&0), "after the store: {lost:?}");
+    assert_eq!(lost.iter().sum::<u32>(), 2, "before the addition and before the store: {lost:?}");
+}
+
+#[test]
+fn time_advances_within_a_block() {
+    let nops = |interleaved: bool| {
+        let mut bench = Bench::new("lost_update");
+        if interleaved {
+            bench.machine.interleave(None).unwrap();
+        }
+        notes(&mut bench)[3]
+    };
+    assert!(nops(true) >= 100 && nops(true) < 110, "{}", nops(true));
+    assert!(nops(false) < 100, "a block is charged before it runs");
+}
+
+/// The programs that show a mechanism pass in this mode too: preemption, locks, floats, IT blocks, exclusive accesses.
+#[test]
+fn programs_without_races_pass_with_every_seed() {
+    for program in [
+        "preemption",
+        "basepri",
+        "rtic_tasks",
+        "float_contexts",
+        "it_block",
+        "exclusive",
+        "self_modified",
+        "escalation",
+        "hints",
+    ] {
+        for seed in seeds() {
+            let mut bench = Bench::new(program);
+            bench.machine.interleave(Some(seed)).unwrap();
+            assert_eq!(bench.run(), Verdict::Passed, "{program}, seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run() {
+    let trace = |seed| {
+        let mut bench = Bench::new("rtic_tasks");
+        bench.machine.interleave(Some(seed)).unwrap();
+        bench.run();
+        bench.machine.stats().trace
+    };
+    assert_eq!(trace(1), trace(1));
+    assert_ne!(trace(1), trace(2));
+}

@@ -1,0 +1,70 @@
+//! Where the host's time goes, for who wants a run to be faster.
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use serde::{Serialize, Serializer};
+
+/// What the host works for.
+#[derive(Clone, Copy, Debug)]
+pub enum Work {
+    /// The cores and the chips of the boards.
+    Boards,
+    /// The bus.
+    Bus,
+    /// The clients of the gateway.
+    Clients,
+    /// Display, log and files.
+    Output,
+}
+
+/// Names of the kinds of work, in their order.
+const NAMES: [&str; 4] = ["boards", "bus", "clients", "output"];
+
+/// Time by the kind of work.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HostTime([Duration; NAMES.len()]);
+
+impl HostTime {
+    /// Counts what has passed since `start` for this work, and returns the present time.
+    pub fn count(&mut self, work: Work, start: Instant) -> Instant {
+        let now = Instant::now();
+        self.0[work as usize] += now - start;
+        now
+    }
+
+    /// The time of both.
+    #[must_use]
+    pub fn and(&self, other: &HostTime) -> HostTime {
+        HostTime(std::array::from_fn(|work| self.0[work] + other.0[work]))
+    }
+}
+
+impl fmt::Display for HostTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = self.0.iter().sum::<Duration>().as_secs_f64().max(f64::MIN_POSITIVE);
+        let parts = NAMES.iter().zip(&self.0);
+        let parts = parts.map(|(name, time)| format!("{name} {:.1} %", time.as_secs_f64() / all * 100.0));
+        f.write_str(&parts.collect::<Vec<_>>().join(", "))
+    }
+}
+
+impl Serialize for HostTime {
+    /// Seconds by name.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(NAMES.iter().zip(self.0.map(|time| time.as_secs_f64())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_of_what_was_counted() {
+        let time = HostTime([3, 1, 0, 0].map(Duration::from_secs));
+        assert_eq!(time.to_string(), "boards 75.0 %, bus 25.0 %, clients 0.0 %, output 0.0 %");
+        assert_eq!(HostTime::default().to_string(), "boards 0.0 %, bus 0.0 %, clients 0.0 %, output 0.0 %");
+        assert_eq!(serde_json::json!(time)["boards"], 3.0);
+    }
+}
