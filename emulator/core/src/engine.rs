@@ -10,7 +10,8 @@ use crate::cost::Cost;
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::nvic::Masks;
-use crate::{ppb, stepping};
+use crate::scb::{DIV_0_TRP, cfsr};
+use crate::{alignment, ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
@@ -94,7 +95,10 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     }
     let mut code = [0; 18];
     let charged = cpu.get_data().memory.read(place, &mut code).map_or(size, |()| stepping::length(&code));
-    if pass(cpu, address, charged) {
+    let traps_division = cpu.get_data().scb.ccr & DIV_0_TRP != 0;
+    if let Some(status) = alignment::fault(&code, traps_division, |number| core_register(cpu, number)) {
+        refuse(cpu, status);
+    } else if pass(cpu, address, charged) {
         let core = cpu.get_data_mut();
         let wait = core.stepping.as_mut().map_or(0, |stepping| {
             stepping.charged(place, size, charged);
@@ -102,6 +106,16 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
         });
         core.spend(0, wait);
     }
+}
+
+/// R0 to R14 by number.
+fn core_register<P>(cpu: &Unicorn<Core<P>>, number: u16) -> u32 {
+    let register = match number {
+        0..=12 => RegisterARM::R0 as i32 + i32::from(number),
+        13 => RegisterARM::SP as i32,
+        _ => RegisterARM::LR as i32,
+    };
+    cpu.reg_read(register).unwrap_or(0) as u32
 }
 
 /// Charges code that is about to run, or stops before it when something is due.
@@ -115,10 +129,21 @@ fn pass<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) -> 
     }
     let cost = core.costs.get(address as u32, size).unwrap_or_else(|| learn(cpu, address, size));
     let core = cpu.get_data_mut();
+    if cost.floats && !core.scb.allows_floats() {
+        return refuse(cpu, cfsr::NOCP);
+    }
+    core.place = address as u32;
     core.exclusive |= cost.exclusive;
     core.profile.visit(address as u32, size);
     core.spend(cost.instructions, cost.cycles);
     true
+}
+
+/// Stops before code that faults.
+fn refuse<P>(cpu: &mut Unicorn<Core<P>>, status: u32) -> bool {
+    cpu.get_data_mut().halt = Some(Halt::Usage(status));
+    let _ = cpu.emu_stop();
+    false
 }
 
 /// Lets loads from flash fail while it is busy, or lets them through again.

@@ -36,6 +36,11 @@ impl Fault {
         Fault::new(pc, cfsr::IBUSERR)
     }
 
+    /// A usage fault with this status.
+    pub(crate) fn usage(pc: u32, status: u32) -> Fault {
+        Fault::new(pc, status)
+    }
+
     pub(crate) fn undefined(pc: u32) -> Fault {
         Fault::new(pc, cfsr::UNDEFINSTR)
     }

@@ -252,6 +252,9 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// Everything that is due before the next block: events, effects, resets.
     fn attend(&mut self) -> Option<Stop> {
         self.advance_chip();
+        while let Some((at, pc, rule)) = self.cpu.get_data_mut().breaches.pop_front() {
+            self.incidents.push((at, Incident::Breach { rule, pc }));
+        }
         while let Some(effect) = self.cpu.get_data_mut().effects.pop_front() {
             if let Some(stop) = self.carry_out(effect) {
                 return Some(stop);
@@ -349,6 +352,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             (_, Some(Halt::SupervisorCall)) => self.raise(Exception::SV_CALL),
             (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),
             (_, Some(Halt::Undefined)) => self.take_fault(Fault::undefined(self.pc())),
+            (_, Some(Halt::Usage(status))) => self.take_fault(Fault::usage(self.pc(), status)),
             (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
             (Err(uc_error::READ_PROT), None) if self.cpu.get_data().flash_closed => self.loading = true,
             (Err(error), None) => self.take_fault(self.fault_of(error)),

@@ -1,9 +1,10 @@
 //! The private peripheral bus: every register of the core by address (ARMv7-M, B3.1).
 
-use chip::Peripherals;
+use chip::{Breach, Peripherals};
 
 use crate::core::Core;
 use crate::exception::Exception;
+use crate::scb::{DIV_0_TRP, UNALIGN_TRP};
 
 /// Where the system space begins.
 pub(crate) const BASE: u32 = 0xE000_0000;
@@ -87,7 +88,7 @@ impl<P: Peripherals> Core<P> {
             }
             0xE000_ED0C => self.set_aircr(value),
             0xE000_ED10 => self.scb.scr = value & 0x16,
-            0xE000_ED14 => self.scb.ccr = value,
+            0xE000_ED14 => self.set_ccr(value),
             0xE000_ED18..=0xE000_ED20 => self.set_priorities(4 + (address - 0xE000_ED18), value),
             0xE000_ED24 => self.scb.shcsr = value & 0x0007_0000,
             0xE000_ED28 => self.scb.cfsr &= !value,
@@ -143,6 +144,16 @@ impl<P: Peripherals> Core<P> {
             if value & bit != 0 {
                 self.nvic.clear(exception.bit());
             }
+        }
+    }
+
+    fn set_ccr(&mut self, value: u32) {
+        self.scb.ccr = value;
+        if value & UNALIGN_TRP != 0 {
+            self.report(Breach::NotModelled { what: "CCR.UNALIGN_TRP" });
+        }
+        if value & DIV_0_TRP != 0 && self.stepping.is_none() {
+            self.report(Breach::NotModelled { what: "CCR.DIV_0_TRP, but with --interleave," });
         }
     }
 
