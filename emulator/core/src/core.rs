@@ -211,6 +211,8 @@ impl<P: Peripherals> Core<P> {
     pub(crate) fn set_clock(&mut self, hertz: u64) {
         let count = self.cyccnt();
         self.cycle = Time::of_cycle(hertz.max(1));
+        self.systick.change_clock(self.now, self.cycle);
+        self.due = self.deadline();
         self.set_cyccnt(self.cyccnt_runs(), count);
     }
 

@@ -287,9 +287,14 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
 
 fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
     let read = |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize| {
-        let ipsr = cpu.reg_read(RegisterARM::IPSR).unwrap_or(0) as u32 & 0x1FF;
+        let ipsr = ipsr(cpu);
         let address = ppb::BASE + offset as u32;
+        let refused = is_unprivileged(cpu, ipsr);
         let core = cpu.get_data_mut();
+        if refused {
+            finish(core, address, None);
+            return 0;
+        }
         let word = core.ppb_read(address & !3, ipsr);
         finish(core, address, word.map(|_| ()));
         let value = word.unwrap_or(0) >> (8 * (address & 3));
@@ -297,13 +302,26 @@ fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
     };
     let write = |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize, value: u64| {
         let address = ppb::BASE + offset as u32;
+        let refused = is_unprivileged(cpu, ipsr(cpu));
         let core = cpu.get_data_mut();
+        if refused {
+            return finish(core, address, None);
+        }
         let word = if size == 4 { Some(value as u32) } else { merged(core, address, size, value as u32) };
         let result = word.and_then(|word| core.ppb_write(address & !3, word));
         finish(core, address, result);
     };
     cpu.mmio_map(ppb::BASE.into(), ppb::SIZE.into(), Some(read), Some(write))?;
     Ok(())
+}
+
+fn ipsr<P>(cpu: &Unicorn<Core<P>>) -> u32 {
+    cpu.reg_read(RegisterARM::IPSR).unwrap_or(0) as u32 & 0x1FF
+}
+
+/// Thread mode without privileges reaches nothing of the system space (ARMv7-M, B3.1.1).
+fn is_unprivileged<P>(cpu: &Unicorn<Core<P>>, ipsr: u32) -> bool {
+    ipsr == 0 && cpu.reg_read(RegisterARM::CONTROL).unwrap_or(0) & 1 != 0
 }
 
 /// A byte or halfword put into its word; the priority registers are written so.

@@ -349,7 +349,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         match (result, self.cpu.get_data_mut().halt.take()) {
             (_, Some(Halt::Attention)) => {}
             (_, Some(Halt::ExceptionReturn)) => self.leave(),
-            (_, Some(Halt::SupervisorCall)) => self.raise(Exception::SV_CALL),
+            (_, Some(Halt::SupervisorCall)) => self.supervisor_call(),
             (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),
             (_, Some(Halt::Undefined)) => self.take_fault(Fault::undefined(self.pc())),
             (_, Some(Halt::Usage(status))) => self.take_fault(Fault::usage(self.pc(), status)),
@@ -370,9 +370,15 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// Pends an exception of the core itself.
-    fn raise(&mut self, exception: Exception) {
-        self.cpu.get_data_mut().pend(exception);
+    /// A call that cannot be taken at once becomes a HardFault (ARMv7-M, B1.5.2).
+    fn supervisor_call(&mut self) {
+        let masks = engine::masks(&self.cpu);
+        let core = self.cpu.get_data_mut();
+        if core.nvic.may_preempt(Exception::SV_CALL, masks) {
+            core.pend(Exception::SV_CALL);
+        } else {
+            self.take_fault(Fault::refused_call(self.pc()));
+        }
     }
 
     pub(crate) fn note(&mut self, incident: Incident) {

@@ -49,7 +49,7 @@ pub(crate) fn world(flags: &str) -> World {
         ["sim", "--bootloader", bootloader.to_str().unwrap(), "--firmware", firmware.to_str().unwrap()];
     let options = Options::try_parse_from(images.into_iter().chain(flags.split_whitespace())).unwrap();
     let mut world = sim::setup::world(&options).unwrap();
-    world.enforce_rules();
+    world.enforce_rules(true);
     world
 }
 
