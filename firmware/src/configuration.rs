@@ -4,7 +4,8 @@ use core::mem::MaybeUninit;
 
 use bsp::reset_cause::ResetCause;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory};
-use node::{BitRate, FactoryCalibration, NodeId, Parameters, Personality, Protocol, RawSample, Setup};
+use node::{BitRate, NodeId, Parameters, Personality, Protocol, Setup};
+use profiles::board::{ChipThermometer, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 
 /// Where the store has nothing to say: node-ID 1, 250 kbit/s, pressure.
@@ -102,18 +103,14 @@ pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
     crash.is_some() || cause.is_unexpected()
 }
 
-/// What the maker of the chip measured.
-pub(crate) fn calibration() -> FactoryCalibration {
-    let words = factory::calibration();
-    FactoryCalibration {
-        ts_cal1: words.temperature_30,
-        ts_cal2: words.temperature_110,
-        vrefint_cal: words.reference,
-    }
+/// The temperature sensor in the chip, as its maker has measured it.
+pub(crate) fn thermometer() -> ChipThermometer {
+    let (offset, slope) = factory::calibration().line();
+    ChipThermometer { offset, slope }
 }
 
 /// The front end's sums as the measurement takes them.
-pub(crate) fn raw_sample(sums: &Sums, factory: FactoryCalibration) -> RawSample {
-    let [pressure, supply, thermistor, temperature, vrefint] = sums.channels;
-    RawSample { pressure, supply, temperature, vrefint, thermistor, count: Sums::COUNT, factory }
+pub(crate) fn raw_sample(sums: &Sums) -> RawSample {
+    let [pressure, supply, thermistor, temperature, reference] = sums.channels;
+    RawSample { pressure, supply, temperature, reference, thermistor, count: Sums::COUNT }
 }

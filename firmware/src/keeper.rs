@@ -4,7 +4,7 @@
 use bsp::Clock;
 use bsp::ParameterFlash;
 use canopen::sdo::Abort;
-use node::Parcel;
+use node::StoreJob;
 use storage::Store;
 
 use crate::SERVICES;
@@ -14,12 +14,12 @@ use crate::shared::Shared;
 pub(crate) struct Keeper {
     /// `None` when the flash could not be prepared: then nothing can be stored.
     store: Option<Store<ParameterFlash>>,
-    parcel: &'static mut Parcel,
+    job: &'static mut StoreJob,
 }
 
 impl Keeper {
-    pub(crate) fn new(store: Option<Store<ParameterFlash>>, parcel: &'static mut Parcel) -> Keeper {
-        Keeper { store, parcel }
+    pub(crate) fn new(store: Option<Store<ParameterFlash>>, job: &'static mut StoreJob) -> Keeper {
+        Keeper { store, job }
     }
 
     /// Whether it can store anything.
@@ -29,17 +29,17 @@ impl Keeper {
 
     /// Does the job that waits, if one does.
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
-        let parcel = &mut *self.parcel;
-        if !node.call(|protocol, _| protocol.pack(parcel)) {
+        let job = &mut *self.job;
+        if !node.call(|protocol, _| protocol.take_job(job)) {
             return;
         }
-        let result = self.store.as_mut().map_or(Err(Abort::Hardware), |store| parcel.deliver(store));
+        let result = self.store.as_mut().map_or(Err(Abort::Hardware), |store| job.run(store));
         match result {
             Ok(()) => defmt::info!("stored"),
             Err(abort) => defmt::error!("not stored: {=u32:#010x}", abort.code()),
         }
         // What follows is left to the services, which find it when they poll.
-        let _ = node.call(|protocol, out| protocol.finish(parcel, result, Clock::now(), out));
+        let _ = node.call(|protocol, out| protocol.finish(job, result, Clock::now(), out));
         rtic::pend(SERVICES);
     }
 }

@@ -2,7 +2,7 @@
 
 use node::Snapshot;
 
-/// Written in its place: a thousand times a second, a copy of some hundred bytes counts.
+/// Written in its place and copied once: a thousand times a second, a copy of some hundred bytes counts.
 #[derive(Default)]
 pub struct Latest {
     snapshot: Snapshot,
@@ -16,8 +16,11 @@ impl Latest {
         &mut self.snapshot
     }
 
-    /// The one that nobody has taken yet.
-    pub(crate) fn take(&mut self) -> Option<Snapshot> {
-        core::mem::take(&mut self.is_new).then_some(self.snapshot)
+    /// Copies the one that nobody has taken yet; false when there is none.
+    pub(crate) fn take(&mut self, to: &mut Snapshot) -> bool {
+        if self.is_new {
+            *to = self.snapshot;
+        }
+        core::mem::take(&mut self.is_new)
     }
 }

@@ -62,7 +62,8 @@ mod app {
         BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TimeInterrupt,
         Transmitter, Watchdog,
     };
-    use node::{EncoderBoard, FactoryCalibration, Measurement, Parameters, Parcel, Protocol};
+    use node::{Measurement, Parameters, Protocol, StoreJob};
+    use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
     use crate::bit_rate::Rate;
     use crate::configuration::Loaded;
@@ -91,7 +92,6 @@ mod app {
         shaft: Shaft,
         buttons: Buttons,
         measurement: &'static mut Measurement,
-        factory: FactoryCalibration,
         transmitter: Transmitter,
         time: TimeInterrupt,
         process: Process,
@@ -107,19 +107,19 @@ mod app {
         // Too large to be handed around on the stack.
         protocol: MaybeUninit<Protocol> = MaybeUninit::uninit(),
         measurement_place: MaybeUninit<Measurement> = MaybeUninit::uninit(),
-        parcel: MaybeUninit<Parcel> = MaybeUninit::uninit(),
+        job: MaybeUninit<StoreJob> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
         let Loaded { protocol, parameters, setup, store } =
             configuration::load(board.parameters, cx.local.protocol);
-        let keeper = Keeper::new(store, cx.local.parcel.write(Parcel::new(setup.personality)));
+        let keeper = Keeper::new(store, cx.local.job.write(StoreJob::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
         remembering::report_battery(board.reset_cause, &board.found);
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
-        let surroundings = EncoderBoard { watchdog_reset, ..EncoderBoard::default() };
+        let surroundings = Surroundings { watchdog_reset, ..Surroundings::default() };
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);
         let (receiver_services, service_frames) =
             Receiver::new(Fifo::Services, cx.local.services_queue, lost);
@@ -139,7 +139,6 @@ mod app {
             shaft: Shaft::new(board.ssi, surroundings),
             buttons: board.buttons,
             measurement: remembering::make(cx.local.measurement_place, setup.personality, &board.found),
-            factory: configuration::calibration(),
             transmitter: board.transmitter,
             time: board.time,
             process: Process::new(process_frames, process_alarm, board.lamps, lost),
@@ -179,7 +178,8 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, shaft, buttons, measurement, factory, backup],
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, shaft, buttons, measurement, backup,
+               retained: [u32; RETAINED_WORDS] = [0; RETAINED_WORDS]],
            shared = [snapshot, parameters, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
@@ -187,14 +187,19 @@ mod app {
         cx.shared.parameters.lock(|parameters| {
             if let Some(new) = parameters {
                 measurement.apply(new);
-                shaft.apply(new);
+                shaft.apply(new.position_inputs());
                 *parameters = None;
             }
         });
-        let raw = configuration::raw_sample(&sums, *cx.local.factory);
-        let (encoder, pressed) = (shaft.read(counted), cx.local.buttons.sample());
-        cx.shared.snapshot.lock(|latest| measurement.update(&raw, &encoder, pressed, latest.renew()));
-        measurement.keep(|words| cx.local.backup.write(words));
+        let inputs = Inputs {
+            analogue: configuration::raw_sample(&sums),
+            position: shaft.read(counted),
+            digital: cx.local.buttons.sample(),
+        };
+        cx.shared.snapshot.lock(|latest| measurement.update(&inputs, latest.renew()));
+        if measurement.retain(cx.local.retained) {
+            cx.local.backup.write(cx.local.retained);
+        }
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
     }
@@ -210,8 +215,7 @@ mod app {
     fn process(mut cx: process::Context) {
         let [_, services_due] = cx.local.time.acknowledge();
         cx.local.process.wake_services(services_due);
-        let snapshot = cx.shared.snapshot.lock(Latest::take);
-        cx.local.process.run(snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
+        cx.local.process.run(&mut cx.shared.snapshot, &mut (cx.shared.protocol, cx.shared.transmit));
         cx.shared.watchdog.progress(Part::Process);
     }
 

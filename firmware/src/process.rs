@@ -4,8 +4,9 @@
 use bsp::losses::{Event, Losses};
 use bsp::{Alarm, Clock, Frames, Lamps, Received, Ring};
 use canopen::{Duration, Instant, Next};
-use node::Snapshot;
+use rtic::Mutex;
 
+use crate::latest::Latest;
 use crate::shared::Shared;
 use crate::{SAMPLING, SERVICES};
 
@@ -39,22 +40,20 @@ impl Process {
     }
 
     /// Does everything that is due and sets the alarm for what comes next.
-    pub(crate) fn run(&mut self, snapshot: Option<Snapshot>, node: &mut impl Shared) {
+    pub(crate) fn run(&mut self, snapshot: &mut impl Mutex<T = Latest>, node: &mut impl Shared) {
         while let Some(Received { frame, at }) = self.frames.dequeue() {
             let next = node.call(|protocol, out| protocol.on_process_frame(&frame, at, out));
             self.follow(next, at);
         }
         let now = Clock::now();
-        self.watch(snapshot.is_some(), now);
-        let (next, lit) = node.call(|protocol, out| {
-            let next = match snapshot {
-                Some(snapshot) => protocol.publish(&snapshot, now, out),
-                None => protocol.poll_process(now, out),
-            };
-            (next, protocol.lamps())
+        let (has_sampled, next, outputs) = node.call(|protocol, out| {
+            let is_new = snapshot.lock(|latest| latest.take(protocol.snapshot_mut()));
+            let next = if is_new { protocol.publish(now, out) } else { protocol.poll_process(now, out) };
+            (is_new, next, protocol.outputs())
         });
+        self.watch(has_sampled, now);
         self.follow(next, now);
-        self.lamps.set(lit);
+        self.lamps.set(outputs.digital);
     }
 
     /// Sets the alarm, and wakes the services where they are due: NMT may have asked for something.

@@ -5,7 +5,10 @@ use core::mem::MaybeUninit;
 use bsp::battery::Battery;
 use bsp::kept::Found;
 use bsp::reset_cause::ResetCause;
-use node::{Kept, Measurement, Personality, Start};
+use node::{Measurement, Personality};
+use profiles::board::{PowerOn, Retained};
+
+use crate::configuration;
 
 /// Makes the measurement in its place. Not inlined: the stack on which the value is made is free again after it.
 #[inline(never)]
@@ -14,7 +17,7 @@ pub(crate) fn make(
     personality: Personality,
     found: &Found,
 ) -> &'static mut Measurement {
-    place.write(Measurement::new(personality, start(found)))
+    place.write(Measurement::new(personality, &power_on(found)))
 }
 
 /// Says what the start tells of the battery.
@@ -28,17 +31,18 @@ pub(crate) fn report_battery(cause: ResetCause, found: &Found) {
     }
 }
 
-/// What the encoder goes on from.
+/// What the board knows when the power comes.
 ///
 /// Memory without a trace of a copy is that of a new board, and after a loss of power that of one without a battery, or with
 /// an empty one: the two cannot be told apart, and the encoder begins anew.
-fn start(found: &Found) -> Start {
-    match found {
-        Found::Nothing => Start::First,
-        Found::Kept(words) => Start::Kept(Kept::from_words(words)),
+fn power_on(found: &Found) -> PowerOn {
+    let retained = match found {
+        Found::Nothing => Retained::Nothing,
+        Found::Kept(words) => Retained::Words(*words),
         Found::Damaged => {
             defmt::error!("what was kept of the encoder is damaged");
-            Start::Damaged
+            Retained::Damaged
         }
-    }
+    };
+    PowerOn { thermometer: configuration::thermometer(), retained }
 }

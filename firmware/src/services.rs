@@ -10,7 +10,8 @@ use bsp::losses::{EVENTS, Event, Losses};
 use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
-use node::{Action, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
+use node::fault::{PARAMETER_STORE, UNEXPECTED_RESET};
+use node::{Action, BusEvent, Next, NodeId, Parameters, Protocol};
 
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
@@ -244,10 +245,10 @@ impl Services {
     fn report_findings(&mut self, node: &mut impl Shared) {
         let Findings { crashed, no_store } = self.findings;
         self.findings.crashed = false;
-        for (fault, found) in [(Fault::UnexpectedReset, crashed), (Fault::ParameterStore, no_store)] {
+        for (fault, found) in [(UNEXPECTED_RESET, crashed), (PARAMETER_STORE, no_store)] {
             if found {
                 // The message goes out with the next poll.
-                let _ = node.call(|protocol, _| protocol.set_fault(fault, true, Clock::now()));
+                let _ = node.call(|protocol, _| protocol.set_fault(&fault, true, Clock::now()));
             }
         }
     }

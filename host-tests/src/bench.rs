@@ -2,10 +2,8 @@
 
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-use node::{
-    BitRate, BusEvent, FactoryCalibration, Fault, Measurement, Parcel, Personality, Protocol, RawEncoder,
-    RawSample, Setup, Start,
-};
+use node::{BitRate, BusEvent, Fault, Measurement, Personality, Protocol, Setup, StoreJob};
+use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
 use storage::{DeviceRecord, Memory, Pages, Store, View};
 
@@ -72,11 +70,14 @@ pub fn setup() -> Setup {
     }
 }
 
+/// A chip whose temperature sensor reads 940 at 30 degC and 1210 at 110 degC, with the reference at 1500.
+pub const CHIP: ChipThermometer =
+    ChipThermometer { offset: 303.15 - 940.0 * 80.0 / 270.0, slope: 1500.0 * 80.0 / 270.0 };
+
 /// The readings of an intact sensor at this pressure in Pa and temperature in K: 16 conversions at VDDA = 3.3 V.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
-    let factory = FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
     let supply = 16 * 4000;
     let ratio = 0.1 + 0.8 * pascal / 1.0e6;
     let temperature = 940.0 + (kelvin - 303.15) * (1210.0 - 940.0) / 80.0;
@@ -84,10 +85,9 @@ pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
         pressure: (ratio * f64::from(supply)).round() as u32,
         supply,
         temperature: (16.0 * temperature).round() as u32,
-        vrefint: 16 * 1500,
+        reference: 16 * 1500,
         thermistor: 0,
         count: 16,
-        factory,
     }
 }
 
@@ -101,6 +101,12 @@ fn stored_setup(record: DeviceRecord, unless_stored: &Setup) -> Setup {
     }
 }
 
+/// A board that is switched on for the first time.
+#[must_use]
+pub fn intact() -> PowerOn {
+    PowerOn { thermometer: CHIP, ..PowerOn::default() }
+}
+
 /// An empty parameter store.
 ///
 /// # Panics
@@ -111,11 +117,11 @@ pub fn empty_store() -> Flash {
 }
 
 /// Stores at once what the node asks to be stored.
-pub fn deliver(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
-    let mut parcel = Parcel::new(Personality::default());
-    if protocol.pack(&mut parcel) {
-        let result = parcel.deliver(store);
-        let _ = protocol.finish(&parcel, result, now, out);
+pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
+    let mut job = StoreJob::new(Personality::default());
+    if protocol.take_job(&mut job) {
+        let result = job.run(store);
+        let _ = protocol.finish(&job, result, now, out);
     }
 }
 
@@ -129,16 +135,22 @@ impl Bench {
     /// A node of this personality that has booted.
     #[must_use]
     pub fn booted_as(personality: Personality) -> Bench {
-        Bench::start(ERASED.to_vec(), &Setup { personality, ..setup() }, Start::First)
+        Bench::start(ERASED.to_vec(), &Setup { personality, ..setup() }, intact())
     }
 
     /// A node that has booted with this content of its parameter pages.
     #[must_use]
     pub fn with_flash(flash: Vec<u8>) -> Bench {
-        Bench::start(flash, &setup(), Start::First)
+        Bench::start(flash, &setup(), intact())
     }
 
-    fn start(flash: Vec<u8>, unless_stored: &Setup, kept: Start) -> Bench {
+    /// A node that has booted on a chip whose temperature sensor was not calibrated.
+    #[must_use]
+    pub fn booted_without_chip_calibration() -> Bench {
+        Bench::start(ERASED.to_vec(), &setup(), PowerOn::default())
+    }
+
+    fn start(flash: Vec<u8>, unless_stored: &Setup, power_on: PowerOn) -> Bench {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
         let record = view.device().expect("a record or none");
         let setup = record.map_or(*unless_stored, |record| stored_setup(record, unless_stored));
@@ -146,7 +158,7 @@ impl Bench {
         protocol.load(&mut view);
         let mut bench = Bench {
             protocol,
-            measurement: Measurement::new(setup.personality, kept),
+            measurement: Measurement::new(setup.personality, &power_on),
             out: Queue::default(),
             now: Instant(0),
             store: Store::prepare(view).expect("a store"),
@@ -164,8 +176,8 @@ impl Bench {
     /// Switches the power off and on.
     #[must_use]
     pub fn power_cycled(self) -> Bench {
-        let (flash, kept) = (self.store.into_flash().0, self.measurement.kept());
-        Bench::start(flash, &self.setup, kept.map_or(Start::First, Start::Kept))
+        let retained = self.measurement.retained();
+        Bench::start(self.store.into_flash().0, &self.setup, PowerOn { retained, ..intact() })
     }
 
     /// The same, with one bit changed of what was stored last.
@@ -179,7 +191,7 @@ impl Bench {
         let last = first_page.iter().rposition(|&byte| byte != 0xFF).expect("something is stored");
         // Behind the values are the commit word and the closing mark, four bytes each.
         flash[last - 8] ^= 1;
-        Bench::start(flash, &self.setup, Start::First)
+        Bench::start(flash, &self.setup, intact())
     }
 
     /// Boots, or boots again after a reset.
@@ -198,7 +210,7 @@ impl Bench {
     fn keep(&mut self, next: Next) {
         self.has_parameters |= next.parameters;
         match next.action {
-            Some(Action::Store(_)) => deliver(&mut self.protocol, &mut self.store, self.now, &mut self.out),
+            Some(Action::Store(_)) => run_job(&mut self.protocol, &mut self.store, self.now, &mut self.out),
             other => self.actions.extend(other),
         }
     }
@@ -211,7 +223,7 @@ impl Bench {
 
     /// A fault that the firmware has found, or that is gone.
     pub fn set_fault(&mut self, fault: Fault, active: bool) {
-        let _ = self.protocol.set_fault(fault, active, self.now);
+        let _ = self.protocol.set_fault(&fault, active, self.now);
         self.poll();
     }
 
@@ -257,8 +269,9 @@ impl Bench {
         if std::mem::take(&mut self.has_parameters) {
             self.measurement.apply(&self.protocol.parameters());
         }
-        let snapshot = self.measurement.sample(raw, &self.encoder, self.buttons);
-        let _ = self.protocol.publish(&snapshot, self.now, &mut self.out);
+        let inputs = Inputs { analogue: *raw, position: self.encoder, digital: self.buttons };
+        self.measurement.update(&inputs, self.protocol.snapshot_mut());
+        let _ = self.protocol.publish(self.now, &mut self.out);
         self.poll();
     }
 

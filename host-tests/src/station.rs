@@ -1,28 +1,26 @@
 //! A node as a station of a network: both halves, its parameter store, and what its sensors read.
 
 use canopen::{Action, Duration, Frame, Instant, NodeId, Transmit};
-use node::{BitRate, Measurement, Protocol, RawEncoder, RawSample, Setup, Start};
-use profiles::lift::panel::BUTTONS;
+use node::{BitRate, Measurement, Protocol, Setup};
+use profiles::board::{DIGITAL_INPUTS, Inputs, RawEncoder, RawSample};
 
 use crate::asked::Asked;
-use crate::bench::{Flash, deliver, empty_store, setup};
+use crate::bench::{Flash, empty_store, intact, run_job, setup};
 use crate::network::Unit;
 
 const SAMPLE_PERIOD: Duration = Duration::from_millis(1);
 
-/// What one sample reads: both analogue channels, the encoder and the buttons.
-pub type Readings = (RawSample, RawEncoder, [bool; BUTTONS]);
-
 /// What a station measures.
 pub trait Sensors {
     /// What its sensors read now.
-    fn read(&mut self, now: Instant) -> Readings;
+    fn read(&mut self, now: Instant) -> Inputs;
 }
 
 /// A pressure that does not change.
 impl Sensors for RawSample {
-    fn read(&mut self, _: Instant) -> Readings {
-        (*self, RawEncoder::default(), [false; BUTTONS])
+    fn read(&mut self, _: Instant) -> Inputs {
+        let position = RawEncoder::default();
+        Inputs { analogue: *self, position, digital: [false; DIGITAL_INPUTS] }
     }
 }
 
@@ -57,7 +55,7 @@ impl<S: Sensors> Station<S> {
     pub fn new(setup: &Setup, sensors: S) -> Station<S> {
         Station {
             protocol: Protocol::new(setup),
-            measurement: Measurement::new(setup.personality, Start::First),
+            measurement: Measurement::new(setup.personality, &intact()),
             store: empty_store(),
             sensors,
             next_sample: Instant::NEVER,
@@ -71,9 +69,9 @@ impl<S: Sensors> Station<S> {
         if self.asked.take_parameters() {
             self.measurement.apply(&self.protocol.parameters());
         }
-        let (raw, encoder, buttons) = self.sensors.read(now);
-        let snapshot = self.measurement.sample(&raw, &encoder, buttons);
-        self.asked.keep(self.protocol.publish(&snapshot, now, out));
+        let inputs = self.sensors.read(now);
+        self.measurement.update(&inputs, self.protocol.snapshot_mut());
+        self.asked.keep(self.protocol.publish(now, out));
     }
 }
 
@@ -106,7 +104,7 @@ impl<S: Sensors> Unit for Station<S> {
     }
 
     fn store(&mut self, now: Instant, out: &mut impl Transmit) {
-        deliver(&mut self.protocol, &mut self.store, now, out);
+        run_job(&mut self.protocol, &mut self.store, now, out);
     }
 
     fn process_ids(&self) -> Vec<u16> {

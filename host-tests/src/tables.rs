@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use node::{Personality, REVISION, Setup, VENDOR_ID};
+use node::{Personality, Setup};
+use product::{REVISION, VENDOR_ID};
 
 use crate::bench::{ID, setup};
 use crate::lift417;

@@ -1,7 +1,8 @@
 //! The calibration of a transmitter by SDO: locked, checked, at work from the next sample on, and kept by itself.
 
 use host_tests::bench::{Bench, raw};
-use node::{Personality, RawSample};
+use node::Personality;
+use profiles::board::RawSample;
 
 const ACCESS: u32 = 0x0601_0000;
 const PARAMETER: u32 = 0x0604_0043;

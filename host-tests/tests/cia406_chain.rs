@@ -1,12 +1,14 @@
 //! The encoder against golden values that golden/cia406_chain.py has computed on integers without bounds.
 
+use profiles::board::{RawEncoder, SsiFrame};
+use profiles::profile::Chain;
 use std::fmt::Debug;
 use std::num::{NonZeroU16, NonZeroU32};
 use std::str::FromStr;
 
 use profiles::encoder::{
-    CODE_SEQUENCE, ChannelParameters, Coding, Command, DIRECTION, Encoder, Format, Frame, Parameters, Parity,
-    RawEncoder, SCALING, SensorType,
+    CODE_SEQUENCE, ChannelParameters, Coding, Command, DIRECTION, Encoder, Format, Parameters, Parity,
+    SCALING, SensorType,
 };
 
 const POSITION: &str = include_str!("../golden/cia406_position.csv");
@@ -58,7 +60,7 @@ fn parameters(cells: &[&str]) -> Parameters {
 fn raw(kind: SensorType, format: Format, bits: &str) -> RawEncoder {
     let bits = u64::from_str_radix(bits, 16).unwrap();
     if kind.is_absolute() {
-        let frame = Frame { bits, clocks: format.length() + 3 };
+        let frame = SsiFrame { bits, clocks: format.length() + 3 };
         return RawEncoder { ssi: Some(frame), ..RawEncoder::default() };
     }
     RawEncoder { counter: u16::try_from(bits).unwrap(), ..RawEncoder::default() }

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use canopen::dictionary::Group;
 use canopen::{Condition, Frame};
 use host_tests::bench::{Bench, ID, raw};
-use node::{BusEvent, Fault, Personality, RawSample};
-use profiles::encoder::Board;
+use node::{BusEvent, FAULTS, Fault, Personality};
+use profiles::board::{Board, RawSample};
 
 const TABLE: &str = include_str!("../tables/emcy.csv");
 /// A number of mapped objects that makes it a multiplexed PDO with a destination.
@@ -58,12 +58,12 @@ impl Any {
             Bus::StoredData(Group::Application),
             Bus::StoredData(Group::Calibration),
         ];
-        Fault::ALL.into_iter().map(Any::Node).chain(bus.into_iter().map(Any::Bus))
+        FAULTS.into_iter().map(Any::Node).chain(bus.into_iter().map(Any::Bus))
     }
 
     fn name(self) -> String {
         match self {
-            Any::Node(fault) => format!("{fault:?}"),
+            Any::Node(fault) => fault.name.into(),
             Any::Bus(canopen::Fault::StoredData(group)) => format!("{group:?}Data"),
             Any::Bus(fault) => format!("{fault:?}"),
         }
@@ -71,7 +71,7 @@ impl Any {
 
     fn condition(self) -> Condition {
         match self {
-            Any::Node(fault) => fault.condition(),
+            Any::Node(fault) => fault.condition,
             Any::Bus(fault) => fault.condition(&[]),
         }
     }
@@ -109,14 +109,14 @@ fn provoke(bench: &mut Bench, fault: Any) {
 
 fn provoke_in_node(bench: &mut Bench, fault: Fault) {
     let mut sample = intact();
-    match fault {
-        Fault::SensorBreak => sample.pressure = 100,
-        Fault::PressureRail => sample.pressure = 0,
-        Fault::TemperatureRail => sample.temperature = 0,
-        Fault::EncoderBreak => bench.write(0x2100, 1, &[2]).unwrap(),
-        Fault::InputCurrent => bench.encoder.board.current = Some(1000),
-        Fault::InputVoltage => bench.encoder.board.supply = Some(0),
-        Fault::HardwareMemory => bench.encoder.board.memory_error = true,
+    match fault.name {
+        "SensorBreak" => sample.pressure = 100,
+        "PressureRail" => sample.pressure = 0,
+        "TemperatureRail" => sample.temperature = 0,
+        "EncoderBreak" => bench.write(0x2100, 1, &[2]).unwrap(),
+        "InputCurrent" => bench.encoder.board.current = Some(1000),
+        "InputVoltage" => bench.encoder.board.supply = Some(0),
+        "HardwareMemory" => bench.encoder.board.memory_error = true,
         _ => return bench.set_fault(fault, true),
     }
     (0..1000).for_each(|_| bench.sample(&sample));

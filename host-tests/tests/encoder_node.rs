@@ -4,7 +4,7 @@
 use canopen::Frame;
 use host_tests::bench::{Bench, ID, raw};
 use node::{Personality, State};
-use profiles::encoder::Board;
+use profiles::board::Board;
 
 const TPDO1: u16 = 0x180 + ID as u16;
 const TPDO2: u16 = 0x280 + ID as u16;

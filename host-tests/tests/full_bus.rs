@@ -11,7 +11,8 @@ use host_tests::lss::Master;
 use host_tests::network::{Network, from_bus};
 use host_tests::sdo::Client;
 use host_tests::station::PressureNode;
-use node::{Measurement, Parcel, Personality, Protocol, REVISION, VENDOR_ID};
+use node::{Measurement, Personality, Protocol, StoreJob};
+use product::{REVISION, VENDOR_ID};
 
 const NODES: u8 = 127;
 /// Event timer of TPDO 1, in ms: 127 frames of eight bytes fill some 16 of them.
@@ -80,11 +81,11 @@ fn print_figures(network: &Network<PressureNode>, share: f64) {
         "{NODES} nodes: {seconds:.3} s of virtual time, {frames} frames, {share:.1} % load when all send"
     );
     let protocol = size_of::<Protocol>();
-    let [measurement, queue, parcel] =
-        [size_of::<Measurement>(), size_of::<TransmitQueue>(), size_of::<Parcel>()];
-    let sum = protocol + measurement + queue + parcel;
+    let [measurement, queue, job] =
+        [size_of::<Measurement>(), size_of::<TransmitQueue>(), size_of::<StoreJob>()];
+    let sum = protocol + measurement + queue + job;
     println!(
-        "{sum} bytes a node: protocol {protocol}, measurement {measurement}, transmit queue {queue}, store {parcel}"
+        "{sum} bytes a node: protocol {protocol}, measurement {measurement}, transmit queue {queue}, store {job}"
     );
 }
 

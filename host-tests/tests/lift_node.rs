@@ -8,7 +8,8 @@ use canopen::sdo::Multiplexer;
 use host_tests::bench::{Bench, ID, raw};
 use host_tests::lift417::pdos;
 use host_tests::tables::table;
-use node::{Personality, RawSample};
+use node::Personality;
+use profiles::board::RawSample;
 use profiles::lift::load::OVERLOAD;
 
 const NO_OBJECT: u32 = 0x0602_0000;
@@ -165,7 +166,7 @@ fn lamps_follow_the_virtual_output_a_multiplexed_pdo_and_a_client() {
     }
     let output = |bench: &mut Bench, word| {
         bench.receive(&Frame::new(0x400, &[word, 0, 0, 0, 0, 1]).unwrap());
-        bench.protocol.lamps()
+        bench.protocol.outputs().digital
     };
     assert_eq!(output(&mut bench, 0x11), [true, false]);
     assert_eq!(output(&mut bench, 0x21), [true, true]);
@@ -174,9 +175,9 @@ fn lamps_follow_the_virtual_output_a_multiplexed_pdo_and_a_client() {
     let at = Multiplexer { index: 0x2322, sub: 1 };
     let lamp = Mpdo { address: Address::Destination(None), at, data: [1, 0, 0, 0] };
     bench.receive(&Frame::new(0x503, &lamp.encode()).unwrap());
-    assert_eq!(bench.protocol.lamps(), [true, true]);
+    assert_eq!(bench.protocol.outputs().digital, [true, true]);
     bench.write(0x6011, 0, &[0x20, 0, 0, 0, 0, 1]).unwrap();
-    assert_eq!(bench.protocol.lamps(), [true, false]);
+    assert_eq!(bench.protocol.outputs().digital, [true, false]);
 }
 
 #[test]

@@ -5,8 +5,8 @@ use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Objec
 use canopen::{Device, Duration, Frame, Instant, NodeId};
 use host_tests::bench::Queue;
 use host_tests::lift417::{Pdo, pdos};
-use node::lift::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 use profiles::lift::catalogue::by_cob_id;
+use profiles::lift::objects::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 
 /// Node-ID of the producer.
 const ID: u8 = 33;

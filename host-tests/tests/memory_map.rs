@@ -85,7 +85,7 @@ fn the_staging_slot_holds_any_image_of_the_application_slot() {
 #[test]
 fn the_update_knows_the_areas_and_their_sectors() {
     let regions = regions();
-    let layout = update::Layout::STM32F4;
+    let layout = bsp::update_layout::LAYOUT;
     let application = regions["IMAGE_HEADER"].start..regions["APPLICATION"].end;
     assert_eq!(regions["IMAGE_HEADER"].len(), update::HEADER_LEN);
     for (area, region) in

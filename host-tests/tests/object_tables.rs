@@ -3,11 +3,11 @@
 
 use std::collections::BTreeSet;
 
-use canopen::dictionary::{Access, Object, Type};
+use canopen::dictionary::{Access, Type};
 use host_tests::bench::{Bench, ID};
 use host_tests::lift417;
 use host_tests::tables::{Row, table};
-use node::{Personality, combined, encoder, lift, pressure};
+use node::Personality;
 
 const ACCESS: u32 = 0x0601_0000;
 const NOT_MAPPABLE: u32 = 0x0604_0041;
@@ -17,16 +17,6 @@ const TOO_LONG: u32 = 0x0607_0012;
 const TOO_SHORT: u32 = 0x0607_0013;
 const DEVICE_STATE: u32 = 0x0800_0022;
 const NO_DATA: u32 = 0x0800_0024;
-
-/// The node's own table.
-fn own(personality: Personality) -> &'static [Object] {
-    match personality {
-        Personality::Pressure => &pressure::OBJECTS,
-        Personality::Encoder => &encoder::OBJECTS,
-        Personality::Combined => &combined::OBJECTS,
-        Personality::Lift => &lift::OBJECTS,
-    }
-}
 
 /// Every row of every personality.
 fn rows() -> impl Iterator<Item = (Personality, Row)> {
@@ -51,7 +41,7 @@ fn without_tpdos(personality: Personality) -> Bench {
 fn the_node_has_nothing_that_the_tables_do_not_know() {
     for personality in Personality::ALL {
         let known = table(personality).into_iter().map(|row| (row.index, row.sub, row.name));
-        let own = own(personality).iter().map(|row| (row.index, row.sub, row.name));
+        let own = personality.rows().iter().map(|row| (row.index, row.sub, row.name));
         let [known, own] = [known.collect::<BTreeSet<_>>(), own.collect()];
         let difference: Vec<_> = known.symmetric_difference(&own).collect();
         assert!(difference.is_empty(), "{personality:?}: {difference:X?}");
@@ -144,7 +134,7 @@ fn what_can_be_mapped_is_sent_and_the_rest_is_refused() {
 #[test]
 fn the_node_s_table_has_the_access_and_the_type_of_the_row() {
     for (personality, row) in rows() {
-        let mut own = own(personality).iter();
+        let mut own = personality.rows().iter();
         let own = own.find(|own| (own.index, own.sub) == (row.index, row.sub)).unwrap();
         let access = match own.access {
             Access::Const => "const",

@@ -4,7 +4,7 @@ use canopen::Instant;
 use canopen::lss::Request as LssRequest;
 use canopen::sdo::Abort;
 use host_tests::bench::{Bench, ID};
-use node::{Action, Parcel, Personality};
+use node::{Action, Personality, StoreJob};
 
 const VALUE_TOO_HIGH: u32 = 0x0609_0031;
 
@@ -90,9 +90,9 @@ fn a_store_that_fails_is_told_and_changes_nothing() {
     while !matches!(next.action, Some(Action::Store(_))) {
         next = bench.protocol.poll_services(now, &mut bench.out);
     }
-    let mut parcel = Parcel::new(Personality::default());
-    assert!(bench.protocol.pack(&mut parcel));
-    let _ = bench.protocol.finish(&parcel, Err(Abort::Hardware), now, &mut bench.out);
+    let mut job = StoreJob::new(Personality::default());
+    assert!(bench.protocol.take_job(&mut job));
+    let _ = bench.protocol.finish(&job, Err(Abort::Hardware), now, &mut bench.out);
     assert_eq!(bench.take(), [(0x580 + u16::from(ID), vec![0x80, 0, 0x20, 0, 0, 0, 6, 6])]);
     assert_eq!(personality(&mut bench), 0);
 }

@@ -1,8 +1,10 @@
 //! The pressure node as a whole: from converter readings to frames, parameters back into the chain, faults.
 
 use canopen::{Frame, Instant};
-use host_tests::bench::{Bench, ID, Queue, raw, setup};
-use node::{Action, BusEvent, Fault, Measurement, Protocol, RawEncoder, Start, State};
+use host_tests::bench::{Bench, ID, Queue, intact, raw, setup};
+use node::fault::UNEXPECTED_RESET;
+use node::{Action, BusEvent, Measurement, Protocol, State};
+use profiles::board::{Inputs, RawEncoder};
 
 const TPDO1: u16 = 0x180 + ID as u16;
 const EMCY: u16 = 0x080 + ID as u16;
@@ -49,11 +51,13 @@ fn tpdo1_carries_the_live_pressure_and_temperature() {
 fn a_node_that_is_started_the_moment_it_boots_sends_what_it_has_measured_before() {
     let setup = setup();
     let mut protocol = Protocol::new(&setup);
-    let mut measurement = Measurement::new(setup.personality, Start::First);
+    let mut measurement = Measurement::new(setup.personality, &intact());
     let (mut out, now) = (Queue::default(), Instant(0));
     measurement.apply(&protocol.load_defaults());
-    let snapshot = measurement.sample(&raw(250_000.0, 298.15), &RawEncoder::default(), [false; 2]);
-    let _ = protocol.publish(&snapshot, now, &mut out);
+    let analogue = raw(250_000.0, 298.15);
+    let inputs = Inputs { analogue, position: RawEncoder::default(), digital: [false; 2] };
+    measurement.update(&inputs, protocol.snapshot_mut());
+    let _ = protocol.publish(now, &mut out);
     let _ = protocol.start(now, &mut out);
     let _ = protocol.on_process_frame(&Frame::new(0, &[1, ID]).unwrap(), now, &mut out);
     let last = out.0.last().unwrap();
@@ -147,8 +151,16 @@ fn rails_are_found_at_once() {
     assert_eq!(emergencies(&mut bench), [(0x8002, 1), (0x8001, 1)]);
     assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 3 | 1 << 4, 0, 0, 0]));
     assert_eq!(bench.protocol.state(), State::Operational);
-    rail.factory.ts_cal1 = rail.factory.ts_cal2;
     bench.sample(&rail);
+    assert!(real(&mut bench, 0x6100, 2).abs() < f32::EPSILON);
+    assert_eq!(bench.read(0x7130, 2), Ok((-273_i16).to_le_bytes().to_vec()));
+}
+
+#[test]
+fn a_chip_without_calibration_measures_no_temperature() {
+    let mut bench = Bench::booted_without_chip_calibration();
+    bench.sample(&raw(0.0, 298.15));
+    assert_eq!(emergencies(&mut bench), [(0x8001, 1)]);
     assert!(real(&mut bench, 0x6100, 2).abs() < f32::EPSILON);
     assert_eq!(bench.read(0x7130, 2), Ok((-273_i16).to_le_bytes().to_vec()));
 }
@@ -157,7 +169,7 @@ fn rails_are_found_at_once() {
 fn a_transducer_without_supply_is_a_break_and_not_a_division_by_zero() {
     let mut bench = Bench::booted();
     let mut dead = raw(0.0, 298.15);
-    (dead.supply, dead.vrefint) = (0, 0);
+    (dead.supply, dead.reference) = (0, 0);
     bench.sample(&dead);
     assert!(real(&mut bench, 0x6130, 1).is_finite() && real(&mut bench, 0x6130, 2).is_finite());
     assert_eq!(emergencies(&mut bench), [(0x5006, 1), (0x8001, 1)]);
@@ -175,7 +187,7 @@ fn the_span_sets_the_overload_bits() {
 #[test]
 fn flags_survive_a_reset_as_what_they_report_does() {
     let mut bench = Bench::booted();
-    bench.set_fault(Fault::UnexpectedReset, true);
+    bench.set_fault(UNEXPECTED_RESET, true);
     assert_eq!(emergencies(&mut bench), [(0x6101, 1)]);
     bench.nmt(0x81);
     while bench.take_action().is_some_and(|action| action != Action::ResetNode) {}

@@ -14,6 +14,7 @@ pub mod bit_rate_detection;
 pub mod bit_timing;
 pub mod bus_state;
 mod checksum;
+pub mod chip_thermometer;
 pub mod crash_record;
 pub mod debounce;
 pub mod extension;
@@ -31,6 +32,7 @@ pub mod ssi_word;
 pub mod step;
 pub mod supervision;
 pub mod transmit_queue;
+pub mod update_layout;
 pub mod vectors;
 
 #[cfg(target_os = "none")]

@@ -1,8 +1,9 @@
 //! What the parameter store has of the device itself: what it is to be after the next reset.
 
-use crate::{Personality, Setup};
+use crate::Setup;
 use canopen::lss::Configuration;
 use canopen::{Job, NodeId};
+use profiles::Personality;
 use storage::DeviceRecord;
 
 /// The content of the device record.

@@ -1,106 +1,72 @@
-//! The faults of the node itself, and what they look like on the bus. The faults of communication are the device's
+//! Every fault of the node: its own, and those of the profiles. The faults of communication are the device's
 //! ([`canopen::Fault`]).
 
 use canopen::Condition;
+use canopen::dictionary::Group;
+use profiles::fault::{Fault, Flags, count, gather};
 
-/// A fault of the node. The discriminant is its place in [`Fault::CONDITIONS`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Fault {
-    /// The clock of the sensor.
-    SensorClock,
-    /// The sensor did not start.
-    SensorBoot,
-    /// The sensor's signal is outside what an intact sensor can give.
-    SensorBreak,
-    /// The sensor's memory is corrupt.
-    SensorMemory,
-    /// The temperature input is at a rail of the converter.
-    TemperatureRail,
-    /// The pressure input is at a rail of the converter.
-    PressureRail,
-    /// An encoder does not answer, or not as one.
-    EncoderBreak,
-    /// The encoders take too much current.
-    InputCurrent,
-    /// The supply of the encoders is out of its limits.
-    InputVoltage,
-    /// A memory of the hardware is damaged.
-    HardwareMemory,
-    /// A module did not initialise.
-    ModuleInitialisation,
-    /// The image does not fit the hardware.
-    HardwareIdentification,
-    /// The parameter store cannot be used.
-    ParameterStore,
-    /// The node restarted without having been told to.
-    UnexpectedReset,
-    /// Node-ID and bit rate could not be loaded.
-    BootData,
+const fn fault(name: &'static str, code: u16, flags: Flags) -> Fault {
+    Fault { name, condition: Condition::new(code), flags }
 }
 
-/// Bits of the error register (1001h): current and voltage.
-const CURRENT: u8 = 1 << 1;
-const VOLTAGE: u8 = 1 << 2;
+/// The clock of the sensor.
+pub const SENSOR_CLOCK: Fault = fault("SensorClock", 0x5004, Flags::sensor(1));
+/// The sensor did not start.
+pub const SENSOR_BOOT: Fault = fault("SensorBoot", 0x5005, Flags::sensor(2));
+/// The sensor's memory is corrupt.
+pub const SENSOR_MEMORY: Fault = fault("SensorMemory", 0x5007, Flags::sensor(6));
+/// A module did not initialise.
+pub const MODULE_INITIALISATION: Fault = fault("ModuleInitialisation", 0x5001, Flags::system(0));
+/// The image does not fit the hardware.
+pub const HARDWARE_IDENTIFICATION: Fault = fault("HardwareIdentification", 0x5002, Flags::system(1));
+/// The parameter store cannot be used.
+pub const PARAMETER_STORE: Fault = fault("ParameterStore", 0x5003, Flags::system(2));
+/// Node-ID and bit rate could not be loaded.
+pub const BOOT_DATA: Fault = fault("BootData", 0x6301, Flags::system(3));
+/// The node restarted without having been told to.
+pub const UNEXPECTED_RESET: Fault = fault("UnexpectedReset", 0x6101, Flags::system(6));
 
-impl Fault {
-    /// All of them, in the order of their numbers.
-    pub const ALL: [Fault; 15] = [
-        Fault::SensorClock,
-        Fault::SensorBoot,
-        Fault::SensorBreak,
-        Fault::SensorMemory,
-        Fault::TemperatureRail,
-        Fault::PressureRail,
-        Fault::EncoderBreak,
-        Fault::InputCurrent,
-        Fault::InputVoltage,
-        Fault::HardwareMemory,
-        Fault::ModuleInitialisation,
-        Fault::HardwareIdentification,
-        Fault::ParameterStore,
-        Fault::UnexpectedReset,
-        Fault::BootData,
-    ];
+/// Those that no profile finds.
+const OWN: &[Fault] = &[
+    SENSOR_CLOCK,
+    SENSOR_BOOT,
+    SENSOR_MEMORY,
+    MODULE_INITIALISATION,
+    HARDWARE_IDENTIFICATION,
+    PARAMETER_STORE,
+    BOOT_DATA,
+    UNEXPECTED_RESET,
+];
 
-    /// What they look like on the bus, in the same order.
-    pub const CONDITIONS: [Condition; 15] = {
-        let mut conditions = [Condition::new(0); 15];
-        let mut i = 0;
-        while i < 15 {
-            conditions[i] = Fault::ALL[i].condition();
-            i += 1;
-        }
-        conditions
-    };
+const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
 
-    /// Emergency error code (CiA 301, table 26, CiA 406, 5.1, and the codes of the classes 50xxh, 61xxh, 63xxh and 80xxh that
-    /// are the manufacturer's), bits of the error register, and the error field: 1 for the encoder's sensor, whose code is
-    /// that of the pressure sensor.
-    #[must_use]
-    pub const fn condition(self) -> Condition {
-        match self {
-            Fault::SensorClock => Condition::new(0x5004),
-            Fault::SensorBoot => Condition::new(0x5005),
-            Fault::SensorBreak => Condition::new(0x5006),
-            Fault::SensorMemory => Condition::new(0x5007),
-            Fault::TemperatureRail => Condition::new(0x8001),
-            Fault::PressureRail => Condition::new(0x8002),
-            Fault::EncoderBreak => Condition { detail: [1, 0, 0, 0, 0], ..Condition::new(0x5006) },
-            Fault::InputCurrent => Condition { register: CURRENT, ..Condition::new(0x2110) },
-            Fault::InputVoltage => Condition { register: VOLTAGE, ..Condition::new(0x3110) },
-            Fault::HardwareMemory => Condition::new(0x5100),
-            Fault::ModuleInitialisation => Condition::new(0x5001),
-            Fault::HardwareIdentification => Condition::new(0x5002),
-            Fault::ParameterStore => Condition::new(0x5003),
-            Fault::UnexpectedReset => Condition::new(0x6101),
-            Fault::BootData => Condition::new(0x6301),
-        }
+/// All faults, in the order of their numbers ([`canopen::Fault::Application`]).
+pub static FAULTS: [Fault; count(LISTS)] = gather(LISTS);
+
+/// What they look like on the bus, in the same order.
+pub(crate) const CONDITIONS: [Condition; count(LISTS)] = {
+    let faults: [Fault; count(LISTS)] = gather(LISTS);
+    let mut conditions = [Condition::new(0); count(LISTS)];
+    let mut i = 0;
+    while i < conditions.len() {
+        conditions[i] = faults[i].condition;
+        i += 1;
     }
+    conditions
+};
 
-    /// Its place in the list.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        self as u8
+/// The number of a fault.
+pub(crate) fn number(fault: &Fault) -> Option<u8> {
+    let mut numbered = (0..).zip(&FAULTS);
+    numbered.find(|(_, known)| *known == fault).map(|(number, _)| number)
+}
+
+/// The flag of a storage group whose values could not be loaded. Without its calibration, the sensor runs with that of no
+/// device.
+pub(crate) fn flag_of(group: Group) -> Flags {
+    match group {
+        Group::Calibration => Flags::sensor(0),
+        Group::Communication => Flags::system(4),
+        Group::Application => Flags::system(5),
     }
 }

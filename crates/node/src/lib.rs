@@ -1,44 +1,32 @@
 //! One CANopen sensor node: everything that is its state, in two values that two priorities of the firmware own.
 //!
-//! [`Protocol`] is the CANopen device, [`Measurement`] the sampling chain. A [`Snapshot`] goes from the second to the
-//! first once a millisecond, [`Parameters`] go back when they have changed; each is one consistent set of values.
+//! [`Protocol`] is the CANopen device, [`Measurement`] the sampling half of its profile. A [`Snapshot`] goes from the second
+//! to the first once a millisecond, [`Parameters`] go back when they have changed; each is one consistent set of values.
+//! What a node measures, and what its objects mean, is in the crate `profiles`.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
-pub mod combined;
-mod communication;
+mod application;
 mod configured;
-mod dictionaries;
-pub mod encoder;
-mod fault;
+pub mod fault;
 mod faults;
-mod flags;
-mod keeping;
-pub mod lift;
 mod lost_events;
-mod manufacturer;
-mod measurement;
-mod parcel;
-mod personality;
-pub mod pressure;
-mod profile;
+mod packed;
 mod protocol;
 mod setup;
+mod store_job;
 mod stored;
+mod storing;
 mod transfer_buffer;
 
 pub use canopen::lss::BitRate;
 pub use canopen::nmt::State;
 pub use canopen::{Action, BusEvent, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-pub use fault::Fault;
+pub use fault::FAULTS;
 pub use lost_events::LOST_EVENTS;
-pub use measurement::{Measurement, Parameters, Snapshot};
-pub use parcel::Parcel;
-pub use personality::Personality;
-pub use profiles::encoder::{
-    Board as EncoderBoard, ChannelParameters as EncoderChannel, Frame as SsiFrame, Kept, RawEncoder, Start,
-};
-pub use profiles::pressure::{FactoryCalibration, RawSample};
+pub use profiles::fault::Fault;
+pub use profiles::{Measurement, Parameters, Personality, Snapshot};
 pub use protocol::Protocol;
-pub use setup::{REVISION, Setup, VENDOR_ID};
+pub use setup::Setup;
+pub use store_job::StoreJob;

@@ -1,19 +1,21 @@
 //! The protocol half: the CANopen device with everything it owns.
 
-use crate::faults::Conditions;
-use crate::profile::{IMAGE_SIZE, Profile};
-use crate::{Next, Parameters, Setup, Snapshot};
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
-use profiles::lift::panel::LAMPS;
+use profiles::board::Outputs;
+use profiles::{IMAGE_SIZE, Parameters, Snapshot};
+
+use crate::application::NodeApplication;
+use crate::faults::Shown;
+use crate::{Next, Setup};
 
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call. Every
 /// call returns what follows from it: see [`Next`].
 #[derive(Debug)]
 pub struct Protocol {
-    pub(crate) device: Device<Profile, IMAGE_SIZE>,
+    pub(crate) device: Device<NodeApplication, IMAGE_SIZE>,
     /// As last published: most samples change nothing.
-    pub(crate) conditions: Conditions,
+    pub(crate) shown: Shown,
     /// What `Action::Store` is about.
     pub(crate) job: Option<Job>,
 }
@@ -22,10 +24,10 @@ impl Protocol {
     /// A node that has not started: it is silent and hears nothing until `start`.
     #[must_use]
     pub fn new(setup: &Setup) -> Protocol {
-        let dictionary = setup.personality.definition().dictionary;
+        let dictionary = setup.personality.dictionary();
         let device =
-            Device::new(dictionary, setup.node_id, Profile::new(setup)).with_bit_rate(setup.bit_rate);
-        Protocol { device, conditions: Conditions::default(), job: None }
+            Device::new(dictionary, setup.node_id, NodeApplication::new(setup)).with_bit_rate(setup.bit_rate);
+        Protocol { device, shown: Shown::default(), job: None }
     }
 
     /// Initialises what the pending reset covers, then boots up. To be called once the bus is ready,
@@ -35,7 +37,7 @@ impl Protocol {
         self.note(next)
     }
 
-    /// Keeps the job that is to be stored, for `pack`.
+    /// Keeps the job that is to be done, for `take_job`.
     pub(crate) fn note(&mut self, next: Next) -> Next {
         if let Some(Action::Store(job)) = next.action {
             self.job = Some(job);
@@ -66,19 +68,24 @@ impl Protocol {
         self.note(next)
     }
 
+    /// The place of the values of the last millisecond, for [`publish`](Protocol::publish): who measures writes them
+    /// there, or copies them once.
+    pub fn snapshot_mut(&mut self) -> &mut Snapshot {
+        &mut self.device.application_mut().snapshot
+    }
+
     /// Takes the values of the last millisecond into the dictionary and sends what their change triggers, and what is due
     /// of process data. Before the measurement has parameters there are none.
-    pub fn publish(&mut self, snapshot: &Snapshot, now: Instant, out: &mut impl Transmit) -> Next {
-        if snapshot.is_empty() {
+    pub fn publish(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        let snapshot = &self.device.application().snapshot;
+        if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
         }
-        self.device.application_mut().snapshot = *snapshot;
-        self.device.show(|profile, image| profile.show_values(image));
-        let conditions = Conditions::of(snapshot);
-        if self.conditions != conditions {
-            self.take_conditions(conditions, now);
+        let shown = Shown::of(snapshot);
+        if self.shown != shown {
+            self.follow_faults(shown, now);
         }
-        self.device.publish(now, out, |_, _| ())
+        self.device.publish(now, out, |application, image| application.show_values(image))
     }
 
     /// Does what is due of PDO and SYNC timers.
@@ -95,19 +102,13 @@ impl Protocol {
     /// The parameters for `Measurement::apply`: new ones when [`Next::parameters`] says so.
     #[must_use]
     pub fn parameters(&self) -> Parameters {
-        let image = self.device.image();
-        let definition = self.device.application().definition();
-        Parameters {
-            pressure: definition.pressure.map(|fields| fields.parameters(image)),
-            encoder: definition.encoder.map(|fields| fields.parameters(image)),
-            lift: definition.lift.map(|fields| fields.parameters(image)),
-        }
+        self.device.application().profile.parameters(self.device.image())
     }
 
-    /// Which lamps of the panel are lit. To be asked after each frame.
+    /// What the board has to show. To be asked after each frame.
     #[must_use]
-    pub fn lamps(&self) -> [bool; LAMPS] {
-        self.device.application().lit(self.device.image())
+    pub fn outputs(&self) -> Outputs {
+        self.device.application().profile.outputs(self.device.image())
     }
 
     /// Identifiers for FIFO 0, data and remote frames.

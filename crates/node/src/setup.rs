@@ -1,13 +1,8 @@
 //! What a node must know before it starts.
 
-use crate::Personality;
 use canopen::NodeId;
 use canopen::lss::BitRate;
-
-/// Vendor-ID of object 1018h:1. 0 is no vendor: put the one CiA assigned to you here.
-pub const VENDOR_ID: u32 = 0;
-/// Revision number of object 1018h:3: major in the high word, minor in the low word.
-pub const REVISION: u32 = 0x0001_0000;
+use profiles::Personality;
 
 /// Everything that comes from outside the dictionary: configuration of the board and of the image.
 #[derive(Clone, Copy, Debug)]

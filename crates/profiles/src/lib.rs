@@ -1,8 +1,38 @@
-//! What the node measures, as the CiA device profiles define it. Pure functions and small states; no bus, no hardware.
+//! The profiles of the node: what it measures, and what that means on the bus.
+//!
+//! A profile is a folder with everything that belongs to it: its rows, its arithmetic, and one implementation of
+//! [`profile::Profile`] and [`profile::Chain`]. This file has the one list of them. No hardware, no clock, no bus.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
 
+pub mod board;
+pub mod communication;
+pub mod fault;
+mod list;
+pub mod pair;
+pub mod profile;
+pub mod table;
+
+pub mod combined;
 pub mod encoder;
 pub mod lift;
 pub mod pressure;
+
+personalities! {
+    Pressure => pressure, "pressure.eds", "Pressure and temperature transmitter, CiA 404";
+    Encoder => encoder, "encoder.eds", "Encoder, CiA 406";
+    Combined => combined, "combined.eds", "Encoder and transmitter in one, CiA 406 and CiA 404";
+    Lift => lift, "lift.eds", "Car position, load measuring and panel units of a lift, CiA 417";
+}
+
+impl Personality {
+    /// Product code of object 1018h:2.
+    #[must_use]
+    pub const fn product_code(self) -> u32 {
+        product::code(self.number())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,11 +1,10 @@
 //! Car position units: the way of a car, seen by sensors of each kind.
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
 
+use profiles::board::{RawEncoder, SsiFrame};
 use std::num::{NonZeroU16, NonZeroU32};
 
-use profiles::encoder::{
-    Area, Coding, Command, Format, Frame, OVERFLOW, RawEncoder, SensorType, UNDERFLOW, WARNING_FREQUENCY,
-};
+use profiles::encoder::{Area, Coding, Command, Format, OVERFLOW, SensorType, UNDERFLOW, WARNING_FREQUENCY};
 use profiles::lift::position::{
     INVERTED, Parameters, PositionUnits, Snapshot, Source, UNKNOWN, UnitParameters,
 };
@@ -75,10 +74,10 @@ impl Car {
 }
 
 /// What an SSI encoder sends for a position: a high level, the code, and a low level to the last clock.
-fn frame(format: &Format, position: u32) -> Frame {
+fn frame(format: &Format, position: u32) -> SsiFrame {
     let bits = format.position_bits();
     let code = position ^ (position >> 1);
-    Frame { bits: (1 << bits | u64::from(code)) << 1, clocks: bits + 2 }
+    SsiFrame { bits: (1 << bits | u64::from(code)) << 1, clocks: bits + 2 }
 }
 
 fn with_sensor(kind: SensorType, resolution: u32) -> Parameters {

@@ -1,10 +1,10 @@
 //! Whatever finite parameters and whatever readings: nothing but finite numbers leaves the transmitter, and the order of
 //! pressures is kept.
 
+use profiles::board::{ChipThermometer, RawSample};
 use profiles::pressure::{
-    Calibration, Channel, ChannelParameters, ChannelValues, FactoryCalibration, Parameters, Polynomial,
-    PressureCalibration, RawSample, STATUS_INVALID, Span, TemperatureCalibration, Thermistor, Thermometer,
-    Transmitter, Unit,
+    Calibration, Channel, ChannelParameters, ChannelValues, Parameters, Polynomial, PressureCalibration,
+    STATUS_INVALID, Span, TemperatureCalibration, Thermistor, Thermometer, Transmitter, Unit,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -82,12 +82,10 @@ prop_compose! {
         small in any::<[u16; 5]>(),
         is_small in any::<bool>(),
         count in any::<u16>(),
-        [ts_cal1, ts_cal2, vrefint_cal] in any::<[u16; 3]>(),
     ) -> RawSample {
-        let [pressure, supply, temperature, vrefint, thermistor] =
+        let [pressure, supply, temperature, reference, thermistor] =
             if is_small { small.map(u32::from) } else { sums };
-        let factory = FactoryCalibration { ts_cal1, ts_cal2, vrefint_cal };
-        RawSample { pressure, supply, temperature, vrefint, thermistor, count, factory }
+        RawSample { pressure, supply, temperature, reference, thermistor, count }
     }
 }
 
@@ -123,9 +121,11 @@ proptest! {
     #[test]
     fn no_transmitter_gives_anything_but_numbers(
         (pressure, temperature, calibration) in (channel(), channel(), calibration()),
+        (offset, slope) in (any::<f32>(), any::<f32>()),
         readings in vec(raw(), 1..4),
     ) {
-        let mut transmitter = Transmitter::new(&Parameters { pressure, temperature, calibration });
+        let chip = ChipThermometer { offset, slope };
+        let mut transmitter = Transmitter::new(chip, &Parameters { pressure, temperature, calibration });
         for reading in readings {
             let snapshot = transmitter.sample(&reading);
             prop_assert!(is_finite(&snapshot.pressure) && is_finite(&snapshot.temperature), "{snapshot:?}");

@@ -2,7 +2,7 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
-/// The unit of programming: 32 bits, x32 parallelism of the STM32F4 (RM0390, 3.5.2).
+/// A word of the format. The flash may program more at once: see [`Format`].
 pub(crate) const WORD: u32 = 4;
 /// A word that was not programmed since the page was erased.
 pub(crate) const ERASED: u32 = u32::MAX;
@@ -11,16 +11,56 @@ pub(crate) const ERASED: u32 = u32::MAX;
 pub(crate) const MARK: u32 = 0;
 /// First word of a page whose erase has run to its end; the digit is the version of this format.
 pub(crate) const CLEAN: u32 = u32::from_le_bytes(*b"PRM1");
-/// Where the mark of a page is that the store has moved away from.
-pub(crate) const LEFT_AT: u32 = WORD;
-/// Where the first transaction of a page begins.
-pub(crate) const FIRST: u32 = 2 * WORD;
-/// Size of what precedes the records of a transaction: begin mark, generation, length.
-pub(crate) const HEAD: u32 = 3 * WORD;
-/// Size of what follows the records: commit word, closing mark.
-pub(crate) const TAIL: u32 = 2 * WORD;
-/// Size of what precedes the value of a record: group, kind and version; length.
-pub(crate) const RECORD_HEAD: u32 = 2 * WORD;
+/// The most bytes that a flash may program as one.
+pub(crate) const LARGEST_UNIT: u32 = 32;
+
+/// Where things are in a page. What is programmed on its own has a unit of the flash for itself: a flash with check bits
+/// programs a unit once. The words that follow each other fill units; zeros fill what is left of the last one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Format {
+    /// Bytes that the flash programs as one: 4, 8, 16 or 32.
+    pub(crate) unit: u32,
+}
+
+impl Format {
+    /// `None` for a unit that is none.
+    pub(crate) const fn new(unit: u32) -> Option<Format> {
+        match unit {
+            WORD | 8 | 16 | LARGEST_UNIT => Some(Format { unit }),
+            _ => None,
+        }
+    }
+
+    /// Where the mark of a page is that the store has moved away from.
+    pub(crate) fn left_at(self) -> u32 {
+        self.unit
+    }
+
+    /// Where the first transaction of a page begins.
+    pub(crate) fn first(self) -> u32 {
+        2 * self.unit
+    }
+
+    /// Size of what precedes the records of a transaction: begin mark; generation and length.
+    pub(crate) fn head(self) -> u32 {
+        self.unit + self.padded(2 * WORD)
+    }
+
+    /// Size of what follows the records: commit word, closing mark.
+    pub(crate) fn tail(self) -> u32 {
+        2 * self.unit
+    }
+
+    /// Size of what precedes the value of a record: group, kind and version; length.
+    pub(crate) fn record_head(self) -> u32 {
+        self.padded(2 * WORD)
+    }
+
+    /// Bytes that a value takes up: whole units.
+    pub(crate) fn padded(self, len: u32) -> u32 {
+        len.next_multiple_of(self.unit)
+    }
+}
 
 /// The kinds of a record.
 pub(crate) const KIND_VALUE: u8 = 1;
@@ -40,11 +80,6 @@ pub(crate) fn unguarded(word: u32) -> Option<u16> {
     let [low, high, ..] = word.to_le_bytes();
     let value = u16::from_le_bytes([low, high]);
     (guarded(value) == word).then_some(value)
-}
-
-/// Bytes that a value takes up: whole words.
-pub(crate) fn padded(len: u32) -> u32 {
-    len.next_multiple_of(WORD)
 }
 
 /// The running check of a transaction.
@@ -92,11 +127,11 @@ mod tests {
 
     #[test]
     fn a_commit_word_never_reads_as_erased() {
-        let mut check = Check::new(FIRST);
+        let mut check = Check::new(8);
         // After the word that is what the register holds, the register is 0 and the CRC all ones.
-        let word = !CRC.checksum(&FIRST.to_le_bytes());
+        let word = !CRC.checksum(&8_u32.to_le_bytes());
         check.add(word);
-        let bytes = [FIRST.to_le_bytes(), word.to_le_bytes()].concat();
+        let bytes = [8_u32.to_le_bytes(), word.to_le_bytes()].concat();
         assert_eq!(CRC.checksum(&bytes), ERASED);
         assert_eq!(check.commit_word(), 0);
     }

@@ -45,7 +45,10 @@
 //!
 //! # Format
 //!
-//! Everything is words of 32 bits, low byte first, and no word is programmed twice.
+//! Everything is words of 32 bits, low byte first, and no word is programmed twice. A flash that programs 8, 16 or 32 bytes
+//! as one ([`Pages::with_words`]) has the same words in units of that size: every mark and the commit word have a unit of
+//! their own; generation and length share one, as do the two words of a record's head, and a value fills whole units; what is
+//! left of a unit is zeros. Zeros must be allowed over a unit that is programmed already (RM0440, 3.3.8).
 //!
 //! ```text
 //! page         transaction        record

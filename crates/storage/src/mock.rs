@@ -1,26 +1,26 @@
-//! A NOR flash for tests: units of one size that are programmed in words of four bytes.
+//! A NOR flash for tests: units of one size that are erased, and words of four or eight bytes that are programmed.
 
 use std::ops::{Deref, DerefMut};
 use std::vec;
 use std::vec::Vec;
 
-use cells::{Cells, WORD};
+use cells::Cells;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write};
 
 pub use cells::{PowerCut, Weak};
 
-/// A flash that is erased in units of `ERASE` bytes. Its [`Cells`] say how the power is cut.
+/// A flash that is erased in units of `ERASE` bytes and programmed in words of `WORD`. Its [`Cells`] say how the power is cut.
 #[derive(Clone, Debug)]
-pub struct MockFlash<const ERASE: usize> {
+pub struct MockFlash<const ERASE: usize, const WORD: usize = 4> {
     cells: Cells,
     erases: Vec<u32>,
 }
 
-impl<const ERASE: usize> MockFlash<ERASE> {
+impl<const ERASE: usize, const WORD: usize> MockFlash<ERASE, WORD> {
     /// An erased flash of `size` bytes. `seed` decides how random weak bits read.
     #[must_use]
     pub fn new(size: usize, seed: u64) -> Self {
-        MockFlash { cells: Cells::new(size, seed), erases: vec![0; size / ERASE] }
+        MockFlash { cells: Cells::with_words(size, WORD, seed), erases: vec![0; size / ERASE] }
     }
 
     /// How often each erase unit was erased.
@@ -30,7 +30,7 @@ impl<const ERASE: usize> MockFlash<ERASE> {
     }
 }
 
-impl<const ERASE: usize> Deref for MockFlash<ERASE> {
+impl<const ERASE: usize, const WORD: usize> Deref for MockFlash<ERASE, WORD> {
     type Target = Cells;
 
     fn deref(&self) -> &Cells {
@@ -38,18 +38,18 @@ impl<const ERASE: usize> Deref for MockFlash<ERASE> {
     }
 }
 
-impl<const ERASE: usize> DerefMut for MockFlash<ERASE> {
+impl<const ERASE: usize, const WORD: usize> DerefMut for MockFlash<ERASE, WORD> {
     fn deref_mut(&mut self) -> &mut Cells {
         &mut self.cells
     }
 }
 
-impl<const ERASE: usize> ErrorType for MockFlash<ERASE> {
+impl<const ERASE: usize, const WORD: usize> ErrorType for MockFlash<ERASE, WORD> {
     type Error = PowerCut;
 }
 
-impl<const ERASE: usize> ReadNorFlash for MockFlash<ERASE> {
-    const READ_SIZE: usize = WORD;
+impl<const ERASE: usize, const WORD: usize> ReadNorFlash for MockFlash<ERASE, WORD> {
+    const READ_SIZE: usize = 4;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
         check_read(self, offset, bytes.len()).expect("a read within the flash, of whole words");
@@ -61,7 +61,7 @@ impl<const ERASE: usize> ReadNorFlash for MockFlash<ERASE> {
     }
 }
 
-impl<const ERASE: usize> NorFlash for MockFlash<ERASE> {
+impl<const ERASE: usize, const WORD: usize> NorFlash for MockFlash<ERASE, WORD> {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = ERASE;
 

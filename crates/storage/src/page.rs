@@ -3,34 +3,53 @@
 use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::error::Error;
-use crate::format::{Check, ERASED, FIRST, HEAD, MARK, TAIL, WORD, unguarded};
+use crate::format::{Check, ERASED, Format, MARK, WORD, unguarded};
 
 /// Where the two pages of the store lie in the flash. Both are of the same size and adjacent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pages {
     start: u32,
     size: u32,
+    unit: u32,
 }
 
 impl Pages {
-    /// Two pages of `size` bytes each, the first at `start`, an offset from the beginning of the flash.
+    /// Two pages of `size` bytes each, the first at `start`, an offset from the beginning of the flash. The flash
+    /// programs words of four bytes.
     #[must_use]
     pub const fn new(start: u32, size: u32) -> Pages {
-        Pages { start, size }
+        Pages { start, size, unit: WORD }
+    }
+
+    /// The same pages in a flash that programs `bytes` as one: 4, 8, 16 or 32, a multiple of its `WRITE_SIZE`.
+    #[must_use]
+    pub const fn with_words(self, bytes: u32) -> Pages {
+        Pages { unit: bytes, ..self }
+    }
+
+    /// Whether a flash that programs `write_size` bytes as one can take what is written.
+    pub(crate) fn suits(self, write_size: usize) -> bool {
+        usize::try_from(self.unit).is_ok_and(|unit| unit.is_multiple_of(write_size))
     }
 
     /// The two pages, if a flash of `capacity` bytes that is erased in units of `erase_size` can hold them. The store
-    /// takes pages of 64 bytes to 128 KiB, the largest sector of the chip.
+    /// takes pages of 64 bytes to 128 KiB, whole units each.
     pub(crate) fn split<E>(self, capacity: usize, erase_size: usize) -> Result<[Page; 2], Error<E>> {
-        let Pages { start, size } = self;
+        let Pages { start, size, unit } = self;
+        let format = Format::new(unit).ok_or(Error::Geometry)?;
         let second = start.checked_add(size).ok_or(Error::Geometry)?;
         let end = second.checked_add(size).and_then(|end| usize::try_from(end).ok());
         let is_aligned = |at: u32| usize::try_from(at).is_ok_and(|at| at.is_multiple_of(erase_size));
         let fits = end.is_some_and(|end| end <= capacity);
-        if !is_aligned(start) || !is_aligned(size) || !fits || !(64..=128 * 1024).contains(&size) {
+        if !is_aligned(start)
+            || !is_aligned(size)
+            || !fits
+            || !size.is_multiple_of(unit)
+            || !(64..=128 * 1024).contains(&size)
+        {
             return Err(Error::Geometry);
         }
-        Ok([Page { start, size }, Page { start: second, size }])
+        Ok([Page { start, size, format }, Page { start: second, size, format }])
     }
 }
 
@@ -39,6 +58,7 @@ impl Pages {
 pub(crate) struct Page {
     pub(crate) start: u32,
     pub(crate) size: u32,
+    pub(crate) format: Format,
 }
 
 /// A complete transaction whose commit word agrees with its content.
@@ -47,13 +67,8 @@ pub(crate) struct Transaction {
     pub(crate) at: u32,
     pub(crate) generation: u16,
     pub(crate) records_end: u32,
+    pub(crate) end: u32,
     pub(crate) closed: bool,
-}
-
-impl Transaction {
-    pub(crate) fn end(&self) -> u32 {
-        self.records_end + TAIL
-    }
 }
 
 impl Page {
@@ -95,14 +110,15 @@ impl Page {
     ) -> Result<Option<Transaction>, F::Error> {
         let Head::Whole { generation, records_end } = self.head(flash, at)? else { return Ok(None) };
         let mut check = Check::new(at);
-        for at in (at + WORD..records_end).step_by(WORD as usize) {
+        let unit = self.format.unit;
+        for at in (at + unit..records_end).step_by(WORD as usize) {
             check.add(self.word(flash, at)?);
         }
         if self.word(flash, records_end)? != check.commit_word() {
             return Ok(None);
         }
-        let closed = self.word(flash, records_end + WORD)? == MARK;
-        Ok(Some(Transaction { at, generation, records_end, closed }))
+        let closed = self.word(flash, records_end + unit)? == MARK;
+        Ok(Some(Transaction { at, generation, records_end, end: records_end + self.format.tail(), closed }))
     }
 
     /// The end of what a save that was cut can have programmed if it began at `at`: the words are programmed in order,
@@ -110,28 +126,35 @@ impl Page {
     pub(crate) fn reach_of_a_cut<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<u32, F::Error> {
         Ok(match self.head(flash, at)? {
             Head::Torn { end } => end,
-            Head::Whole { records_end, .. } => records_end + WORD,
+            Head::Whole { records_end, .. } => records_end + self.format.unit,
         })
     }
 
     fn head<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<Head, F::Error> {
-        if at + HEAD + TAIL > self.size {
+        let (head, tail, unit) = (self.format.head(), self.format.tail(), self.format.unit);
+        if at + head + tail > self.size {
             return Ok(Head::Torn { end: at });
         }
-        let Some(generation) = unguarded(self.word(flash, at + WORD)?) else {
-            return Ok(Head::Torn { end: at + 2 * WORD });
-        };
-        let records_end =
-            unguarded(self.word(flash, at + 2 * WORD)?).map(|words| at + HEAD + u32::from(words) * WORD);
-        Ok(match records_end {
-            Some(records_end) if records_end + TAIL <= self.size => Head::Whole { generation, records_end },
-            _ => Head::Torn { end: at + HEAD },
+        let generation = unguarded(self.word(flash, at + unit)?);
+        let words = unguarded(self.word(flash, at + unit + WORD)?);
+        let records_end = words.map(|words| at + head + u32::from(words) * WORD);
+        Ok(match (generation, records_end) {
+            (Some(generation), Some(records_end)) if self.is_end_of_records(records_end) => {
+                Head::Whole { generation, records_end }
+            }
+            // Where each of them is programmed on its own, nothing comes after a torn generation.
+            (None, _) => Head::Torn { end: at + 2 * unit },
+            _ => Head::Torn { end: at + head },
         })
+    }
+
+    fn is_end_of_records(self, end: u32) -> bool {
+        end.is_multiple_of(self.format.unit) && end + self.format.tail() <= self.size
     }
 
     /// Bytes for transactions in an empty page.
     pub(crate) fn room(self) -> u32 {
-        self.size - FIRST
+        self.size - self.format.first()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use embedded_storage::nor_flash::ReadNorFlash;
 
-use crate::format::{CLEAN, FIRST, HEAD, KIND_VALUE, LEFT_AT, MARK, RECORD_HEAD, WORD, padded};
+use crate::format::{CLEAN, KIND_VALUE, MARK, WORD};
 use crate::group::{Group, Health, PerGroup};
 use crate::page::{Page, Transaction};
 
@@ -79,10 +79,10 @@ impl Scan {
             page,
             generation: None,
             first: First::Missing,
-            left: page.word(flash, LEFT_AT)? == MARK,
-            clean: page.word(flash, 0)? == CLEAN && page.erased_from(flash, WORD)?,
+            left: page.word(flash, page.format.left_at())? == MARK,
+            clean: page.word(flash, 0)? == CLEAN && page.erased_from(flash, page.format.unit)?,
             tidy: true,
-            end: FIRST,
+            end: page.format.first(),
             groups: PerGroup::default(),
         };
         scan.transactions(flash)?;
@@ -98,30 +98,31 @@ impl Scan {
     /// Takes every complete transaction. Transactions are contiguous, so one that does not begin where the last ended
     /// has something damaged before it.
     fn transactions<F: ReadNorFlash>(&mut self, flash: &mut F) -> Result<(), F::Error> {
-        let mut at = FIRST;
+        let mut at = self.page.format.first();
         while at < self.page.size {
             let Some(transaction) = self.page.transaction(flash, at)? else {
-                at += WORD;
+                at += self.page.format.unit;
                 continue;
             };
             if at != self.end {
                 self.damaged();
             }
             self.take(flash, &transaction)?;
-            at = transaction.end();
+            at = transaction.end;
         }
         Ok(())
     }
 
     fn take<F: ReadNorFlash>(&mut self, flash: &mut F, transaction: &Transaction) -> Result<(), F::Error> {
         self.generation = Some(transaction.generation);
-        if transaction.at == FIRST {
+        if transaction.at == self.page.format.first() {
             self.first = if transaction.closed { First::Closed } else { First::Open };
         }
         self.tidy &= transaction.closed;
-        self.end = transaction.end();
-        let mut at = transaction.at + HEAD;
-        while at + RECORD_HEAD <= transaction.records_end {
+        self.end = transaction.end;
+        let format = self.page.format;
+        let mut at = transaction.at + format.head();
+        while at + format.record_head() <= transaction.records_end {
             at = self.take_record(flash, transaction, at)?;
         }
         Ok(())
@@ -136,7 +137,7 @@ impl Scan {
     ) -> Result<u32, F::Error> {
         let [id, kind, low, high] = self.page.word(flash, at)?.to_le_bytes();
         let len = self.page.word(flash, at + WORD)?;
-        let (data, version) = (at + RECORD_HEAD, u16::from_le_bytes([low, high]));
+        let (data, version) = (at + self.page.format.record_head(), u16::from_le_bytes([low, high]));
         if len > transaction.records_end - data {
             return Ok(transaction.records_end);
         }
@@ -145,7 +146,7 @@ impl Scan {
         if let Some(group) = Group::from_id(id) {
             *self.groups.get_mut(group) = Entry { content, suspect: false };
         }
-        Ok(data + padded(len))
+        Ok(data + self.page.format.padded(len))
     }
 
     /// Judges what follows the last complete transaction: erased, a save that was cut, or damage.
@@ -174,21 +175,23 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::format::{Check, ERASED, guarded};
+    use crate::format::{Check, ERASED, Format, guarded};
     use crate::memory::Memory;
+
+    const FORMAT: Format = Format::new(WORD).unwrap();
 
     /// A page of 64 bytes with one transaction of these records.
     fn scan(records: &[u32]) -> Scan {
         let len = u16::try_from(records.len()).unwrap();
         let mut words = [&[CLEAN, ERASED, MARK, guarded(1), guarded(len)], records].concat();
-        let mut check = Check::new(FIRST);
+        let mut check = Check::new(FORMAT.first());
         for word in &words[3..] {
             check.add(*word);
         }
         words.extend([check.commit_word(), MARK]);
         words.resize(16, ERASED);
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        Scan::of(&mut Memory(bytes.as_slice()), Page { start: 0, size: 64 }).unwrap()
+        Scan::of(&mut Memory(bytes.as_slice()), Page { start: 0, size: 64, format: FORMAT }).unwrap()
     }
 
     fn head(group: Group) -> u32 {

@@ -4,9 +4,11 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::device::DeviceRecord;
 use crate::error::Error;
-use crate::format::{CLEAN, FIRST, LEFT_AT, MARK, WORD};
+use crate::format::{CLEAN, Format, MARK};
 use crate::group::{Change, Group, Health, Loaded, PerGroup};
 use crate::page::Page;
+#[cfg(doc)]
+use crate::page::Pages;
 use crate::scan::{Content, Scan};
 use crate::view::View;
 use crate::writer::{Record, Records, Writer, size};
@@ -30,9 +32,11 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// [`Error::Flash`]; [`Error::Corrupt`] when a page does not erase or does not take what is programmed;
-    /// [`Error::Geometry`] when the flash cannot erase the pages one by one.
+    /// [`Error::Geometry`] when the flash cannot erase the pages one by one, or programs other words than [`Pages`] says.
     pub fn prepare(view: View<F>) -> Result<Store<F>, Error<F::Error>> {
-        const { assert!((WORD as usize).is_multiple_of(F::WRITE_SIZE), "the store programs words of 32 bits") };
+        if !view.pages.suits(F::WRITE_SIZE) {
+            return Err(Error::Geometry);
+        }
         let pages = view.pages.split(view.flash.capacity(), F::ERASE_SIZE)?;
         let mut store = Store { view };
         for page in pages {
@@ -64,14 +68,14 @@ impl<F: NorFlash> Store<F> {
         let mut new = PerGroup::from_fn(|group| last_change(changes, group));
         let whole = PerGroup::from_fn(|group| new.get(group).or(*self.kept().get(group)));
         // What a page could not hold alone could never be moved, so it is refused while there is still room for it.
-        if changes.iter().any(too_long) || size(&whole) > self.current().page.room() {
+        if changes.iter().any(too_long) || size(&whole, self.format()) > self.current().page.room() {
             return Err(Error::TooLong);
         }
         self.drop_unchanged(&mut new)?;
         if new.iter().all(|(_, record)| record.is_none()) {
             return Ok(());
         }
-        if self.can_append(size(&new)) {
+        if self.can_append(size(&new, self.format())) {
             self.append(&new)
         } else if self.other().clean {
             self.move_on(&whole)
@@ -131,6 +135,10 @@ impl<F: NorFlash> Store<F> {
         self.view.into_flash()
     }
 
+    fn format(&self) -> Format {
+        self.current().page.format
+    }
+
     fn current(&self) -> &Scan {
         &self.view.state.current
     }
@@ -168,11 +176,11 @@ impl<F: NorFlash> Store<F> {
         self.verify_kept(records)?;
         let old = *self.current();
         let generation = old.generation.map_or(0, |generation| generation.wrapping_add(1));
-        self.write(self.other().page, FIRST, generation, records)?;
+        self.write(self.other().page, self.format().first(), generation, records)?;
         if old.generation.is_none() || old.left {
             return Ok(());
         }
-        Writer::new(&mut self.view.flash, old.page, LEFT_AT).program(MARK)
+        Writer::new(&mut self.view.flash, old.page, old.page.format.left_at()).program(MARK)
     }
 
     /// A value that has decayed since it was read must not get a new CRC.
@@ -197,7 +205,11 @@ impl<F: NorFlash> Store<F> {
         self.view.refresh()?;
         written?;
         let Scan { page: current, end, tidy, .. } = *self.current();
-        if current == page && end == at + size(records) && tidy { Ok(()) } else { Err(Error::Corrupt) }
+        if current == page && end == at + size(records, page.format) && tidy {
+            Ok(())
+        } else {
+            Err(Error::Corrupt)
+        }
     }
 
     /// Erases a page and marks it clean; without the mark the erase may have been cut.

@@ -3,9 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::error::Error;
-use crate::format::{
-    Check, FIRST, HEAD, KIND_RESTORED, KIND_VALUE, MARK, RECORD_HEAD, TAIL, WORD, guarded, padded,
-};
+use crate::format::{Check, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, guarded};
 use crate::group::{Change, Group, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};
@@ -50,22 +48,29 @@ impl From<Content> for Record<'_> {
 pub(crate) type Records<'a> = PerGroup<Option<Record<'a>>>;
 
 /// Bytes that a transaction takes up. Values are at most [`crate::MAX_VALUE`] long.
-pub(crate) fn size(records: &Records<'_>) -> u32 {
-    let records = records.iter().filter_map(|(_, record)| record.as_ref());
-    records.map(|record| RECORD_HEAD + padded(record.len())).sum::<u32>() + HEAD + TAIL
+pub(crate) fn size(records: &Records<'_>, format: Format) -> u32 {
+    format.head() + records_size(records, format) + format.tail()
 }
 
-/// Where the next word goes.
+fn records_size(records: &Records<'_>, format: Format) -> u32 {
+    let records = records.iter().filter_map(|(_, record)| record.as_ref());
+    records.map(|record| format.record_head() + format.padded(record.len())).sum()
+}
+
+/// Where the next unit goes.
 pub(crate) struct Writer<'f, F> {
     flash: &'f mut F,
     page: Page,
     at: u32,
     check: Check,
+    /// The words of a unit that is not full yet, and zeros.
+    unit: [u8; LARGEST_UNIT as usize],
+    filled: u32,
 }
 
 impl<'f, F: NorFlash> Writer<'f, F> {
     pub(crate) fn new(flash: &'f mut F, page: Page, at: u32) -> Self {
-        Writer { flash, page, at, check: Check::new(at) }
+        Writer { flash, page, at, check: Check::new(at), unit: [0; LARGEST_UNIT as usize], filled: 0 }
     }
 
     /// Programs a transaction. It counts from the commit word on; the closing mark after it says that the commit word
@@ -75,17 +80,18 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         generation: u16,
         records: &Records<'_>,
     ) -> Result<(), Error<F::Error>> {
-        let words = (size(records) - HEAD - TAIL) / WORD;
+        let words = records_size(records, self.page.format) / WORD;
         let words = u16::try_from(words).map_err(|_| Error::TooLong)?;
         self.program(MARK)?;
         self.word(guarded(generation))?;
         self.word(guarded(words))?;
+        self.fill()?;
         for (group, record) in records.iter() {
             if let Some(record) = record {
                 self.record(group, record)?;
             }
         }
-        let check = core::mem::replace(&mut self.check, Check::new(FIRST));
+        let check = core::mem::replace(&mut self.check, Check::new(0));
         self.program(check.commit_word())?;
         self.program(MARK)
     }
@@ -98,6 +104,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         let [low, high] = version.to_le_bytes();
         self.word(u32::from_le_bytes([group.id(), kind, low, high]))?;
         self.word(record.len())?;
+        self.fill()?;
         match *record {
             Record::Set { value, .. } => self.value(value),
             Record::Kept(slot) => self.copy(&slot),
@@ -105,21 +112,30 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         }
     }
 
-    /// The value and zeros up to a whole word.
+    /// The value and zeros up to a whole unit.
     fn value(&mut self, value: &[u8]) -> Result<(), Error<F::Error>> {
         for chunk in value.chunks(WORD as usize) {
             let mut word = [0; WORD as usize];
             word.iter_mut().zip(chunk).for_each(|(to, from)| *to = *from);
             self.word(u32::from_le_bytes(word))?;
         }
-        Ok(())
+        self.fill()
     }
 
     /// A value that is in flash already: no buffer is needed to move it.
     fn copy(&mut self, slot: &Slot) -> Result<(), Error<F::Error>> {
-        for at in (slot.data..slot.data + padded(slot.len)).step_by(WORD as usize) {
+        let end = slot.data + self.page.format.padded(slot.len);
+        for at in (slot.data..end).step_by(WORD as usize) {
             let word = slot.page.word(self.flash, at)?;
             self.word(word)?;
+        }
+        Ok(())
+    }
+
+    /// Zeros up to the end of the unit. The commit word vouches for them too.
+    fn fill(&mut self) -> Result<(), Error<F::Error>> {
+        while self.filled > 0 {
+            self.word(0)?;
         }
         Ok(())
     }
@@ -127,13 +143,31 @@ impl<'f, F: NorFlash> Writer<'f, F> {
     /// A word that the commit word vouches for.
     fn word(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         self.check.add(word);
-        self.program(word)
+        self.put(word)
     }
 
-    /// One word a call to the driver: between two calls the core runs whatever is due.
+    /// A word in a unit of its own.
     pub(crate) fn program(&mut self, word: u32) -> Result<(), Error<F::Error>> {
-        self.flash.write(self.page.start + self.at, &word.to_le_bytes())?;
-        self.at += WORD;
+        self.put(word)?;
+        while self.filled > 0 {
+            self.put(0)?;
+        }
+        Ok(())
+    }
+
+    /// Puts a word into the unit. One unit a call to the driver: between two calls the core runs whatever is due.
+    fn put(&mut self, word: u32) -> Result<(), Error<F::Error>> {
+        let place = self.unit.iter_mut().skip(self.filled as usize);
+        place.zip(word.to_le_bytes()).for_each(|(to, byte)| *to = byte);
+        self.filled += WORD;
+        let size = self.page.format.unit;
+        if self.filled < size {
+            return Ok(());
+        }
+        self.filled = 0;
+        let unit = self.unit.get(..size as usize).unwrap_or(&self.unit);
+        self.flash.write(self.page.start + self.at, unit)?;
+        self.at += size;
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use crate::commit::RECORD_LEN;
+use crate::commit::RECORD_ROOM;
 use crate::header::HEADER;
 
 /// Consecutive sectors, of whatever sizes.
@@ -59,22 +59,11 @@ pub struct Layout {
     staging: Area,
 }
 
-/// The sectors of memory.x: S4 and S5, S6 and S7 of every STM32F4 with 512 KiB or more (RM0390, 3.3). The bootloader and
-/// the parameters lie before them.
-const S4_S5: Area = Area::new(0x1_0000, &[64 * 1024, 128 * 1024]);
-const S6_S7: Area = Area::new(0x4_0000, &[128 * 1024, 128 * 1024]);
-
 impl Layout {
-    /// The areas of memory.x.
-    pub const STM32F4: Layout = match Layout::new(S4_S5, S6_S7) {
-        Some(layout) => layout,
-        None => panic!("evaluated by the compiler"),
-    };
-
     /// A layout; `None` when staging could not hold every image of the application area and the commit record.
     #[must_use]
     pub const fn new(application: Area, staging: Area) -> Option<Layout> {
-        let fits = staging.size() >= application.size().saturating_add(RECORD_LEN);
+        let fits = staging.size() >= application.size().saturating_add(RECORD_ROOM);
         let holds_a_header = application.size() > HEADER;
         if fits && holds_a_header { Some(Layout { application, staging }) } else { None }
     }
@@ -90,11 +79,6 @@ impl Layout {
     pub const fn staging(&self) -> Area {
         self.staging
     }
-
-    /// Offset of the commit record.
-    pub(crate) const fn record(&self) -> u32 {
-        self.staging.end().saturating_sub(RECORD_LEN)
-    }
 }
 
 #[cfg(test)]
@@ -105,10 +89,9 @@ mod tests {
 
     #[test]
     fn sectors_of_different_sizes_follow_each_other() {
-        let area = Layout::STM32F4.application();
+        let area = Area::new(0x1_0000, &[64 * 1024, 128 * 1024]);
         assert_eq!(area.sectors().collect::<Vec<_>>(), [0x1_0000..0x2_0000, 0x2_0000..0x4_0000]);
         assert_eq!((area.start(), area.size(), area.end()), (0x1_0000, 196_608, 0x4_0000));
-        assert_eq!(Layout::STM32F4.record(), 0x8_0000 - RECORD_LEN);
     }
 
     #[test]

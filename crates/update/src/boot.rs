@@ -81,7 +81,7 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
 
 /// What the commit record says, after a torn one was revoked.
 fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
-    let record = Record(target.layout.record());
+    let record = Record(target.layout.staging().end());
     let commit = record.read(flash).unwrap_or(Commit::None);
     if commit == Commit::Torn {
         // Should it fail, the next start tries again.

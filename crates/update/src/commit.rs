@@ -1,25 +1,23 @@
 //! The commit record in the last bytes of staging: whether the image there is to be copied.
 //!
-//! | word | meaning |
+//! | place | meaning |
 //! |---|---|
-//! | 0, 1 | magic, programmed when the staged image has passed every check |
-//! | 2 | 0: the magic is whole, not just lucky to read well after a cut. From this word on the image is to be copied |
-//! | 3 | 0: it was copied, and need not be again while the application is whole |
+//! | eight bytes | magic, programmed when the staged image has passed every check |
+//! | a word | 0: the magic is whole, not just lucky to read well after a cut. From this word on the image is to be copied |
+//! | a word | 0: it was copied, and need not be again while the application is whole |
 //!
-//! The two words that decide are zeros, because zeros may be programmed once more over a word that a cut left half
+//! A word is what the flash programs as one, 4 or 8 bytes. The two words that decide are zeros, because zeros may be programmed once more over a word that a cut left half
 //! programmed, and then hold for good. To revoke is to program zeros over everything, the last word first: it comes before
 //! every erase of staging, so no erase that is cut can bring a record back.
 
 use crate::flash::{Flash, first, program};
 use crate::refusal::Refusal;
 
-/// Bytes at the end of staging.
-pub(crate) const RECORD_LEN: u32 = 16;
+/// Bytes at the end of staging that a record may take: that of a flash with words of 8 bytes.
+pub(crate) const RECORD_ROOM: u32 = 24;
 
 const MAGIC: [u8; 8] = *b"COPYTHIS";
-const ZERO: [u8; 4] = [0; 4];
-const CLOSED: u32 = 8;
-const DONE: u32 = 12;
+const MAGIC_LEN: u32 = 8;
 
 /// What the record says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,46 +32,68 @@ pub(crate) enum Commit {
     Done,
 }
 
-/// The record of the layout, by its offset.
+/// The record, by the offset at which staging ends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record(pub(crate) u32);
 
 impl Record {
     pub(crate) fn read<F: Flash>(self, flash: &mut F) -> Result<Commit, Refusal> {
-        let mut bytes = [0; RECORD_LEN as usize];
-        flash.read(self.0, first(&mut bytes, RECORD_LEN)).map_err(|_| Refusal::Unspecified)?;
-        let [m0, m1, m2, m3, m4, m5, m6, m7, marks @ ..] = bytes;
-        let committed = [m0, m1, m2, m3, m4, m5, m6, m7] == MAGIC;
-        Ok(match marks {
-            [0, 0, 0, 0, 0, 0, 0, 0] if committed => Commit::Done,
-            [0, 0, 0, 0, ..] if committed => Commit::Pending,
-            _ if bytes == [0; 16] || bytes == [0xFF; 16] => Commit::None,
+        let word = flash.word_size();
+        let mut bytes = [0; RECORD_ROOM as usize];
+        let record = first(&mut bytes, len(word));
+        flash.read(self.start(word), record).map_err(|_| Refusal::Unspecified)?;
+        let (magic, marks) = record.split_at(record.len().min(MAGIC.len()));
+        let (closed, done) = marks.split_at(marks.len().min(word as usize));
+        let is = |bytes: &[u8], value: u8| bytes.iter().all(|byte| *byte == value);
+        Ok(match (is(closed, 0), is(done, 0)) {
+            (true, true) if magic == MAGIC => Commit::Done,
+            (true, false) if magic == MAGIC => Commit::Pending,
+            _ if is(record, 0) || is(record, 0xFF) => Commit::None,
             _ => Commit::Torn,
         })
     }
 
     /// The staged image is to be copied.
     pub(crate) fn write<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
-        program(flash, self.0, &MAGIC)?;
+        let start = self.start(flash.word_size());
+        program(flash, start, &MAGIC)?;
         self.close(flash)
     }
 
     /// Makes a record that reads as pending hold for good.
     pub(crate) fn close<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
-        program(flash, self.0.saturating_add(CLOSED), &ZERO)
+        let word = flash.word_size();
+        mark(flash, self.start(word).saturating_add(MAGIC_LEN))
     }
 
     /// The copy is complete.
     pub(crate) fn done<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
-        program(flash, self.0.saturating_add(DONE), &ZERO)
+        let word = flash.word_size();
+        mark(flash, self.0.saturating_sub(word))
     }
 
     /// Nothing is to be copied, for good. First the record says that there is no need: were the magic cut before that, it
     /// could read well, a copy begin, and the magic be gone in the middle of it.
     pub(crate) fn revoke<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         self.done(flash)?;
-        program(flash, self.0, &[0; RECORD_LEN as usize])
+        let word = flash.word_size();
+        program(flash, self.start(word), first(&mut [0; RECORD_ROOM as usize], len(word)))
     }
+
+    fn start(self, word: u32) -> u32 {
+        self.0.saturating_sub(len(word))
+    }
+}
+
+/// Bytes of a record in a flash with words of so many bytes.
+fn len(word: u32) -> u32 {
+    MAGIC_LEN.saturating_add(word).saturating_add(word).min(RECORD_ROOM)
+}
+
+/// Programs a word of zeros.
+fn mark<F: Flash>(flash: &mut F, at: u32) -> Result<(), Refusal> {
+    let word = flash.word_size();
+    program(flash, at, first(&mut [0; 8], word))
 }
 
 #[cfg(test)]
@@ -82,6 +102,7 @@ mod tests {
     use crate::mock::MockFlash;
 
     const ERASED: [u8; 4] = [0xFF; 4];
+    const ZERO: [u8; 4] = [0; 4];
 
     #[test]
     fn the_record_says_what_the_table_says() {
@@ -100,21 +121,35 @@ mod tests {
             ([ERASED, ERASED, ERASED, ZERO], Commit::Torn),
         ] {
             let mut flash = MockFlash::new(&[64], 1);
-            for (at, word) in (0..).step_by(4).zip(words).filter(|(_, word)| *word != ERASED) {
+            for (at, word) in (48..).step_by(4).zip(words).filter(|(_, word)| *word != ERASED) {
                 program(&mut flash, at, &word).unwrap();
             }
-            assert_eq!(Record(0).read(&mut flash), Ok(says), "{words:?}");
+            assert_eq!(Record(64).read(&mut flash), Ok(says), "{words:?}");
         }
     }
 
     #[test]
     fn a_revoked_record_is_none_whatever_it_was() {
-        for write in [Record::write, Record::close, Record::done] {
-            let mut flash = MockFlash::new(&[64], 1);
-            write(Record(0), &mut flash).unwrap();
-            Record(0).revoke(&mut flash).unwrap();
-            assert_eq!(Record(0).read(&mut flash), Ok(Commit::None));
-            assert_eq!(flash.bytes()[..16], [0; 16]);
+        for (word, len) in [(4, 16), (8, 24)] {
+            for write in [Record::write, Record::close, Record::done] {
+                let mut flash = MockFlash::with_words(&[64], word, 1);
+                write(Record(64), &mut flash).unwrap();
+                Record(64).revoke(&mut flash).unwrap();
+                assert_eq!(Record(64).read(&mut flash), Ok(Commit::None));
+                assert_eq!(flash.bytes()[64 - len..], [0; 24][..len]);
+                assert_eq!(flash.bytes()[..64 - len], [0xFF; 64][..64 - len]);
+            }
+        }
+    }
+
+    #[test]
+    fn every_mark_has_a_word_of_its_own() {
+        for word in [4, 8] {
+            let mut flash = MockFlash::with_words(&[64], word, 1);
+            Record(64).write(&mut flash).unwrap();
+            assert_eq!(Record(64).read(&mut flash), Ok(Commit::Pending));
+            Record(64).done(&mut flash).unwrap();
+            assert_eq!(Record(64).read(&mut flash), Ok(Commit::Done));
         }
     }
 }

@@ -10,9 +10,14 @@ use crate::refusal::Refusal;
 /// Offsets count from the start of the flash. What is read is what the cells hold: a driver flushes the caches after it has
 /// programmed or erased, for everything is read back.
 pub trait Flash: ReadNorFlash {
-    /// Programs whole words of 32 bits at a multiple of 4. The words were erased before, or all of `bytes` are 0:
-    /// zeros may be programmed over anything, as a bit may go from 1 to 0 without an erase (RM0390, 3.5.2; RM0090,
-    /// 3.6.3) and a word has no check bits.
+    /// Bytes of a word, which the flash programs as one: 4 or 8.
+    fn word_size(&self) -> u32 {
+        4
+    }
+
+    /// Programs whole words at a multiple of their size. The words were erased before, or all of `bytes` are 0: zeros may
+    /// be programmed over anything. A word without check bits allows it because a bit may go from 1 to 0 without an erase
+    /// (RM0390, 3.5.2; RM0090, 3.6.3), a word with check bits as an exception (RM0440, 3.3.8).
     ///
     /// # Errors
     /// The flash reports that it did not program.
@@ -32,6 +37,10 @@ pub trait Flash: ReadNorFlash {
 }
 
 impl<F: Flash> Flash for &mut F {
+    fn word_size(&self) -> u32 {
+        (**self).word_size()
+    }
+
     fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
         (**self).program(offset, bytes)
     }
@@ -76,10 +85,13 @@ pub(crate) fn first(buffer: &mut [u8], len: u32) -> &mut [u8] {
     buffer.split_at_mut(len).0
 }
 
-/// Programs at most [`CHUNK`] bytes, and reads them back.
+/// Programs at most [`CHUNK`] bytes, and reads them back. What is left of the last word becomes as it is in an erased one.
 pub(crate) fn program<F: Flash>(flash: &mut F, at: u32, bytes: &[u8]) -> Result<(), Refusal> {
-    flash.program(at, bytes).map_err(|_| Refusal::Write)?;
-    let mut buffer = [0; CHUNK];
+    let mut buffer = [0xFF; CHUNK];
+    buffer.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
+    let len = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+    let words = first(&mut buffer, len.next_multiple_of(flash.word_size().max(4)));
+    flash.program(at, words).map_err(|_| Refusal::Write)?;
     let read = first(&mut buffer, u32::try_from(bytes.len()).unwrap_or(u32::MAX));
     flash.read(at, read).map_err(|_| Refusal::Unspecified)?;
     if read == bytes { Ok(()) } else { Err(Refusal::Write) }

@@ -1,4 +1,4 @@
-//! A flash for tests: sectors of different sizes, words of four bytes, and an erase that takes its time.
+//! A flash for tests: sectors of different sizes, words of four or eight bytes, and an erase that takes its time.
 
 use core::ops::{Deref, DerefMut, Range};
 use std::vec::Vec;
@@ -17,6 +17,7 @@ const ERASE_POLLS: u32 = 3;
 #[derive(Clone, Debug)]
 pub struct MockFlash {
     cells: Cells,
+    word: usize,
     sectors: Vec<Range<usize>>,
     busy: u32,
 }
@@ -25,12 +26,20 @@ impl MockFlash {
     /// An erased flash with sectors of these sizes in bytes. `seed` decides how random weak bits read.
     #[must_use]
     pub fn new(sectors: &[usize], seed: u64) -> MockFlash {
+        MockFlash::with_words(sectors, WORD, seed)
+    }
+
+    /// The same in words of `word` bytes, 4 or 8.
+    #[must_use]
+    pub fn with_words(sectors: &[usize], word: usize, seed: u64) -> MockFlash {
         let mut end = 0;
         let ranges = sectors.iter().map(|size| {
             end += size;
             end - size..end
         });
-        MockFlash { sectors: ranges.collect(), cells: Cells::new(sectors.iter().sum(), seed), busy: 0 }
+        let sectors_of = ranges.collect();
+        let cells = Cells::with_words(sectors.iter().sum(), word, seed);
+        MockFlash { sectors: sectors_of, cells, word, busy: 0 }
     }
 
     /// Power again, and no cut to come.
@@ -80,8 +89,14 @@ impl ReadNorFlash for MockFlash {
 }
 
 impl Flash for MockFlash {
+    fn word_size(&self) -> u32 {
+        u32::try_from(self.word).expect("a few bytes")
+    }
+
     fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
         check_read(self, offset, bytes.len()).expect("words within the flash");
+        let is_whole = |len: usize| len.is_multiple_of(self.word);
+        assert!(is_whole(offset as usize) && is_whole(bytes.len()), "whole words");
         self.ready()?;
         self.cells.program(offset as usize, bytes)
     }

@@ -202,7 +202,7 @@ impl<F: Flash> Updater<F> {
     }
 
     fn record(&self) -> Record {
-        Record(self.target.layout.record())
+        Record(self.target.layout.staging().end())
     }
 
     fn is_busy(&self) -> bool {

@@ -16,7 +16,7 @@ use fastrand::Rng;
 pub use word::Weak;
 use word::Word;
 
-/// Bytes of a word.
+/// Bytes of a word of the STM32F4.
 pub const WORD: usize = 4;
 
 /// The power is off.
@@ -32,6 +32,8 @@ impl NorFlashError for PowerCut {
 /// All words of a flash, and its power.
 #[derive(Clone, Debug)]
 pub struct Cells {
+    /// Bytes of a word, 4 or 8.
+    word: usize,
     words: Vec<Word>,
     operations: u32,
     programmed: u32,
@@ -42,11 +44,22 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// An erased flash of `size` bytes. `seed` decides how weak bits read that do so by chance.
+    /// An erased flash of `size` bytes in words of four. `seed` decides how weak bits read that do so by chance.
     #[must_use]
     pub fn new(size: usize, seed: u64) -> Cells {
+        Cells::with_words(size, WORD, seed)
+    }
+
+    /// The same in words of `word` bytes, 4 or 8: what is programmed as one.
+    ///
+    /// # Panics
+    /// When `word` is another number.
+    #[must_use]
+    pub fn with_words(size: usize, word: usize, seed: u64) -> Cells {
+        assert!(word == 4 || word == 8, "words of {word} bytes");
         Cells {
-            words: vec![Word::ERASED; size / WORD],
+            word,
+            words: vec![Word::erased(word); size / word],
             operations: 0,
             programmed: 0,
             cut_at: None,
@@ -59,7 +72,7 @@ impl Cells {
     /// Bytes in all.
     #[must_use]
     pub fn size(&self) -> usize {
-        self.words.len() * WORD
+        self.words.len() * self.word
     }
 
     /// Programs (one word each) and erases so far.
@@ -98,29 +111,34 @@ impl Cells {
     pub fn power_up(&mut self) {
         (self.powered, self.cut_at) = (true, None);
         for word in &mut self.words {
-            word.power_up(self.weak, self.random.u32(..));
+            word.power_up(self.weak, self.random.u64(..));
         }
     }
 
     /// The content, byte by byte.
     #[must_use]
     pub fn bytes(&self) -> Vec<u8> {
-        self.words.iter().flat_map(|word| word.value().to_le_bytes()).collect()
+        self.words.iter().flat_map(|word| word.value().to_le_bytes().into_iter().take(self.word)).collect()
     }
 
     /// Changes a byte behind the driver's back, as radiation, wear or a foreign program would.
     pub fn disturb(&mut self, offset: usize, change: impl FnOnce(u8) -> u8) {
-        self.words[offset / WORD].disturb(offset % WORD, change);
+        self.words[offset / self.word].disturb(offset % self.word, change);
     }
 
-    /// Reads whole words.
+    /// Reads bytes.
     ///
     /// # Errors
     /// [`PowerCut`] when the power is off.
     pub fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), PowerCut> {
         self.check_power()?;
-        for (chunk, word) in bytes.chunks_exact_mut(WORD).zip(&self.words[offset / WORD..]) {
-            chunk.copy_from_slice(&word.value().to_le_bytes());
+        let (mut rest, mut at) = (bytes, offset);
+        while !rest.is_empty() {
+            let word = self.words[at / self.word].value().to_le_bytes();
+            let from_here = &word[at % self.word..self.word];
+            let (chunk, next) = rest.split_at_mut(from_here.len().min(rest.len()));
+            chunk.copy_from_slice(&from_here[..chunk.len()]);
+            (rest, at) = (next, at + chunk.len());
         }
         Ok(())
     }
@@ -133,8 +151,8 @@ impl Cells {
     /// # Panics
     /// When a word is neither erased nor programmed with zeros.
     pub fn program(&mut self, offset: usize, bytes: &[u8]) -> Result<(), PowerCut> {
-        for (index, chunk) in (offset / WORD..).zip(bytes.chunks_exact(WORD)) {
-            let target = u32::from_le_bytes(chunk.try_into().expect("four bytes"));
+        for (index, chunk) in (offset / self.word..).zip(bytes.chunks_exact(self.word)) {
+            let target = chunk.iter().rev().fold(0, |target, byte| target << 8 | u64::from(*byte));
             let is_cut = self.begin()?;
             self.words[index].program(target, is_cut);
             self.check_power()?;
@@ -149,7 +167,7 @@ impl Cells {
     /// [`PowerCut`] when the power is off, or goes off.
     pub fn erase(&mut self, unit: Range<usize>) -> Result<(), PowerCut> {
         let is_cut = self.begin()?;
-        for word in &mut self.words[unit.start / WORD..unit.end / WORD] {
+        for word in &mut self.words[unit.start / self.word..unit.end / self.word] {
             word.erase(is_cut);
         }
         self.check_power()

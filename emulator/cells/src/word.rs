@@ -32,22 +32,28 @@ enum Use {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Word {
-    value: u32,
+    /// What an erased word reads: all ones, as many as the word has.
+    erased: u64,
+    value: u64,
     /// Bits of which nobody knows how they read, what they were and what they would have become.
-    weak: u32,
-    before: u32,
-    after: u32,
+    weak: u64,
+    before: u64,
+    after: u64,
     used: Use,
 }
 
 impl Word {
-    pub(crate) const ERASED: Word = Word { value: !0, weak: 0, before: !0, after: !0, used: Use::Erased };
+    /// An erased word of so many bytes, 8 at most.
+    pub(crate) fn erased(bytes: usize) -> Word {
+        let erased = u64::MAX >> (64 - 8 * bytes);
+        Word { erased, value: erased, weak: 0, before: erased, after: erased, used: Use::Erased }
+    }
 
-    pub(crate) fn value(&self) -> u32 {
+    pub(crate) fn value(&self) -> u64 {
         self.value
     }
 
-    pub(crate) fn power_up(&mut self, weak: Weak, random: u32) {
+    pub(crate) fn power_up(&mut self, weak: Weak, random: u64) {
         let reads = match (weak, random & 1) {
             (Weak::Random, _) => random,
             (Weak::Before, _) | (Weak::Either, 0) => self.before,
@@ -59,24 +65,31 @@ impl Word {
     pub(crate) fn disturb(&mut self, byte: usize, change: impl FnOnce(u8) -> u8) {
         let mut bytes = self.value.to_le_bytes();
         bytes[byte] = change(bytes[byte]);
-        self.value = u32::from_le_bytes(bytes);
+        self.value = u64::from_le_bytes(bytes);
     }
 
-    pub(crate) fn program(&mut self, target: u32, is_cut: bool) {
+    pub(crate) fn program(&mut self, target: u64, is_cut: bool) {
         assert!(target == 0 || self.used == Use::Erased, "a word is programmed that is not erased");
-        assert!(target == 0 || self.value == !0, "a word is programmed that does not read as erased");
+        assert!(
+            target == 0 || self.value == self.erased,
+            "a word is programmed that does not read as erased"
+        );
         let used = if self.used == Use::HalfErased { Use::HalfErased } else { Use::Programmed };
         let (before, after) = (self.value, self.value & target);
         *self = if is_cut {
-            Word { value: before, weak: self.weak | (before ^ after), before, after, used }
+            Word { value: before, weak: self.weak | (before ^ after), before, after, used, ..*self }
         } else {
-            Word { value: after, weak: 0, before: after, after, used }
+            Word { value: after, weak: 0, before: after, after, used, ..*self }
         };
     }
 
     pub(crate) fn erase(&mut self, is_cut: bool) {
-        let (before, weak) = (self.value, self.weak | !self.value);
-        let half = Word { value: before, weak, before, after: !0, used: Use::HalfErased };
-        *self = if is_cut { half } else { Word::ERASED };
+        let (before, erased) = (self.value, self.erased);
+        let weak = self.weak | (before ^ erased);
+        *self = if is_cut {
+            Word { value: before, weak, before, after: erased, used: Use::HalfErased, erased }
+        } else {
+            Word { value: erased, weak: 0, before: erased, after: erased, used: Use::Erased, erased }
+        };
     }
 }

@@ -7,10 +7,8 @@
 
 use canopen::{Frame, Instant, QueueFull, Transmit};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use node::{
-    BusEvent, Fault, Kept, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample, Setup,
-    Snapshot, Start,
-};
+use node::{BusEvent, Fault, Measurement, Personality, Protocol, Setup, StoreJob};
+use profiles::board::{Inputs, Outputs, PowerOn};
 use storage::{Pages, Store, View};
 
 unsafe extern "C" {
@@ -102,7 +100,7 @@ extern "C" fn communicate(protocol: &mut Protocol, frame: &Frame, now: u64, ids:
 /// Faults.
 #[unsafe(no_mangle)]
 extern "C" fn fail(protocol: &mut Protocol, fault: &Fault, event: &BusEvent, active: bool, now: u64) {
-    let _ = protocol.set_fault(*fault, active, Instant(now));
+    let _ = protocol.set_fault(fault, active, Instant(now));
     let _ = protocol.bus_event(*event, Instant(now));
 }
 
@@ -111,31 +109,29 @@ extern "C" fn fail(protocol: &mut Protocol, fault: &Fault, event: &BusEvent, act
 extern "C" fn measure(
     protocol: &mut Protocol,
     measurement: &mut Measurement,
-    raw: &RawSample,
-    encoder: &RawEncoder,
-    buttons: &[bool; 2],
-    lit: &mut [bool; 2],
+    inputs: &Inputs,
+    outputs: &mut Outputs,
     now: u64,
 ) {
     measurement.apply(&protocol.parameters());
-    let snapshot: Snapshot = measurement.sample(raw, encoder, *buttons);
-    let _ = protocol.publish(&snapshot, Instant(now), &mut Queue);
-    *lit = protocol.lamps();
+    measurement.update(inputs, protocol.snapshot_mut());
+    let _ = protocol.publish(Instant(now), &mut Queue);
+    *outputs = protocol.outputs();
 }
 
-/// What the encoder keeps, out and in again.
+/// What outlives a loss of power, out and in again.
 #[unsafe(no_mangle)]
-extern "C" fn power_cycle(measurement: &mut Measurement, personality: &Personality) {
-    let kept = measurement.kept().map(|kept| Kept::from_words(&kept.to_words()));
-    *measurement = Measurement::new(*personality, kept.map_or(Start::First, Start::Kept));
+extern "C" fn power_cycle(measurement: &mut Measurement, personality: &Personality, power_on: &PowerOn) {
+    let retained = measurement.retained();
+    *measurement = Measurement::new(*personality, &PowerOn { retained, ..*power_on });
 }
 
 /// Storing.
 #[unsafe(no_mangle)]
-extern "C" fn keep(protocol: &mut Protocol, parcel: &mut Parcel, store: &mut Store<Flash>, now: u64) {
-    if protocol.pack(parcel) {
-        let result = parcel.deliver(store);
-        let _ = protocol.finish(parcel, result, Instant(now), &mut Queue);
+extern "C" fn store(protocol: &mut Protocol, job: &mut StoreJob, store: &mut Store<Flash>, now: u64) {
+    if protocol.take_job(job) {
+        let result = job.run(store);
+        let _ = protocol.finish(job, result, Instant(now), &mut Queue);
     }
 }
 

@@ -46,7 +46,8 @@ fn is_comparable(row: &Object) -> bool {
 
 fn script(seed: u64) -> Vec<Line> {
     let mut rng = Rng::with_seed(seed);
-    let rows: Vec<&Object> = node::pressure::OBJECTS.iter().filter(|row| is_comparable(row)).collect();
+    let rows: Vec<&Object> =
+        node::Personality::Pressure.rows().iter().filter(|row| is_comparable(row)).collect();
     std::iter::repeat_with(|| line(&mut rng, &rows)).take(FRAMES).collect()
 }
 

@@ -5,8 +5,9 @@ use std::rc::Rc;
 
 use canopen::{Instant, NodeId};
 use host_tests::bench::setup;
-use host_tests::station::{Readings, Sensors, Station};
+use host_tests::station::{Sensors, Station};
 use node::{Personality, Setup};
+use profiles::board::Inputs;
 
 use crate::table::POSITION;
 use crate::world::World;
@@ -21,13 +22,13 @@ pub(crate) struct Sight {
 }
 
 impl Sensors for Sight {
-    fn read(&mut self, now: Instant) -> Readings {
+    fn read(&mut self, now: Instant) -> Inputs {
         let mut world = self.world.borrow_mut();
         if self.node_id == POSITION {
             let car = world.car;
             world.measured.push((now, car));
         }
-        (world.pressure(), world.tape(), [world.is_pressed, false])
+        Inputs { analogue: world.pressure(), position: world.tape(), digital: [world.is_pressed, false] }
     }
 }
 

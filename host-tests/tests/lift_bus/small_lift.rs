@@ -135,7 +135,7 @@ impl SmallLift {
     }
 
     pub(crate) fn is_lit(&self) -> bool {
-        matches!(&self.network.stations[LOAD_NODE].unit, Any::Node(node) if node.protocol.lamps()[0])
+        matches!(&self.network.stations[LOAD_NODE].unit, Any::Node(node) if node.protocol.outputs().digital[0])
     }
 
     /// A value that the display has.

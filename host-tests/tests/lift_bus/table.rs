@@ -2,7 +2,7 @@
 //! that they map, as the catalogue says.
 
 use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Type};
-use node::lift::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
+use profiles::lift::objects::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
 
 /// Node-IDs.
 pub(crate) const CONTROLLER: u8 = 1;

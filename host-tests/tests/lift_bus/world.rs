@@ -1,7 +1,7 @@
 //! What is there besides the bus: the shaft with the car, its doors, who is in it and who presses a button.
 
 use canopen::Instant;
-use node::{RawEncoder, RawSample};
+use profiles::board::{RawEncoder, RawSample};
 
 use host_tests::bench;
 

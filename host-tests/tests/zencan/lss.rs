@@ -2,7 +2,8 @@
 
 use host_tests::bench::raw;
 use host_tests::station::PressureNode;
-use node::{Personality, REVISION, VENDOR_ID};
+use node::Personality;
+use product::{REVISION, VENDOR_ID};
 use tokio::time::{Duration, sleep};
 use zencan_client::common::NodeId;
 use zencan_client::common::lss::{LssIdentity, LssState};

@@ -4,8 +4,8 @@ use canopen::NodeId;
 use canopen::dictionary::{Access, DefaultValue, Object, Type};
 use host_tests::bench::raw;
 use host_tests::station::PressureNode;
+use node::Personality;
 use node::State;
-use node::pressure::OBJECTS;
 use tokio::time::{Duration, sleep};
 use zencan_client::common::CanId;
 use zencan_client::common::nmt::NmtState;
@@ -72,7 +72,7 @@ fn abort_code(error: SdoClientError) -> u32 {
 #[tokio::test(start_paused = true)]
 async fn every_object_is_read_by_both_transfers() {
     let (_, mut client) = node();
-    for row in OBJECTS.iter() {
+    for row in Personality::Pressure.rows().iter() {
         let value = client.upload(row.index, row.sub).await;
         match value {
             Ok(value) => {
@@ -101,7 +101,7 @@ async fn every_object_is_written_as_its_access_says() {
         client.write_u8(0x1A00 + number as u16, 0, 0).await.unwrap();
     }
     client.download(0x2203, 0, b"cali").await.unwrap();
-    for row in OBJECTS.iter().filter(|row| row.access == Access::ReadWrite) {
+    for row in Personality::Pressure.rows().iter().filter(|row| row.access == Access::ReadWrite) {
         // 1010h, 1011h, 1F51h and 2204h take commands. A domain is empty until it is written.
         if matches!(row.index, 0x1010 | 0x1011 | 0x1F51) && row.sub > 0
             || row.index == 0x2204
@@ -116,7 +116,11 @@ async fn every_object_is_written_as_its_access_says() {
             .await
             .unwrap_or_else(|error| panic!("{row:X?}: {error}"));
     }
-    for row in OBJECTS.iter().filter(|row| matches!(row.access, Access::Const | Access::ReadOnly)) {
+    for row in Personality::Pressure
+        .rows()
+        .iter()
+        .filter(|row| matches!(row.access, Access::Const | Access::ReadOnly))
+    {
         let refused = client.download(row.index, row.sub, &[0]).await.unwrap_err();
         assert_eq!(abort_code(refused), 0x0601_0002, "{row:X?}");
     }

@@ -1,7 +1,7 @@
 //! The devices that the project builds, one for each personality.
 
 use canopen::dictionary::Object as Row;
-use node::{Personality, combined, encoder, lift, pressure};
+use profiles::Personality;
 
 /// A device: what its data sheet is made from.
 #[derive(Clone, Copy, Debug)]
@@ -16,30 +16,26 @@ pub struct Device {
     pub rows: &'static [Row],
 }
 
-/// All of them.
-pub static DEVICES: [Device; 4] = [
-    Device {
-        file_name: "pressure.eds",
-        description: "Pressure and temperature transmitter, CiA 404",
-        personality: Personality::Pressure,
-        rows: &pressure::OBJECTS,
-    },
-    Device {
-        file_name: "encoder.eds",
-        description: "Encoder, CiA 406",
-        personality: Personality::Encoder,
-        rows: &encoder::OBJECTS,
-    },
-    Device {
-        file_name: "combined.eds",
-        description: "Encoder and transmitter in one, CiA 406 and CiA 404",
-        personality: Personality::Combined,
-        rows: &combined::OBJECTS,
-    },
-    Device {
-        file_name: "lift.eds",
-        description: "Car position, load measuring and panel units of a lift, CiA 417",
-        personality: Personality::Lift,
-        rows: &lift::OBJECTS,
-    },
-];
+impl Device {
+    /// The device of a personality.
+    #[must_use]
+    pub const fn of(personality: Personality) -> Device {
+        Device {
+            file_name: personality.file_name(),
+            description: personality.description(),
+            personality,
+            rows: personality.rows(),
+        }
+    }
+}
+
+/// All of them, in the order of the list of personalities.
+pub static DEVICES: [Device; Personality::ALL.len()] = {
+    let mut devices = [Device::of(Personality::ALL[0]); Personality::ALL.len()];
+    let mut i = 0;
+    while i < devices.len() {
+        devices[i] = Device::of(Personality::ALL[i]);
+        i += 1;
+    }
+    devices
+};

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Write};
 
-use node::REVISION;
+use product::REVISION;
 
 use crate::read::BIT_RATES;
 use crate::{Device, DeviceInfo, Eds, Entry, Object, ObjectType};

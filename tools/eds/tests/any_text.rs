@@ -2,8 +2,8 @@
 
 use std::sync::LazyLock;
 
+use canopen::NodeId;
 use eds::{DEVICES, Eds, LookupError, address};
-use node::NodeId;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::string::string_regex;

@@ -1,7 +1,9 @@
 //! What is written is read again, and it is what the table says.
 
+use canopen::NodeId;
 use eds::{Access, DEVICES, Eds, Formula, ObjectType, Value};
-use node::{NodeId, Personality, REVISION, VENDOR_ID};
+use product::{REVISION, VENDOR_ID};
+use profiles::Personality;
 
 fn pressure() -> Eds {
     Eds::parse(&DEVICES[0].sheet()).unwrap()

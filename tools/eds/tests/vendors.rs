@@ -1,7 +1,7 @@
 //! Data sheets as vendors write them.
 
+use canopen::NodeId;
 use eds::{Access, DataType, Eds, Entry, Error, Formula, ObjectType, Problem, Value};
-use node::NodeId;
 
 /// Everything odd that the reader takes.
 const ODD: &str = "\u{FEFF}; a comment\r

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use profiles::pressure::{FactoryCalibration, PressureCalibration, RawSample};
+use profiles::board::RawSample;
+use profiles::pressure::PressureCalibration;
 
 const CODES: f64 = 4096.0;
 const CONVERSIONS: u16 = 16;
@@ -63,9 +64,8 @@ fn raw(pressure: f64) -> RawSample {
         pressure: pressure as u32,
         supply: SUPPLY * u32::from(CONVERSIONS),
         temperature: 0,
-        vrefint: 0,
+        reference: 0,
         thermistor: 0,
         count: CONVERSIONS,
-        factory: FactoryCalibration { ts_cal1: 0, ts_cal2: 0, vrefint_cal: 0 },
     }
 }

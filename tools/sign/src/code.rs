@@ -1,26 +1,26 @@
 //! The code of an image, from an ELF file or a flat binary.
 
 use anyhow::{Context, Result, bail, ensure};
+use bsp::sectors::FLASH;
+use bsp::update_layout::LAYOUT;
 use object::Endianness;
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Object, elf};
-use update::{HEADER_LEN, Layout};
+use update::HEADER_LEN;
 
-/// Where flash begins in the address space (RM0390, 2.2).
-const FLASH: u32 = 0x0800_0000;
 /// What erased flash reads as.
 const ERASED: u8 = 0xFF;
 
 /// The address of the vector table of an application: after the header.
 #[must_use]
 pub fn start() -> u32 {
-    FLASH + Layout::STM32F4.application().start() + HEADER_LEN as u32
+    FLASH + LAYOUT.application().start() + HEADER_LEN as u32
 }
 
 /// The most code that there is room for, in bytes.
 #[must_use]
 pub fn most() -> usize {
-    Layout::STM32F4.application().size() as usize - HEADER_LEN
+    LAYOUT.application().size() as usize - HEADER_LEN
 }
 
 /// The code in a file, as whole words: of an ELF file what is loaded into flash, anything else as it is.

@@ -8,7 +8,7 @@ use crate::image::Image;
 use crate::key;
 
 /// The product that the bootloader answers to (1018h:2). An image has all personalities.
-pub const PRODUCT: u32 = node::Personality::Pressure.product_code();
+pub const PRODUCT: u32 = product::BOARD;
 /// The hardware revisions that there are: 0.
 pub const HARDWARE: u32 = 1;
 

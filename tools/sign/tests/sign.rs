@@ -1,12 +1,11 @@
 //! What the tool signs is what a node accepts.
 
+use bsp::update_layout::LAYOUT;
 use sign::image::Image;
 use sign::{code, key};
 use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, PUBLIC_KEY};
 use update::mock::MockFlash;
-use update::{
-    Decision, Description, HEADER_LEN, Layout, Next, Start, Status, Target, Updater, Version, boot,
-};
+use update::{Decision, Description, HEADER_LEN, Next, Start, Status, Target, Updater, Version, boot};
 
 const SECTORS: [usize; 8] = [16, 16, 16, 16, 64, 128, 128, 128];
 
@@ -17,7 +16,7 @@ fn description() -> Description {
 
 fn target() -> Target {
     let key = DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY;
-    Target { layout: Layout::STM32F4, product: 0x8271, hardware: 0, key }
+    Target { layout: LAYOUT, product: 0x8271, hardware: 0, key }
 }
 
 /// An update of a node with the flash of the chip; what 1F57h reads at the end.

@@ -2,6 +2,7 @@
 
 use stm32f4xx_hal::signature::{VrefCal, VtempCal30, VtempCal110};
 
+use crate::chip_thermometer::Calibration;
 use crate::serial_number::serial_number as from_unique_id;
 
 /// The unique identifier, 96 bits (RM0390, 34.1).
@@ -11,17 +12,6 @@ const UNIQUE_ID: *const [u8; 12] = 0x1FFF_7A10 as *const _;
 pub fn serial_number() -> u32 {
     // SAFETY: system memory, readable and constant on every STM32F4.
     from_unique_id(&unsafe { UNIQUE_ID.read() })
-}
-
-/// Conversions at VDDA = 3.3 V.
-#[derive(Clone, Copy, Debug)]
-pub struct Calibration {
-    /// Temperature sensor at 30 degC (TS_CAL1).
-    pub temperature_30: u16,
-    /// Temperature sensor at 110 degC (TS_CAL2).
-    pub temperature_110: u16,
-    /// Internal reference (VREFINT_CAL).
-    pub reference: u16,
 }
 
 /// The calibration of this chip.

@@ -2,7 +2,9 @@
 
 use super::channel::{Channel, Pending};
 use super::supervision::{Conditions, Supervision};
-use super::{ChannelParameters, ChannelValues, Kept, KeptChannel, Limits, Parameters, RawEncoder, Start};
+use super::{ChannelParameters, ChannelValues, Kept, KeptChannel, Limits, Parameters, Start};
+use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
+use crate::profile::Chain;
 
 /// What the encoder gives for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,30 +64,14 @@ impl Encoder {
         }
     }
 
-    /// Takes over parameters, from the next sample on.
-    pub fn apply(&mut self, parameters: &Parameters) {
-        if core::mem::take(&mut self.is_damaged) {
-            self.supervision.set_damaged(parameters.sensors().any(|sensor| sensor.kind.is_kept()));
-        }
-        // What was kept is for the first parameters: a channel that is switched off and on again starts afresh.
-        let kept = core::mem::take(&mut self.kept.channels);
-        for ((channel, own), kept) in self.channels.iter_mut().zip(&parameters.channels).zip(&kept) {
-            apply(channel, parameters, own, kept);
-        }
-        self.acknowledge.set(parameters.acknowledge);
-        self.limits = parameters.limits;
-        self.fixed = fixed(parameters);
-    }
-
     /// Processes what was read in one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
         let mut snapshot = Snapshot::default();
-        self.update(raw, &mut snapshot);
+        self.measure(raw, &mut snapshot);
         snapshot
     }
 
-    /// The same, with the snapshot where it is to be.
-    pub fn update(&mut self, raw: &RawEncoder, snapshot: &mut Snapshot) {
+    fn measure(&mut self, raw: &RawEncoder, snapshot: &mut Snapshot) {
         self.kept.operating_time.tick();
         if let Some(mask) = self.acknowledge.take() {
             let [low, high, ..] = mask.to_le_bytes();
@@ -116,12 +102,41 @@ impl Encoder {
         let channels = [kept(first, before), kept(second, before_too)];
         Kept { channels, operating_time: self.kept.operating_time }
     }
+}
 
-    /// The same as it is stored: see [`Kept::to_words`]. Not inlined: this crate is compiled for speed, its callers for size.
-    #[must_use]
-    #[inline(never)]
-    pub fn kept_words(&self) -> [u32; Kept::WORDS] {
-        self.kept().to_words()
+impl Chain for Encoder {
+    type Parameters = Parameters;
+    type Snapshot = Snapshot;
+
+    fn new(power_on: &PowerOn) -> Encoder {
+        Encoder::new(Start::from(power_on.retained))
+    }
+
+    fn apply(&mut self, parameters: &Parameters) {
+        if core::mem::take(&mut self.is_damaged) {
+            self.supervision.set_damaged(parameters.sensors().any(|sensor| sensor.kind.is_kept()));
+        }
+        // What was kept is for the first parameters: a channel that is switched off and on again starts afresh.
+        let kept = core::mem::take(&mut self.kept.channels);
+        for ((channel, own), kept) in self.channels.iter_mut().zip(&parameters.channels).zip(&kept) {
+            apply(channel, parameters, own, kept);
+        }
+        self.acknowledge.set(parameters.acknowledge);
+        self.limits = parameters.limits;
+        self.fixed = fixed(parameters);
+    }
+
+    fn update(&mut self, inputs: &Inputs, snapshot: &mut Snapshot) {
+        self.measure(&inputs.position, snapshot);
+    }
+
+    fn position_inputs(parameters: &Parameters) -> PositionInputs {
+        parameters.inputs()
+    }
+
+    fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
+        *words = self.kept().to_words();
+        true
     }
 }
 

@@ -2,12 +2,13 @@
 
 use super::area::area_state;
 use super::commissioning::Commissioning;
-use super::input::{Input, RawEncoder};
+use super::input::Input;
 use super::speed::speed_value;
 use super::{
     Area, CamChannel, ChannelParameters, Command, KeptChannel, Module, Parameters, Position, Progress, Scale,
     Sensor, Speedometer,
 };
+use crate::board::RawEncoder;
 
 /// What a channel gives for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,8 +1,9 @@
 //! From what the hardware has read to the movement of one sensor.
 
+use crate::board::RawEncoder;
 use core::num::NonZeroU32;
 
-use super::{Fault, Frame, Scale, Sensor, Tracker};
+use super::{Fault, Scale, Sensor, Tracker};
 
 /// Sensor state: the encoder does not answer.
 pub const SENSOR_NO_SIGNAL: u8 = 1 << 0;
@@ -31,19 +32,6 @@ const TOLERATED_MISSES: u32 = 2;
 /// Steps by which the index may come too early or too late: it is one quarter period wide and is seen at one edge
 /// forwards and at the other backwards; the capture may fall on either side of the step that causes it.
 const INDEX_TOLERANCE: u64 = 2;
-
-/// What the hardware reads once a millisecond. There is one input of each kind: channels of the same kind share it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RawEncoder {
-    /// Timer in encoder mode: all quarter periods, modulo 2^16.
-    pub counter: u16,
-    /// What the timer stood at when the last index pulse came; `None` when none came since the last sample.
-    pub index: Option<u16>,
-    /// SSI frame, `None` when none was read.
-    pub ssi: Option<Frame>,
-    /// The board around the sensors.
-    pub board: super::Board,
-}
 
 /// What one sample says about the movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

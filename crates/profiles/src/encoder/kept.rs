@@ -7,6 +7,7 @@
 
 use super::input::Left;
 use super::{Position, SensorType};
+use crate::board::{RETAINED_WORDS, Retained};
 
 /// Milliseconds in a tenth of an hour.
 const TENTH: u32 = 360_000;
@@ -103,12 +104,23 @@ pub enum Start {
     Damaged,
 }
 
+impl From<Retained> for Start {
+    fn from(retained: Retained) -> Start {
+        match retained {
+            Retained::Nothing => Start::First,
+            Retained::Words(words) => Start::Kept(Kept::from_words(&words)),
+            Retained::Damaged => Start::Damaged,
+        }
+    }
+}
+
 /// Words of a channel.
 const CHANNEL: usize = 8;
+const _: () = assert!(Kept::WORDS == 2 * CHANNEL + 2);
 
 impl Kept {
     /// Words of its stored form.
-    pub const WORDS: usize = 2 * CHANNEL + 2;
+    pub const WORDS: usize = RETAINED_WORDS;
 
     /// The form to be stored. It has no check of its own: whoever stores it adds one.
     #[must_use]

@@ -52,16 +52,19 @@ mod speed;
 mod ssi;
 mod supervision;
 
+pub mod objects;
+
 pub use area::{Area, Module, OUT_OF_RANGE, OVERFLOW, UNDERFLOW, area_state};
 pub use cam::{Cam, CamChannel, Cams};
 pub use chain::{Encoder, Snapshot};
 pub use channel::ChannelValues;
 pub use commissioning::Progress;
 pub use input::{
-    RawEncoder, SENSOR_ALARM, SENSOR_HELD, SENSOR_IMPLAUSIBLE, SENSOR_INDEX, SENSOR_NO_SIGNAL, SENSOR_PARITY,
+    SENSOR_ALARM, SENSOR_HELD, SENSOR_IMPLAUSIBLE, SENSOR_INDEX, SENSOR_NO_SIGNAL, SENSOR_PARITY,
     SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED,
 };
 pub use kept::{Kept, KeptChannel, OperatingTime, Start};
+pub use objects::{FAULTS, Objects, ROWS, fields, handles};
 pub use parameters::{
     CODE_SEQUENCE, COMMISSIONING, ChannelParameters, Command, DIRECTION, Parameters, SCALING,
 };
@@ -70,8 +73,8 @@ pub use scale::{Native, Scale, Settings};
 pub use sensor::{Sensor, SensorType};
 pub use shaft::{Shaft, Tracker};
 pub use speed::{STANDSTILL, Speedometer, speed_value};
-pub use ssi::{Coding, Fault, Format, Frame, Parity, Reading};
+pub use ssi::{Coding, Fault, Format, Parity, Reading};
 pub use supervision::{
-    ALARM_COMMISSIONING, ALARM_POSITION, Board, Conditions, Limits, SUPPORTED_ALARMS, SUPPORTED_WARNINGS,
+    ALARM_COMMISSIONING, ALARM_POSITION, Conditions, Limits, SUPPORTED_ALARMS, SUPPORTED_WARNINGS,
     WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
 };

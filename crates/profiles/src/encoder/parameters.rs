@@ -2,6 +2,8 @@
 
 use core::num::{NonZeroU16, NonZeroU32};
 
+use crate::board::PositionInputs;
+
 use super::{Area, Cams, Format, Limits, Module, Native, Scale, Sensor, SensorType, Settings};
 
 /// Operating parameter (6000h): the position falls when the shaft turns clockwise. Rotary encoders only.
@@ -130,6 +132,13 @@ impl Parameters {
     /// All sensors.
     pub fn sensors(&self) -> impl Iterator<Item = Sensor> {
         self.channels.iter().filter_map(|channel| self.sensor(channel))
+    }
+
+    /// How the board has to read the sensors.
+    #[must_use]
+    pub fn inputs(&self) -> PositionInputs {
+        let is_absolute = self.sensors().any(|sensor| sensor.kind.is_absolute());
+        PositionInputs { are_used: true, ssi_bits: is_absolute.then(|| self.format.length()) }
     }
 
     /// Whether every sensor can give so many units per revolution (6001h).

@@ -5,14 +5,7 @@
 //! the encoder has them. Then the line is low until the clock has rested for the monoflop time. The level before the
 //! word and the one after it tell an encoder from a line that is open or shorted.
 
-/// What was clocked in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Frame {
-    /// The bits, the last one in bit 0.
-    pub bits: u64,
-    /// How many, from the rest level on: at least two more than the word has.
-    pub clocks: u32,
-}
+use crate::board::SsiFrame;
 
 /// How the position is coded on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +114,7 @@ impl Format {
     ///
     /// # Errors
     /// [`Fault`] when the line or the parity is bad.
-    pub fn read(self, frame: Frame) -> Result<Reading, Fault> {
+    pub fn read(self, frame: SsiFrame) -> Result<Reading, Fault> {
         let Some(tail) = frame.clocks.min(64).checked_sub(self.length() + 1).filter(|tail| *tail > 0) else {
             return Err(Fault::NoSignal);
         };
@@ -193,9 +186,9 @@ mod tests {
         )
     }
 
-    fn frame(format: Format, position: u32, alarm: bool, tail: u32) -> Frame {
+    fn frame(format: Format, position: u32, alarm: bool, tail: u32) -> SsiFrame {
         let bits = (1 << format.length() | encode(format, position, alarm)) << tail;
-        Frame { bits, clocks: 1 + format.length() + tail }
+        SsiFrame { bits, clocks: 1 + format.length() + tail }
     }
 
     proptest! {
@@ -216,7 +209,7 @@ mod tests {
 
         #[test]
         fn any_frame_is_read_or_refused(format in any_format(), bits: u64, clocks: u32) {
-            if let Ok(reading) = format.read(Frame { bits, clocks }) {
+            if let Ok(reading) = format.read(SsiFrame { bits, clocks }) {
                 prop_assert!(u64::from(reading.position) < 1 << format.position_bits());
             }
         }
@@ -224,7 +217,7 @@ mod tests {
         #[test]
         fn a_dead_line_is_no_position(format in any_format(), clocks in 0..=64_u32) {
             for bits in [0, u64::MAX] {
-                prop_assert_eq!(format.read(Frame { bits, clocks }), Err(Fault::NoSignal));
+                prop_assert_eq!(format.read(SsiFrame { bits, clocks }), Err(Fault::NoSignal));
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::input::{SENSOR_NO_SIGNAL, SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED};
 use super::{ChannelValues, OperatingTime};
+use crate::board::Board;
 
 /// Alarm bit 0: position error.
 pub const ALARM_POSITION: u16 = 1 << 0;
@@ -26,21 +27,6 @@ pub const SUPPORTED_WARNINGS: u16 =
 
 /// Milliseconds for which a supply must be out of its limits, or back, before that is believed.
 const DEBOUNCE: u8 = 10;
-
-/// What the board knows besides positions; `None` where it does not measure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Board {
-    /// Supply of the sensors in mV.
-    pub supply: Option<u16>,
-    /// Current of the sensors in mA.
-    pub current: Option<u16>,
-    /// Battery behind what is kept, in mV.
-    pub battery: Option<u16>,
-    /// The last reset came from the watchdog.
-    pub watchdog_reset: bool,
-    /// A memory test has failed.
-    pub memory_error: bool,
-}
 
 /// The limits of what the board measures, and of the operating time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

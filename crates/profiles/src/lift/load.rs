@@ -20,7 +20,8 @@
 //! * The reference weight (6486h) is the load in the car at the moment when it is written.
 //! * A sensor that is broken gives the highest load there is: a car that cannot be weighed does not leave.
 
-use crate::pressure::{Calibration, Filter, RawSample};
+use crate::board::{ChipThermometer, RawSample};
+use crate::pressure::{Calibration, Filter};
 
 /// Load signal (6482h): the car is empty.
 pub const ZERO_LOAD: u8 = 1 << 0;
@@ -104,29 +105,24 @@ pub struct Snapshot {
 /// The load measuring unit and its state.
 #[derive(Clone, Copy, Debug)]
 pub struct LoadUnit {
+    chip: ChipThermometer,
     parameters: Parameters,
     line: Option<(f32, f32)>,
     filter: Filter,
 }
 
-impl Default for LoadUnit {
-    fn default() -> LoadUnit {
-        LoadUnit::new(&Parameters::default())
-    }
-}
-
 impl LoadUnit {
-    /// A unit that has not measured yet.
+    /// A unit that has not measured yet, in a chip with this temperature sensor.
     #[must_use]
-    pub fn new(parameters: &Parameters) -> LoadUnit {
+    pub fn new(chip: ChipThermometer, parameters: &Parameters) -> LoadUnit {
         let filter = Filter::new(parameters.filter_type, parameters.filter_constant);
-        LoadUnit { parameters: *parameters, line: parameters.line(), filter }
+        LoadUnit { chip, parameters: *parameters, line: parameters.line(), filter }
     }
 
     /// Takes over parameters, from the next sample on. The filter only starts afresh when it is another one.
     #[inline(never)]
     pub fn apply(&mut self, parameters: &Parameters) {
-        let fresh = LoadUnit::new(parameters);
+        let fresh = LoadUnit::new(self.chip, parameters);
         let filter = if fresh.filter.is_like(&self.filter) { self.filter } else { fresh.filter };
         *self = LoadUnit { filter, ..fresh };
     }
@@ -148,7 +144,7 @@ impl LoadUnit {
                 is_broken,
             };
         }
-        let kelvin = p.transducer.temperature.temperature(raw);
+        let kelvin = p.transducer.temperature.temperature(raw, self.chip);
         let pascal = p.transducer.pressure.pressure(raw.ratio(), kelvin);
         let measured = self.filter.next(pascal) * factor + constant;
         let load = rounded(measured);
@@ -181,14 +177,12 @@ pub fn signals(load: u16, limits: &[u16; 4]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pressure::FactoryCalibration;
 
     /// Readings of an intact transducer, 10 % to 90 % of its supply for 0 to 10 bar.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn raw(pascal: f64) -> RawSample {
-        let factory = FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
         let pressure = (64_000.0 * (0.1 + 0.8 * pascal / 1.0e6)).round() as u32;
-        RawSample { pressure, supply: 64_000, temperature: 0, thermistor: 0, vrefint: 0, count: 16, factory }
+        RawSample { pressure, supply: 64_000, temperature: 0, thermistor: 0, reference: 0, count: 16 }
     }
 
     fn hydraulic() -> Parameters {
@@ -199,7 +193,7 @@ mod tests {
 
     #[test]
     fn two_points_make_a_line_that_goes_on() {
-        let mut unit = LoadUnit::new(&hydraulic());
+        let mut unit = LoadUnit::new(ChipThermometer::UNKNOWN, &hydraulic());
         for (pascal, load) in [(2.0e5, 0), (3.0e5, 200), (6.0e5, 800), (8.0e5, 1200), (1.0e5, 0)] {
             let snapshot = unit.sample(&raw(pascal));
             assert_eq!((snapshot.load, snapshot.is_broken), (load, false), "{pascal}");
@@ -212,7 +206,8 @@ mod tests {
         let points = [Point { pressure: 2.0e5, load: 100.0 }, Point { pressure: 6.0e5, load: 300.0 }];
         let own = Parameters { points, ..hydraulic() };
         assert!(own.is_calibrated());
-        let loads = [2.0e5, 4.0e5, 6.0e5].map(|pascal| LoadUnit::new(&own).sample(&raw(pascal)).load);
+        let loads = [2.0e5, 4.0e5, 6.0e5]
+            .map(|pascal| LoadUnit::new(ChipThermometer::UNKNOWN, &own).sample(&raw(pascal)).load);
         assert_eq!(loads, [100, 200, 300]);
     }
 
@@ -257,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_broken_sensor_is_an_overload() {
-        let mut unit = LoadUnit::new(&hydraulic());
+        let mut unit = LoadUnit::new(ChipThermometer::UNKNOWN, &hydraulic());
         for pressure in [0, 65_520] {
             let snapshot = unit.sample(&RawSample { pressure, ..raw(0.0) });
             assert_eq!((snapshot.load, snapshot.signals & OVERLOAD), (u16::MAX, OVERLOAD));
@@ -271,7 +266,7 @@ mod tests {
         let open = RawSample { pressure: 640, ..raw(0.0) };
         let rail = RawSample { pressure: 65_520, supply: 70_000, ..raw(0.0) };
         for broken in [open, rail] {
-            assert!(LoadUnit::new(&hydraulic()).sample(&broken).is_broken);
+            assert!(LoadUnit::new(ChipThermometer::UNKNOWN, &hydraulic()).sample(&broken).is_broken);
         }
     }
 
@@ -280,12 +275,18 @@ mod tests {
         let points = [Point { pressure: 1.0, load: 0.0 }, Point { pressure: 1.0, load: 100.0 }];
         let parameters = Parameters { points, ..hydraulic() };
         assert!(!parameters.is_calibrated());
-        assert_eq!(LoadUnit::new(&parameters).sample(&raw(5.0e5)), Snapshot::default());
+        assert_eq!(
+            LoadUnit::new(ChipThermometer::UNKNOWN, &parameters).sample(&raw(5.0e5)),
+            Snapshot::default()
+        );
     }
 
     #[test]
     fn the_mean_of_many_samples_stays_until_the_next() {
-        let mut unit = LoadUnit::new(&Parameters { filter_type: 2, filter_constant: 4, ..hydraulic() });
+        let mut unit = LoadUnit::new(
+            ChipThermometer::UNKNOWN,
+            &Parameters { filter_type: 2, filter_constant: 4, ..hydraulic() },
+        );
         let loads = [2.0e5, 4.0e5, 4.0e5, 4.0e5, 6.0e5].map(|pascal| unit.sample(&raw(pascal)).load);
         assert_eq!(loads, [0, 0, 0, 300, 300]);
         unit.apply(&Parameters { filter_type: 2, filter_constant: 4, offset: 5.0, ..hydraulic() });

@@ -6,11 +6,15 @@
 
 pub mod catalogue;
 pub mod load;
+pub mod objects;
 pub mod panel;
 pub mod position;
 
-use crate::encoder::{Kept, RawEncoder, Start};
-use crate::pressure::RawSample;
+pub use objects::{FAULTS, Objects, ROWS, fields, handles};
+
+use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS};
+use crate::encoder::Start;
+use crate::profile::Chain;
 
 /// All parameters of the virtual devices.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,17 +23,6 @@ pub struct Parameters {
     pub position: position::Parameters,
     /// Of the load measuring unit.
     pub load: load::Parameters,
-}
-
-/// What was read in one millisecond.
-#[derive(Clone, Copy, Debug)]
-pub struct RawLift {
-    /// Position sensors.
-    pub encoder: RawEncoder,
-    /// Pressure input.
-    pub pressure: RawSample,
-    /// Which buttons are pressed, debounced.
-    pub buttons: [bool; panel::BUTTONS],
 }
 
 /// What the virtual devices give for one sample.
@@ -44,72 +37,82 @@ pub struct Snapshot {
 }
 
 /// All virtual devices with their state.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Lift {
     position: position::PositionUnits,
     load: load::LoadUnit,
     buttons: panel::Buttons,
 }
 
-impl Lift {
-    /// The devices after power-on. Positions are measured from the first parameters on.
-    #[must_use]
-    pub fn new(start: Start) -> Lift {
-        Lift { position: position::PositionUnits::new(start), ..Lift::default() }
+impl Chain for Lift {
+    type Parameters = Parameters;
+    type Snapshot = Snapshot;
+
+    fn new(power_on: &PowerOn) -> Lift {
+        Lift {
+            position: position::PositionUnits::new(Start::from(power_on.retained)),
+            load: load::LoadUnit::new(power_on.thermometer, &load::Parameters::default()),
+            buttons: panel::Buttons::default(),
+        }
     }
 
-    /// Takes over parameters, from the next sample on.
-    pub fn apply(&mut self, parameters: &Parameters) {
+    fn apply(&mut self, parameters: &Parameters) {
         self.position.apply(&parameters.position);
         self.load.apply(&parameters.load);
     }
 
-    /// Processes what was read in one millisecond.
-    pub fn sample(&mut self, raw: &RawLift) -> Snapshot {
-        Snapshot {
-            position: self.position.sample(&raw.encoder),
-            load: self.load.sample(&raw.pressure),
-            button: self.buttons.sample(raw.buttons),
-        }
+    fn update(&mut self, inputs: &Inputs, snapshot: &mut Snapshot) {
+        *snapshot = Snapshot {
+            position: self.position.sample(&inputs.position),
+            load: self.load.sample(&inputs.analogue),
+            button: self.buttons.sample(inputs.digital),
+        };
     }
 
-    /// What is to outlive a loss of power.
-    #[must_use]
-    pub fn kept(&self) -> Kept {
-        self.position.kept()
+    fn position_inputs(parameters: &Parameters) -> PositionInputs {
+        parameters.position.sensors.inputs()
+    }
+
+    fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
+        *words = self.position.kept().to_words();
+        true
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pressure::FactoryCalibration;
+    use crate::board::{RawEncoder, RawSample, Retained};
 
-    const FACTORY: FactoryCalibration = FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
     /// 5 bar.
     const PRESSURE: RawSample = RawSample {
         pressure: 32_000,
         supply: 64_000,
         temperature: 0,
-        vrefint: 0,
+        reference: 0,
         thermistor: 0,
         count: 16,
-        factory: FACTORY,
     };
 
-    fn raw(counter: u16) -> RawLift {
-        let encoder = RawEncoder { counter, ..RawEncoder::default() };
-        RawLift { encoder, pressure: PRESSURE, buttons: [true, false] }
+    fn inputs(counter: u16) -> Inputs {
+        let position = RawEncoder { counter, ..RawEncoder::default() };
+        Inputs { analogue: PRESSURE, position, digital: [true, false] }
+    }
+
+    fn sample(lift: &mut Lift, counter: u16) -> Snapshot {
+        let mut snapshot = Snapshot::default();
+        lift.update(&inputs(counter), &mut snapshot);
+        snapshot
     }
 
     #[test]
     fn every_virtual_device_measures_with_its_own_parameters() {
         let mut parameters = Parameters::default();
         parameters.load.offset = 7.0;
-        let mut lift = Lift::default();
+        let mut lift = Lift::new(&PowerOn::default());
         lift.apply(&parameters);
-        lift.sample(&raw(0));
-        let snapshot = lift.sample(&raw(4096));
+        sample(&mut lift, 0);
+        let snapshot = sample(&mut lift, 4096);
         assert_eq!(snapshot.position.units[0].position, 200, "a turn of 200 mm");
         assert_eq!(snapshot.load.load, 507);
         assert_eq!(snapshot.button, panel::Contact { button: 0, is_pressed: true });
@@ -117,12 +120,15 @@ mod tests {
 
     #[test]
     fn the_position_outlives_a_loss_of_power() {
-        let mut lift = Lift::default();
+        let mut lift = Lift::new(&PowerOn::default());
         lift.apply(&Parameters::default());
-        lift.sample(&raw(0));
-        lift.sample(&raw(4096));
-        let mut lift = Lift::new(Start::Kept(lift.kept()));
+        sample(&mut lift, 0);
+        sample(&mut lift, 4096);
+        let mut words = [0; RETAINED_WORDS];
+        assert!(lift.retain(&mut words));
+        let retained = Retained::Words(words);
+        let mut lift = Lift::new(&PowerOn { retained, ..PowerOn::default() });
         lift.apply(&Parameters::default());
-        assert_eq!(lift.sample(&raw(0)).position.units[0].position, 200);
+        assert_eq!(sample(&mut lift, 0).position.units[0].position, 200);
     }
 }

@@ -4,10 +4,12 @@
 //! look into them: each button has one word for when it is pressed and another one for when it is released, each lamp one
 //! that lights it and another one that puts it out. Every other word is for somebody else.
 
+use crate::board::{DIGITAL_INPUTS, DIGITAL_OUTPUTS};
+
 /// Buttons of a panel.
-pub const BUTTONS: usize = 2;
+pub const BUTTONS: usize = DIGITAL_INPUTS;
 /// Lamps of a panel.
-pub const LAMPS: usize = 2;
+pub const LAMPS: usize = DIGITAL_OUTPUTS;
 
 /// A button and what has happened to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

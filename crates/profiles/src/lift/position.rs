@@ -9,11 +9,13 @@
 //!
 //! Positions are unsigned as those of CiA 406 are, and go round at the ends: a preset puts the whole way of the car above 0.
 
+use crate::board::RawEncoder;
+use crate::profile::Chain;
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::encoder::{
-    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Kept, Module, RawEncoder, SENSOR_HELD,
-    Sensor, Start, area_state,
+    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Kept, Module, SENSOR_HELD, Sensor,
+    Start, area_state,
 };
 
 /// Position units that a device can be.

@@ -8,18 +8,18 @@ mod calibration;
 mod channel;
 mod filter;
 mod precise;
-mod raw;
-mod sensor;
 mod thermometer;
 mod transmitter;
 mod unit;
+
+pub mod objects;
 
 pub use calibration::{Polynomial, PressureCalibration};
 pub use channel::{
     Channel, ChannelParameters, ChannelValues, STATUS_ABOVE, STATUS_BELOW, STATUS_INVALID, Span,
 };
 pub use filter::Filter;
-pub use raw::{FactoryCalibration, RawSample};
+pub use objects::{FAULTS, Objects, ROWS, fields, handles};
 pub use thermometer::{TemperatureCalibration, Thermistor, Thermometer};
 pub use transmitter::{Calibration, Conditions, Parameters, Snapshot, Transmitter};
 pub use unit::Unit;

@@ -1,10 +1,7 @@
 //! The temperature in K, by the chip's sensor or by a thermistor.
 
-use super::RawSample;
+use crate::board::{ChipThermometer, RawSample};
 
-/// Temperatures at which the chip's maker took `TS_CAL1` and `TS_CAL2`, in K.
-const TS_CAL1_KELVIN: f32 = 303.15;
-const TS_CAL2_KELVIN: f32 = 383.15;
 /// Codes of a 12-bit conversion.
 const CODES: u32 = 4096;
 
@@ -76,12 +73,12 @@ impl Default for TemperatureCalibration {
 }
 
 impl TemperatureCalibration {
-    /// The temperature in K; `None` when it is not measured: an input at a rail, a broken thermistor, no factory calibration,
-    /// or no number.
+    /// The temperature in K; `None` when it is not measured: an input at a rail, a broken thermistor, a chip without a
+    /// calibration, or no number.
     #[must_use]
-    pub fn temperature(&self, raw: &RawSample) -> Option<f32> {
+    pub fn temperature(&self, raw: &RawSample, chip: ChipThermometer) -> Option<f32> {
         let measured = match self.thermometer {
-            Thermometer::Internal => internal(raw),
+            Thermometer::Internal => internal(raw, chip),
             Thermometer::Thermistor => self.thermistor.temperature(raw),
         };
         measured.map(|kelvin| kelvin * self.factor + self.offset).filter(|kelvin| kelvin.is_finite())
@@ -120,17 +117,13 @@ impl Thermistor {
     }
 }
 
-/// Sensor and reference are read against the same VDDA, so their quotient times the reference's reading at 3.3 V is the
-/// sensor's reading at 3.3 V (RM0390, 13.10), for which the factory's two points hold. Without a reference or two points
-/// it is no number.
-fn internal(raw: &RawSample) -> Option<f32> {
+/// Sensor and reference are read against the same supply, so their quotient does not depend on it. Without a reference or a
+/// characteristic the result is no number.
+fn internal(raw: &RawSample, chip: ChipThermometer) -> Option<f32> {
     if raw.is_rail(raw.temperature) {
         return None;
     }
-    let points = raw.factory;
-    let at_3300_mv = real(raw.temperature) / real(raw.vrefint) * f32::from(points.vrefint_cal);
-    let (low, high) = (f32::from(points.ts_cal1), f32::from(points.ts_cal2));
-    Some(TS_CAL1_KELVIN + (at_3300_mv - low) * (TS_CAL2_KELVIN - TS_CAL1_KELVIN) / (high - low))
+    Some(chip.offset + chip.slope * (real(raw.temperature) / real(raw.reference)))
 }
 
 /// Exact up to 2^24: sums of 4096 conversions.
@@ -142,21 +135,22 @@ fn real(sum: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pressure::FactoryCalibration;
-
+    use crate::board::{ChipThermometer, RawSample};
     const RAW: RawSample = RawSample {
         pressure: 0,
         supply: 0,
         temperature: 16 * 1000,
-        vrefint: 16 * 1500,
+        reference: 16 * 1500,
         thermistor: 16 * 2048,
         count: 16,
-        factory: FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 },
     };
+    /// 940 at 30 degC and 1210 at 110 degC, with the reference at 1500.
+    const CHIP: ChipThermometer =
+        ChipThermometer { offset: 303.15 - 940.0 * 80.0 / 270.0, slope: 1500.0 * 80.0 / 270.0 };
 
     fn thermistor(thermistor: u32) -> Option<f32> {
         let own = TemperatureCalibration { thermometer: Thermometer::Thermistor, ..Default::default() };
-        own.temperature(&RawSample { thermistor, ..RAW })
+        own.temperature(&RawSample { thermistor, ..RAW }, CHIP)
     }
 
     #[test]
@@ -191,17 +185,18 @@ mod tests {
         for sum in [0, 16 * 4095, 16 * 4096, u32::MAX] {
             assert_eq!(thermistor(sum), None);
             let own = TemperatureCalibration::default();
-            assert_eq!(own.temperature(&RawSample { temperature: sum, ..RAW }), None);
+            assert_eq!(own.temperature(&RawSample { temperature: sum, ..RAW }, CHIP), None);
         }
     }
 
     #[test]
-    fn without_a_reference_or_factory_points_there_is_no_temperature() {
+    fn without_a_reference_or_a_characteristic_there_is_no_temperature() {
         let own = TemperatureCalibration::default();
-        assert_eq!(own.temperature(&RawSample { vrefint: 0, ..RAW }), None);
-        for (ts_cal1, ts_cal2) in [(1000, 1000), (940, 940), (0xFFFF, 0xFFFF)] {
-            let factory = FactoryCalibration { ts_cal1, ts_cal2, ..RAW.factory };
-            assert_eq!(own.temperature(&RawSample { factory, ..RAW }), None);
+        assert_eq!(own.temperature(&RawSample { reference: 0, ..RAW }, CHIP), None);
+        for (offset, slope) in
+            [(f32::NAN, f32::NAN), (f32::NEG_INFINITY, f32::INFINITY), (0.0, f32::INFINITY)]
+        {
+            assert_eq!(own.temperature(&RAW, ChipThermometer { offset, slope }), None);
         }
     }
 
@@ -230,15 +225,15 @@ mod tests {
         let wide = Thermistor { break_low: 0.0, break_high: 1.0, ..Thermistor::default() };
         let own = TemperatureCalibration { thermometer, thermistor: wide, ..Default::default() };
         for sum in [1, 16 * 4095 - 1] {
-            assert!(own.temperature(&RawSample { thermistor: sum, ..RAW }).is_some());
+            assert!(own.temperature(&RawSample { thermistor: sum, ..RAW }, CHIP).is_some());
         }
     }
 
     #[test]
     fn the_trim_comes_last() {
         let own = TemperatureCalibration { factor: 1.01, offset: -2.0, ..Default::default() };
-        let plain = TemperatureCalibration::default().temperature(&RAW).unwrap();
-        assert!((own.temperature(&RAW).unwrap() - (plain * 1.01 - 2.0)).abs() < 1e-3);
+        let plain = TemperatureCalibration::default().temperature(&RAW, CHIP).unwrap();
+        assert!((own.temperature(&RAW, CHIP).unwrap() - (plain * 1.01 - 2.0)).abs() < 1e-3);
         assert!((plain - (303.15 + 60.0 * 80.0 / 270.0)).abs() < 1e-3);
     }
 

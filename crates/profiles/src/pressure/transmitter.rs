@@ -1,9 +1,10 @@
 //! The transmitter: sensor, pressure channel, temperature channel.
 
 use super::{
-    Channel, ChannelParameters, ChannelValues, PressureCalibration, RawSample, Span, TemperatureCalibration,
-    Unit,
+    Channel, ChannelParameters, ChannelValues, PressureCalibration, Span, TemperatureCalibration, Unit,
 };
+use crate::board::{ChipThermometer, Inputs, PowerOn, RawSample};
+use crate::profile::Chain;
 
 /// Samples in a second: how often a sensor break is looked for (CiA 404 leaves it to the device).
 const SAMPLES_PER_SECOND: u16 = 1000;
@@ -53,7 +54,7 @@ pub struct Conditions {
     pub sensor_break: bool,
     /// The pressure input is at a rail of the converter.
     pub pressure_rail: bool,
-    /// The temperature is not measured: input at a rail, or no factory calibration for the chip's own sensor.
+    /// The temperature is not measured: input at a rail, or a chip without a calibration of its own sensor.
     pub temperature_rail: bool,
 }
 
@@ -71,6 +72,7 @@ pub struct Snapshot {
 /// The whole chain with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmitter {
+    chip: ChipThermometer,
     calibration: Calibration,
     pressure: Channel,
     temperature: Channel,
@@ -79,17 +81,12 @@ pub struct Transmitter {
     until_check: u16,
 }
 
-impl Default for Transmitter {
-    fn default() -> Transmitter {
-        Transmitter::new(&Parameters::default())
-    }
-}
-
 impl Transmitter {
-    /// A chain that has not measured yet.
+    /// A chain that has not measured yet, in a chip with this temperature sensor.
     #[must_use]
-    pub fn new(parameters: &Parameters) -> Transmitter {
+    pub fn new(chip: ChipThermometer, parameters: &Parameters) -> Transmitter {
         Transmitter {
+            chip,
             calibration: parameters.calibration,
             pressure: Channel::new(&parameters.pressure),
             temperature: Channel::new(&parameters.temperature),
@@ -98,25 +95,17 @@ impl Transmitter {
         }
     }
 
-    /// Takes over parameters from the next sample on.
-    pub fn apply(&mut self, parameters: &Parameters) {
-        self.calibration = parameters.calibration;
-        self.pressure.apply(&parameters.pressure);
-        self.temperature.apply(&parameters.temperature);
-    }
-
     /// Processes the sums of one millisecond.
     pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
         let mut snapshot = Snapshot::default();
-        self.update(raw, &mut snapshot);
+        self.measure(raw, &mut snapshot);
         snapshot
     }
 
-    /// The same, with the snapshot where it is to be.
-    pub fn update(&mut self, raw: &RawSample, snapshot: &mut Snapshot) {
+    fn measure(&mut self, raw: &RawSample, snapshot: &mut Snapshot) {
         let ratio = raw.ratio();
         self.check_break(ratio);
-        let kelvin = self.calibration.temperature.temperature(raw);
+        let kelvin = self.calibration.temperature.temperature(raw, self.chip);
         let conditions = Conditions {
             sensor_break: self.sensor_break,
             pressure_rail: raw.is_rail(raw.pressure),
@@ -139,27 +128,48 @@ impl Transmitter {
     }
 }
 
+impl Chain for Transmitter {
+    type Parameters = Parameters;
+    type Snapshot = Snapshot;
+
+    fn new(power_on: &PowerOn) -> Transmitter {
+        Transmitter::new(power_on.thermometer, &Parameters::default())
+    }
+
+    fn apply(&mut self, parameters: &Parameters) {
+        self.calibration = parameters.calibration;
+        self.pressure.apply(&parameters.pressure);
+        self.temperature.apply(&parameters.temperature);
+    }
+
+    fn update(&mut self, inputs: &Inputs, snapshot: &mut Snapshot) {
+        self.measure(&inputs.analogue, snapshot);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pressure::{FactoryCalibration, Polynomial, STATUS_ABOVE, STATUS_BELOW, STATUS_INVALID};
+    use crate::pressure::{Polynomial, STATUS_ABOVE, STATUS_BELOW, STATUS_INVALID};
 
     /// An intact sensor at 5 bar and 30 degC.
     const GOOD: RawSample = RawSample {
         pressure: 16 * 1000,
         supply: 16 * 2000,
         temperature: 16 * 940,
-        vrefint: 16 * 1500,
+        reference: 16 * 1500,
         thermistor: 0,
         count: 16,
-        factory: FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 },
     };
+    /// 940 at 30 degC and 1210 at 110 degC, with the reference at 1500.
+    const CHIP: ChipThermometer =
+        ChipThermometer { offset: 303.15 - 940.0 * 80.0 / 270.0, slope: 1500.0 * 80.0 / 270.0 };
     /// The wire of the transducer is open: 1 % of the supply.
     const OPEN: RawSample = RawSample { pressure: 16 * 20, ..GOOD };
 
     #[test]
     fn an_intact_sensor_is_measured() {
-        let snapshot = Transmitter::default().sample(&GOOD);
+        let snapshot = Transmitter::new(CHIP, &Parameters::default()).sample(&GOOD);
         assert_eq!(snapshot.conditions, Conditions::default());
         assert!((snapshot.pressure.process_value - 5.0).abs() < 1e-5);
         assert!((snapshot.temperature.process_value - 30.0).abs() < 1e-3);
@@ -168,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_break_is_looked_for_once_a_second() {
-        let mut transmitter = Transmitter::default();
+        let mut transmitter = Transmitter::new(CHIP, &Parameters::default());
         transmitter.sample(&GOOD);
         for _ in 1..1000 {
             assert!(!transmitter.sample(&OPEN).conditions.sensor_break);
@@ -193,7 +203,7 @@ mod tests {
             // With limits that this rail does not pass, so that it is a rail and nothing else.
             let mut parameters = Parameters::default();
             parameters.calibration.pressure.break_high = 1.1;
-            let snapshot = Transmitter::new(&parameters).sample(&raw);
+            let snapshot = Transmitter::new(CHIP, &parameters).sample(&raw);
             assert_eq!((snapshot.pressure.status, snapshot.temperature.status), (pressure, temperature));
             let conditions = Conditions {
                 sensor_break: raw == OPEN,
@@ -206,7 +216,7 @@ mod tests {
 
     #[test]
     fn new_parameters_hold_from_the_next_sample() {
-        let mut transmitter = Transmitter::default();
+        let mut transmitter = Transmitter::new(CHIP, &Parameters::default());
         transmitter.sample(&GOOD);
         let mut parameters = Parameters::default();
         parameters.calibration.pressure.end = 2_000_000.0;

@@ -1,9 +1,11 @@
 //! An encoder on a shaft or a rod that is moved.
 
+use profiles::board::{RawEncoder, SsiFrame};
 use profiles::encoder::{
-    ChannelParameters, ChannelValues, Coding, Command, Encoder, Format, Frame, Parameters, RawEncoder,
-    SensorType, Snapshot, Start,
+    ChannelParameters, ChannelValues, Coding, Command, Encoder, Format, Parameters, SensorType, Snapshot,
+    Start,
 };
+use profiles::profile::Chain;
 
 /// The encoder with its parameters, and where the sensors are.
 pub(crate) struct Bench {
@@ -75,7 +77,7 @@ impl Bench {
     }
 
     /// A millisecond with this frame.
-    pub(crate) fn receive(&mut self, frame: Option<Frame>) -> Snapshot {
+    pub(crate) fn receive(&mut self, frame: Option<SsiFrame>) -> Snapshot {
         self.raw.ssi = frame;
         self.encoder.sample(&self.raw)
     }
@@ -92,11 +94,11 @@ impl Bench {
 }
 
 /// A frame without alarm bit and parity.
-pub(crate) fn frame(format: Format, total: i64) -> Frame {
+pub(crate) fn frame(format: Format, total: i64) -> SsiFrame {
     let bits = format.position_bits();
     let position = u64::try_from(total.rem_euclid(1 << bits)).unwrap();
     let code = if is_gray(format) { position ^ (position >> 1) } else { position };
-    Frame { bits: ((1 << bits) | code) << 2, clocks: bits + 3 }
+    SsiFrame { bits: ((1 << bits) | code) << 2, clocks: bits + 3 }
 }
 
 fn is_gray(format: Format) -> bool {

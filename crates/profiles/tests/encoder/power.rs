@@ -3,6 +3,7 @@
 use profiles::encoder::{
     ALARM_POSITION, CODE_SEQUENCE, Encoder, Kept, SENSOR_UNREFERENCED, SensorType, Start,
 };
+use profiles::profile::Chain;
 
 use crate::bench::{Bench, one, two};
 

@@ -1,10 +1,12 @@
 //! Anything at all: nothing overflows (tests run with overflow checks), and values stay in their ranges.
 
+use profiles::board::{Board, RawEncoder, SsiFrame};
+use profiles::profile::Chain;
 use std::num::{NonZeroU16, NonZeroU32};
 
 use profiles::encoder::{
-    Area, Board, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Frame, Kept, Limits, Module,
-    Parameters, Parity, RawEncoder, SensorType, Start,
+    Area, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Kept, Limits, Module, Parameters,
+    Parity, SensorType, Start,
 };
 use proptest::prelude::*;
 
@@ -74,7 +76,7 @@ fn any_parameters() -> impl Strategy<Value = Parameters> {
 }
 
 fn any_raw() -> impl Strategy<Value = RawEncoder> {
-    let frame = (any::<u64>(), 0..70_u32).prop_map(|(bits, clocks)| Frame { bits, clocks });
+    let frame = (any::<u64>(), 0..70_u32).prop_map(|(bits, clocks)| SsiFrame { bits, clocks });
     (any::<(u16, Option<u16>)>(), prop::option::of(frame), any::<[Option<u16>; 3]>(), any::<(bool, bool)>())
         .prop_map(|((counter, index), ssi, [supply, current, battery], (watchdog_reset, memory_error))| {
             RawEncoder {

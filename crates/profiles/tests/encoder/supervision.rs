@@ -1,9 +1,10 @@
 //! Disturbed readings, alarms, warnings, and what is reported as an emergency.
 
+use profiles::board::{Board, SsiFrame};
 use profiles::encoder::{
-    ALARM_POSITION, Board, Coding, Conditions, Format, Frame, Parity, SENSOR_IMPLAUSIBLE, SENSOR_NO_SIGNAL,
-    SENSOR_PARITY, SENSOR_POSITION_ERROR, SUPPORTED_WARNINGS, SensorType, Snapshot, WARNING_BATTERY,
-    WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
+    ALARM_POSITION, Coding, Conditions, Format, Parity, SENSOR_IMPLAUSIBLE, SENSOR_NO_SIGNAL, SENSOR_PARITY,
+    SENSOR_POSITION_ERROR, SUPPORTED_WARNINGS, SensorType, Snapshot, WARNING_BATTERY, WARNING_FREQUENCY,
+    WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
 };
 
 use crate::bench::{Bench, frame, one, two};
@@ -12,8 +13,8 @@ use crate::bench::{Bench, frame, one, two};
 fn two_bad_frames_are_tolerated_and_the_third_is_a_position_error() {
     for (bad, state) in [
         (None, SENSOR_NO_SIGNAL),
-        (Some(Frame { bits: u64::MAX, clocks: 28 }), SENSOR_NO_SIGNAL),
-        (Some(Frame { bits: 0, clocks: 28 }), SENSOR_NO_SIGNAL),
+        (Some(SsiFrame { bits: u64::MAX, clocks: 28 }), SENSOR_NO_SIGNAL),
+        (Some(SsiFrame { bits: 0, clocks: 28 }), SENSOR_NO_SIGNAL),
         (Some(frame(Format::COMMON, 500_000)), SENSOR_IMPLAUSIBLE),
     ] {
         let mut bench = Bench::new(one(SensorType::MultiTurn));
@@ -44,7 +45,7 @@ fn a_wrong_parity_is_no_position() {
     let mut parameters = one(SensorType::SingleTurn);
     parameters.format = Format::new(0, 8, Coding::Binary, false, Parity::Even).unwrap();
     let mut bench = Bench::new(parameters);
-    let frame = |word: u64| Some(Frame { bits: (1 << 9 | word) << 1, clocks: 11 });
+    let frame = |word: u64| Some(SsiFrame { bits: (1 << 9 | word) << 1, clocks: 11 });
     assert_eq!(bench.receive(frame(3 << 1)).channels[0].position, 3);
     let values = bench.receive(frame(7 << 1)).channels[0];
     assert_eq!((values.position, values.sensor_state), (3, SENSOR_PARITY));
@@ -55,7 +56,7 @@ fn the_encoder_s_own_alarm_is_one() {
     let mut parameters = one(SensorType::SingleTurn);
     parameters.format = Format::new(0, 8, Coding::Binary, true, Parity::None).unwrap();
     let mut bench = Bench::new(parameters);
-    let frame = |word: u64| Some(Frame { bits: (1 << 9 | word) << 1, clocks: 11 });
+    let frame = |word: u64| Some(SsiFrame { bits: (1 << 9 | word) << 1, clocks: 11 });
     assert_eq!(bench.receive(frame(3 << 1)).alarms, 0);
     assert_eq!(bench.receive(frame(3 << 1 | 1)).alarms, ALARM_POSITION);
 }

@@ -63,7 +63,10 @@ fn as_change((group, value): &(Group, Value)) -> Change<'_> {
 }
 
 /// What the flash holds, and how far it is to be trusted.
-pub(crate) fn read<const ERASE: usize>(flash: &mut MockFlash<ERASE>, pages: Pages) -> (Model, [Health; 4]) {
+pub(crate) fn read<const ERASE: usize, const WORD: usize>(
+    flash: &mut MockFlash<ERASE, WORD>,
+    pages: Pages,
+) -> (Model, [Health; 4]) {
     let mut view = View::open(flash, pages).unwrap();
     let value = Group::ALL.map(|group| {
         let mut buf = [0; MAX_VALUE];
@@ -74,7 +77,10 @@ pub(crate) fn read<const ERASE: usize>(flash: &mut MockFlash<ERASE>, pages: Page
 }
 
 /// What the flash holds when nothing may be doubtful.
-pub(crate) fn read_good<const ERASE: usize>(flash: &mut MockFlash<ERASE>, pages: Pages) -> Model {
+pub(crate) fn read_good<const ERASE: usize, const WORD: usize>(
+    flash: &mut MockFlash<ERASE, WORD>,
+    pages: Pages,
+) -> Model {
     let (model, health) = read(flash, pages);
     assert_eq!(health, [Health::Good; 4], "a power cut is no damage");
     model
@@ -82,8 +88,8 @@ pub(crate) fn read_good<const ERASE: usize>(flash: &mut MockFlash<ERASE>, pages:
 
 /// Opens and prepares the store and takes the steps. Returns the states that the flash may be in then: one, or two
 /// when the power was cut in a save.
-pub(crate) fn run<const ERASE: usize>(
-    flash: &mut MockFlash<ERASE>,
+pub(crate) fn run<const ERASE: usize, const WORD: usize>(
+    flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
     steps: &[Step],
     mut model: Model,
@@ -110,10 +116,10 @@ pub(crate) fn run<const ERASE: usize>(
 }
 
 /// Start-up, unless the power is cut.
-pub(crate) fn start<const ERASE: usize>(
-    flash: &mut MockFlash<ERASE>,
+pub(crate) fn start<const ERASE: usize, const WORD: usize>(
+    flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
-) -> Result<Store<&mut MockFlash<ERASE>>, PowerCut> {
+) -> Result<Store<&mut MockFlash<ERASE, WORD>>, PowerCut> {
     match View::open(flash, pages).and_then(Store::prepare) {
         Ok(store) => Ok(store),
         Err(Error::Flash(PowerCut)) => Err(PowerCut),
@@ -122,8 +128,8 @@ pub(crate) fn start<const ERASE: usize>(
 }
 
 /// Power comes back: one of the `allowed` states is read, `prepare` keeps it, and it is read ever after.
-pub(crate) fn recover<const ERASE: usize>(
-    flash: &mut MockFlash<ERASE>,
+pub(crate) fn recover<const ERASE: usize, const WORD: usize>(
+    flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
     allowed: &[Model],
 ) -> Model {

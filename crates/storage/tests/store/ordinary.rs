@@ -13,7 +13,7 @@ fn application(value: &[u8]) -> [Change<'_>; 1] {
 
 #[test]
 fn a_value_comes_back_with_its_version_and_an_empty_value_is_not_none() {
-    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let mut store = start(&mut flash, PAGES).unwrap();
     let value = [1, 2, 3, 4, 5];
     let group = Group::Communication;
@@ -29,7 +29,7 @@ fn a_value_comes_back_with_its_version_and_an_empty_value_is_not_none() {
 
 #[test]
 fn of_several_changes_to_one_group_the_last_counts() {
-    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let changes = vec![
         set(Group::Device, 1, 4),
         set(Group::Application, 2, 9),
@@ -42,7 +42,7 @@ fn of_several_changes_to_one_group_the_last_counts() {
 
 #[test]
 fn a_device_record_of_another_layout_is_none() {
-    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let mut store = start(&mut flash, PAGES).unwrap();
     let record = DeviceRecord::new(7, 500, 1).unwrap();
     for (version, value, expected) in [
@@ -57,7 +57,7 @@ fn a_device_record_of_another_layout_is_none() {
 
 #[test]
 fn when_both_pages_are_used_up_a_restart_is_asked_for_and_nothing_is_lost() {
-    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
     for round in 0..20_u8 {
         let mut store = start(&mut flash, PAGES).unwrap();
         let mut saves = 0;
@@ -76,7 +76,7 @@ fn when_both_pages_are_used_up_a_restart_is_asked_for_and_nothing_is_lost() {
 
 #[test]
 fn what_could_never_be_moved_is_refused_while_there_is_room() {
-    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let mut store = start(&mut flash, PAGES).unwrap();
     store.save(&application(&noise(1, 200))).unwrap();
     let value = noise(2, 253);
@@ -92,7 +92,7 @@ fn what_could_never_be_moved_is_refused_while_there_is_room() {
 #[test]
 fn four_values_of_the_greatest_length_fit_the_pages_of_the_chip() {
     let pages = Pages::new(0, 16 * 1024);
-    let mut flash = MockFlash::<16384>::new(32 * 1024, 0);
+    let mut flash = MockFlash::<16384, 4>::new(32 * 1024, 0);
     let changes: Vec<_> = Group::ALL.iter().map(|&group| set(group, 1, MAX_VALUE)).collect();
     for _ in 0..3 {
         start(&mut flash, pages).unwrap().save(&as_changes(&changes)).unwrap();
@@ -103,9 +103,26 @@ fn four_values_of_the_greatest_length_fit_the_pages_of_the_chip() {
 #[test]
 fn pages_that_cannot_be_erased_one_by_one_are_refused() {
     for pages in [Pages::new(0, 384), Pages::new(128, 512), Pages::new(0, 1024)] {
-        let mut flash = MockFlash::<256>::new(1536, 0);
+        let mut flash = MockFlash::<256, 4>::new(1536, 0);
         let prepared = View::open(&mut flash, pages).and_then(Store::prepare);
         assert_eq!(prepared.err(), Some(Error::Geometry));
+    }
+}
+
+#[test]
+fn a_flash_that_programs_other_words_than_the_pages_say_is_refused() {
+    let mut flash = MockFlash::<512, 8>::new(1024, 0);
+    assert_eq!(View::open(&mut flash, PAGES).and_then(Store::prepare).err(), Some(Error::Geometry));
+    for bytes in [0, 2, 12, 64] {
+        assert_eq!(View::open(&mut flash, PAGES.with_words(bytes)).err(), Some(Error::Geometry));
+    }
+    for bytes in [8, 16, 32] {
+        let pages = PAGES.with_words(bytes);
+        start(&mut flash, pages).unwrap().save(&application(&[1, 2, 3])).unwrap();
+        let mut buf = [0; 3];
+        let loaded = start(&mut flash, pages).unwrap().load(Group::Application, &mut buf);
+        assert_eq!((loaded, buf), (Ok(Some(Loaded { version: 1, len: 3 })), [1, 2, 3]));
+        flash = MockFlash::new(1024, 0);
     }
 }
 
@@ -113,7 +130,7 @@ fn pages_that_cannot_be_erased_one_by_one_are_refused() {
 fn the_generation_of_the_pages_may_wrap() {
     // Pages so small that every save moves.
     let pages = Pages::new(0, 64);
-    let mut flash = MockFlash::<64>::new(128, 0);
+    let mut flash = MockFlash::<64, 4>::new(128, 0);
     for count in 0..=66_000_u32 {
         let mut store = start(&mut flash, pages).unwrap();
         store.save(&application(&count.to_le_bytes())).unwrap();
@@ -209,7 +226,7 @@ fn a_worn_out_word_fails_the_save_and_nothing_else() {
 
 #[test]
 fn what_is_stored_already_wears_out_nothing() {
-    let mut flash = MockFlash::<512>::new(1024, 0);
+    let mut flash = MockFlash::<512, 4>::new(1024, 0);
     let both = vec![set(Group::Communication, 1, 7), restore(Group::Application), set(Group::Device, 1, 4)];
     start(&mut flash, PAGES).unwrap().save(&as_changes(&both)).unwrap();
     let programmed = flash.programmed();

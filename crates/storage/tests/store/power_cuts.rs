@@ -1,4 +1,5 @@
-//! The power is cut at every single operation of a long scenario, and again at every operation of the recovery.
+//! The power is cut at every single operation of a long scenario, and again at every operation of the recovery; on a flash
+//! that programs words of four bytes, as the STM32F4 does, and on one that programs words of eight, as the STM32G4 and L4 do.
 
 use crate::model::{
     EMPTY, Model, Step, after, as_changes, noise, read_good, recover, restore, run, set, start,
@@ -7,12 +8,14 @@ use storage::mock::{MockFlash, Weak};
 use storage::{Group, Pages};
 
 /// Small pages make page moves frequent; two erase units a page make erases that are cut between units.
-const PAGES: Pages = Pages::new(256, 256);
-type Flash = MockFlash<128>;
+const fn pages(word: usize) -> Pages {
+    Pages::new(256, 256).with_words(word as u32)
+}
+type Flash<const WORD: usize> = MockFlash<128, WORD>;
 
 const WAYS: [Weak; 3] = [Weak::Before, Weak::After, Weak::Random];
 
-fn flash(seed: u64) -> Flash {
+fn flash<const WORD: usize>(seed: u64) -> Flash<WORD> {
     Flash::new(1024, seed)
 }
 
@@ -39,30 +42,29 @@ fn scenario() -> Vec<Step> {
     ]
 }
 
-fn operations_of(run_it: impl FnOnce(&mut Flash), flash: &Flash) -> u32 {
+fn operations_of<const WORD: usize>(run_it: impl FnOnce(&mut Flash<WORD>), flash: &Flash<WORD>) -> u32 {
     let mut flash = flash.clone();
     let before = flash.operations();
     run_it(&mut flash);
     flash.operations() - before
 }
 
-#[test]
-fn without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model() {
-    let mut flash = flash(0);
-    let end = run(&mut flash, PAGES, &scenario(), EMPTY);
-    assert_eq!(vec![read_good(&mut flash, PAGES)], end);
+fn without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model<const WORD: usize>() {
+    let mut flash = flash::<WORD>(0);
+    let end = run(&mut flash, pages(WORD), &scenario(), EMPTY);
+    assert_eq!(vec![read_good(&mut flash, pages(WORD))], end);
     assert_eq!(flash.erases()[..2], [0, 0], "nothing outside the pages is erased");
     assert!(flash.erases()[2..6].iter().all(|&erases| erases >= 2), "{:?}", flash.erases());
 }
 
 /// Every state of flash that a cut in the scenario can leave, with the states that may be read from it.
-fn cut_everywhere(mut check: impl FnMut(Flash, Vec<Model>)) -> u32 {
-    let total = operations_of(|flash| drop(run(flash, PAGES, &scenario(), EMPTY)), &flash(0));
+fn cut_everywhere<const WORD: usize>(mut check: impl FnMut(Flash<WORD>, Vec<Model>)) -> u32 {
+    let total = operations_of(|flash| drop(run(flash, pages(WORD), &scenario(), EMPTY)), &flash::<WORD>(0));
     for operation in 0..total {
         for weak in WAYS {
-            let mut flash = flash(u64::from(operation));
+            let mut flash = flash::<WORD>(u64::from(operation));
             flash.cut_after(operation, weak);
-            let allowed = run(&mut flash, PAGES, &scenario(), EMPTY);
+            let allowed = run(&mut flash, pages(WORD), &scenario(), EMPTY);
             assert!(flash.is_down());
             check(flash, allowed);
         }
@@ -70,30 +72,28 @@ fn cut_everywhere(mut check: impl FnMut(Flash, Vec<Model>)) -> u32 {
     total
 }
 
-#[test]
-fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on() {
+fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on<const WORD: usize>() {
     let mut news = 0;
-    let total = cut_everywhere(|mut flash, allowed| {
-        let model = recover(&mut flash, PAGES, &allowed);
+    let total = cut_everywhere::<WORD>(|mut flash, allowed| {
+        let model = recover(&mut flash, pages(WORD), &allowed);
         news += u32::from(allowed.len() == 2 && model == allowed[0]);
         let changes = vec![set(Group::Communication, 99, 21), restore(Group::Device)];
-        start(&mut flash, PAGES).unwrap().save(&as_changes(&changes)).unwrap();
-        assert_eq!(read_good(&mut flash, PAGES), after(&model, &changes));
+        start(&mut flash, pages(WORD)).unwrap().save(&as_changes(&changes)).unwrap();
+        assert_eq!(read_good(&mut flash, pages(WORD)), after(&model, &changes));
     });
     assert!(news > 20, "some cuts come after the commit: {news} of {total}");
 }
 
-#[test]
-fn a_second_cut_at_any_operation_of_the_recovery_changes_nothing() {
+fn a_second_cut_at_any_operation_of_the_recovery_changes_nothing<const WORD: usize>() {
     let mut cuts = 0;
-    cut_everywhere(|mut first, allowed| {
+    cut_everywhere::<WORD>(|mut first, allowed| {
         first.power_up();
-        let recovery = operations_of(|flash| drop(start(flash, PAGES)), &first);
+        let recovery = operations_of(|flash| drop(start(flash, pages(WORD))), &first);
         for operation in 0..recovery {
             let mut flash = first.clone();
             flash.cut_after(operation, WAYS[operation as usize % WAYS.len()]);
-            assert!(start(&mut flash, PAGES).is_err());
-            recover(&mut flash, PAGES, &allowed);
+            assert!(start(&mut flash, pages(WORD)).is_err());
+            recover(&mut flash, pages(WORD), &allowed);
             cuts += 1;
         }
     });
@@ -101,18 +101,63 @@ fn a_second_cut_at_any_operation_of_the_recovery_changes_nothing() {
     assert!(cuts > 1000);
 }
 
-#[test]
-fn a_dozen_cuts_in_a_row_lose_nothing() {
+fn a_dozen_cuts_in_a_row_lose_nothing<const WORD: usize>() {
     for seed in 0..200 {
-        let mut flash = flash(seed);
+        let mut flash = flash::<WORD>(seed);
         let mut model = EMPTY;
         for round in 0..12 {
             let changes = vec![set(Group::Device, round, 4), set(Group::Application, round + 100, 30)];
             let steps = [Step::Save(changes.clone()), Step::Restart, Step::Save(changes)];
             let at = noise(seed * 100 + u64::from(round), 1)[0];
             flash.cut_after(u32::from(at) % 60, Weak::Random);
-            let allowed = run(&mut flash, PAGES, &steps, model);
-            model = recover(&mut flash, PAGES, &allowed);
+            let allowed = run(&mut flash, pages(WORD), &steps, model);
+            model = recover(&mut flash, pages(WORD), &allowed);
         }
+    }
+}
+
+/// Words of four bytes.
+mod words_of_four_bytes {
+    #[test]
+    fn without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model() {
+        super::without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model::<4>();
+    }
+
+    #[test]
+    fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on() {
+        super::a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on::<4>();
+    }
+
+    #[test]
+    fn a_second_cut_at_any_operation_of_the_recovery_changes_nothing() {
+        super::a_second_cut_at_any_operation_of_the_recovery_changes_nothing::<4>();
+    }
+
+    #[test]
+    fn a_dozen_cuts_in_a_row_lose_nothing() {
+        super::a_dozen_cuts_in_a_row_lose_nothing::<4>();
+    }
+}
+
+/// Words of eight bytes.
+mod words_of_eight_bytes {
+    #[test]
+    fn without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model() {
+        super::without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model::<8>();
+    }
+
+    #[test]
+    fn a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on() {
+        super::a_cut_at_any_operation_leaves_the_old_or_the_new_groups_and_saving_goes_on::<8>();
+    }
+
+    #[test]
+    fn a_second_cut_at_any_operation_of_the_recovery_changes_nothing() {
+        super::a_second_cut_at_any_operation_of_the_recovery_changes_nothing::<8>();
+    }
+
+    #[test]
+    fn a_dozen_cuts_in_a_row_lose_nothing() {
+        super::a_dozen_cuts_in_a_row_lose_nothing::<8>();
     }
 }

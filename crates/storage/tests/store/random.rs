@@ -7,7 +7,9 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use storage::mock::{MockFlash, Weak};
 use storage::{Group, Pages};
 
-const PAGES: Pages = Pages::new(512, 512);
+const fn pages(word: usize) -> Pages {
+    Pages::new(512, 512).with_words(word as u32)
+}
 
 /// What a device does until the power is cut, when, and how the weak bits read then.
 type Life = (Vec<Step>, u32, Weak);
@@ -28,20 +30,29 @@ fn life() -> impl Strategy<Value = Life> {
     (vec(step(), 1..12), 0_u32..400, weak)
 }
 
-#[test]
-fn random_lives_agree_with_the_model() {
+fn random_lives_agree_with_the_model<const WORD: usize>() {
     let config = Config { cases: 600, failure_persistence: None, ..Config::default() };
     let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
     let lives = (any::<u64>(), vec(life(), 1..6));
     let outcome = TestRunner::new_with_rng(config, rng).run(&lives, |(seed, lives)| {
-        let mut flash = MockFlash::<512>::new(2048, seed);
+        let mut flash = MockFlash::<512, WORD>::new(2048, seed);
         let mut model = EMPTY;
         for (steps, operations, weak) in lives {
             flash.cut_after(operations, weak);
-            let allowed = run(&mut flash, PAGES, &steps, model);
-            model = recover(&mut flash, PAGES, &allowed);
+            let allowed = run(&mut flash, pages(WORD), &steps, model);
+            model = recover(&mut flash, pages(WORD), &allowed);
         }
         Ok(())
     });
     outcome.unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+fn random_lives_agree_with_the_model_on_words_of_four_bytes() {
+    random_lives_agree_with_the_model::<4>();
+}
+
+#[test]
+fn random_lives_agree_with_the_model_on_words_of_eight_bytes() {
+    random_lives_agree_with_the_model::<8>();
 }

@@ -85,7 +85,12 @@ pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
 
 /// A flash in which `image` was installed by an update.
 pub(crate) fn flash_with(image: &Image, seed: u64) -> MockFlash {
-    let mut flash = MockFlash::new(&SECTORS, seed);
+    flash_of_words_with(image, 4, seed)
+}
+
+/// The same on a flash that programs words of so many bytes.
+pub(crate) fn flash_of_words_with(image: &Image, word: usize, seed: u64) -> MockFlash {
+    let mut flash = MockFlash::with_words(&SECTORS, word, seed);
     update(&mut flash, &image.bytes()).unwrap();
     flash
 }

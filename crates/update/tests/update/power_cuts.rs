@@ -1,7 +1,8 @@
 //! The power is cut at every flash operation of whole updates, and again in the recovery.
 
 use crate::bench::{
-    Image, SECTORS, flash_with, holds, image_a, image_b, install, noise, stage, start, update,
+    Image, SECTORS, flash_of_words_with, flash_with, holds, image_a, image_b, install, noise, stage, start,
+    update,
 };
 use update::mock::{MockFlash, Weak};
 use update::{Decision, Refusal, Stay};
@@ -33,6 +34,11 @@ impl Case {
     /// A node that runs A, which came by an update.
     fn from_a_to_b() -> Case {
         Case::new(flash_with(&image_a(), 1), Some(image_a()))
+    }
+
+    /// The same with a flash that programs words of eight bytes.
+    fn from_a_to_b_in_words_of_eight() -> Case {
+        Case::new(flash_of_words_with(&image_a(), 8, 1), Some(image_a()))
     }
 
     /// A node that was never programmed.
@@ -113,6 +119,12 @@ fn after_a_cut_anywhere_the_old_or_the_new_image_starts() {
 }
 
 #[test]
+fn the_same_holds_for_a_flash_that_programs_words_of_eight_bytes() {
+    let [old, new, nothing] = check_every_cut(&Case::from_a_to_b_in_words_of_eight(), &Weak::ALL);
+    assert!(old > 250 && new > 250 && nothing == 0);
+}
+
+#[test]
 fn after_a_cut_in_the_first_update_the_image_starts_or_the_node_waits_for_the_next() {
     let [old, new, nothing] = check_every_cut(&Case::from_nothing_to_b(), &[Weak::Random]);
     assert!(old == 0 && new > 250 && nothing > 250);
@@ -120,8 +132,16 @@ fn after_a_cut_in_the_first_update_the_image_starts_or_the_node_waits_for_the_ne
 
 #[test]
 fn a_second_cut_in_the_recovery_changes_nothing() {
+    second_cuts(&Case::from_a_to_b(), 250);
+}
+
+#[test]
+fn a_second_cut_in_the_recovery_of_words_of_eight_bytes_changes_nothing() {
+    second_cuts(&Case::from_a_to_b_in_words_of_eight(), 125);
+}
+
+fn second_cuts(case: &Case, at_least: u32) {
     let mut cuts = 0_u32;
-    let case = Case::from_a_to_b();
     case.cut_everywhere(&[Weak::Either], |first| {
         let mut flash = first.clone();
         let runs = case.start(&mut flash);
@@ -141,7 +161,7 @@ fn a_second_cut_in_the_recovery_changes_nothing() {
         cuts += 1;
     });
     println!("{cuts} second cuts in the recovery");
-    assert!(cuts > 250);
+    assert!(cuts > at_least);
 }
 
 /// A number that looks random and is the same each time.

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use canopen::dictionary::Object;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-use eds::DEVICES;
-use node::{BitRate, Measurement, Parcel, Personality, Protocol, RawEncoder, RawSample, Setup, Start, State};
+use node::{BitRate, Measurement, Personality, Protocol, Setup, State, StoreJob};
+use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample, Retained};
 use storage::{DeviceRecord, Pages, Store, View};
 
 use super::flash::{Flash, PAGE};
@@ -14,6 +14,8 @@ use super::step::{Step, raw};
 const PAGES: Pages = Pages::new(0, PAGE);
 /// As the firmware's transmit queue.
 const ROOM: usize = 32;
+/// A chip whose temperature sensor is calibrated.
+const CHIP: ChipThermometer = ChipThermometer { offset: 24.6, slope: 444.0 };
 /// More requests than a call can leave.
 const REQUESTS: usize = 16;
 
@@ -72,7 +74,7 @@ impl Board {
             unless_stored,
             personality,
             protocol: Protocol::new(&unless_stored),
-            measurement: Measurement::new(personality, Start::First),
+            measurement: Measurement::new(personality, &PowerOn::default()),
             flash: Flash::erased(),
             store: None,
             out: Queue::default(),
@@ -83,14 +85,14 @@ impl Board {
             has_parameters: false,
             has_started: false,
         };
-        board.power_on(Start::First);
+        board.power_on(Retained::Nothing);
         board.settle();
         board.sent();
         board
     }
 
     /// As the firmware's start. A power cut in it is a start of its own.
-    fn power_on(&mut self, kept: Start) {
+    fn power_on(&mut self, retained: Retained) {
         self.out.waiting.clear();
         self.actions.clear();
         self.store = None;
@@ -105,7 +107,7 @@ impl Board {
             parameters = self.protocol.load(&mut view);
             self.store = Store::prepare(view).ok();
         }
-        self.measurement = Measurement::new(self.personality, kept);
+        self.measurement = Measurement::new(self.personality, &PowerOn { thermometer: CHIP, retained });
         self.measurement.apply(&parameters);
         self.start();
     }
@@ -116,8 +118,8 @@ impl Board {
         self.has_parameters |= next.parameters;
     }
 
-    fn kept(&self) -> Start {
-        self.measurement.kept().map_or(Start::First, Start::Kept)
+    fn retained(&self) -> Retained {
+        self.measurement.retained()
     }
 
     fn start(&mut self) {
@@ -129,8 +131,7 @@ impl Board {
 
     /// The rows of the personality that runs.
     pub(super) fn rows(&self) -> &'static [Object] {
-        let device = DEVICES.iter().find(|device| device.personality == self.personality);
-        device.expect("every personality has a sheet").rows
+        self.personality.rows()
     }
 
     pub(super) fn row(&self, place: u16) -> &'static Object {
@@ -166,8 +167,8 @@ impl Board {
             Step::Service { place, data } => self.receive(pick(&self.filters[1], place), 8, false, data),
             Step::Frame { id, len, remote, data } => self.receive(id, len, remote, data),
             Step::Lss(data) => self.receive(0x7E5, 8, false, data),
-            Step::Sample { pressure, supply, temperature, vrefint, encoder, buttons } => {
-                self.sample(&raw(pressure, supply, temperature, vrefint), encoder, buttons);
+            Step::Sample { pressure, supply, temperature, reference, encoder, buttons } => {
+                self.sample(&raw(pressure, supply, temperature, reference), encoder, buttons);
             }
             Step::Bus(report) => {
                 let _ = self.protocol.bus_event(report.into(), self.now);
@@ -175,7 +176,7 @@ impl Board {
             Step::Deadline => self.now = self.now.max(self.due.min(Instant(self.now.0 + 1_000_000))),
             Step::Wait(time) => self.now = self.now + Duration(time.into()),
             Step::Congest(is_congested) => self.out = Queue { is_congested, ..Queue::default() },
-            Step::PowerCycle => self.power_on(self.kept()),
+            Step::PowerCycle => self.power_on(self.retained()),
             Step::PowerCut { after } => self.flash.cut_after(after),
         }
         self.settle();
@@ -213,9 +214,10 @@ impl Board {
         if std::mem::take(&mut self.has_parameters) {
             self.measurement.apply(&self.protocol.parameters());
         }
-        let shaft = RawEncoder { counter: encoder, ..RawEncoder::default() };
-        let snapshot = self.measurement.sample(raw, &shaft, buttons);
-        let _ = self.protocol.publish(&snapshot, self.now, &mut self.out);
+        let position = RawEncoder { counter: encoder, ..RawEncoder::default() };
+        let inputs = Inputs { analogue: *raw, position, digital: buttons };
+        self.measurement.update(&inputs, self.protocol.snapshot_mut());
+        let _ = self.protocol.publish(self.now, &mut self.out);
     }
 
     /// Polls and fulfils until there is nothing left to do now.
@@ -243,7 +245,7 @@ impl Board {
             let Some(action) = self.actions.pop_front() else { return };
             match action {
                 Action::ResetNode | Action::Bootloader => {
-                    self.power_on(self.kept());
+                    self.power_on(self.retained());
                 }
                 Action::ResetCommunication => self.start(),
                 Action::Identifiers => {
@@ -251,20 +253,20 @@ impl Board {
                         [self.protocol.process_ids().collect(), self.protocol.service_ids().collect()];
                 }
                 Action::BitRate(_) => (),
-                Action::Store(_) => self.deliver(),
+                Action::Store(_) => self.run_job(),
             }
         }
         panic!("the requests have no end");
     }
 
-    fn deliver(&mut self) {
-        let mut parcel = Parcel::new(Personality::default());
-        let Some(store) = self.store.as_mut().filter(|_| self.protocol.pack(&mut parcel)) else { return };
-        let result = parcel.deliver(store);
+    fn run_job(&mut self) {
+        let mut job = StoreJob::new(Personality::default());
+        let Some(store) = self.store.as_mut().filter(|_| self.protocol.take_job(&mut job)) else { return };
+        let result = job.run(store);
         if self.flash.is_down() {
-            return self.power_on(Start::First);
+            return self.power_on(Retained::Nothing);
         }
-        let _ = self.protocol.finish(&parcel, result, self.now, &mut self.out);
+        let _ = self.protocol.finish(&job, result, self.now, &mut self.out);
     }
 }
 

@@ -1,7 +1,8 @@
 //! What the world can do to a node.
 
 use arbitrary::Arbitrary;
-use node::{BusEvent, RawSample};
+use node::BusEvent;
+use profiles::board::RawSample;
 
 /// One thing that happens.
 #[derive(Arbitrary, Debug)]
@@ -23,7 +24,7 @@ pub(super) enum Step {
     /// An LSS request.
     Lss([u8; 8]),
     /// A millisecond with other readings.
-    Sample { pressure: u32, supply: u32, temperature: u32, vrefint: u32, encoder: u16, buttons: [bool; 2] },
+    Sample { pressure: u32, supply: u32, temperature: u32, reference: u32, encoder: u16, buttons: [bool; 2] },
     /// A report of the CAN controller.
     Bus(Report),
     /// The next deadline comes.
@@ -60,11 +61,10 @@ impl From<Report> for BusEvent {
     }
 }
 
-/// The readings of a step. The sums are whatever the converter says, the maker's calibration is sound.
-pub(super) fn raw(pressure: u32, supply: u32, temperature: u32, vrefint: u32) -> RawSample {
-    let factory = node::FactoryCalibration { ts_cal1: 940, ts_cal2: 1210, vrefint_cal: 1500 };
+/// The readings of a step. The sums are whatever the converter says.
+pub(super) fn raw(pressure: u32, supply: u32, temperature: u32, reference: u32) -> RawSample {
     let most = 16 * 4095;
-    let [pressure, supply, temperature, vrefint] =
-        [pressure, supply, temperature, vrefint].map(|sum| sum % (most + 1));
-    RawSample { pressure, supply, temperature, vrefint, thermistor: pressure, count: 16, factory }
+    let [pressure, supply, temperature, reference] =
+        [pressure, supply, temperature, reference].map(|sum| sum % (most + 1));
+    RawSample { pressure, supply, temperature, reference, thermistor: pressure, count: 16 }
 }

@@ -1,5 +1,6 @@
 //! A master that follows CiA 302-3, and the images that it has.
 
+use bsp::update_layout::LAYOUT;
 use canbus::{StandardId, Time};
 use canopen::sdo::Multiplexer;
 use chip::Stm32f4;
@@ -8,7 +9,7 @@ use host_tests::sdo::{Channel, Client, Failure};
 use sign::image::Image;
 use sign::product;
 use sim::world::World;
-use update::{Description, Layout, Status, Version};
+use update::{Description, Status, Version};
 
 use crate::support::{Master, SECOND, firmware, world};
 
@@ -114,7 +115,7 @@ impl Bench {
 
     /// What lies in the application area, header and all.
     pub(super) fn application(&self) -> Vec<u8> {
-        let area = Layout::STM32F4.application();
+        let area = LAYOUT.application();
         self.world.boards()[0].flash()[area.start() as usize..area.end() as usize].to_vec()
     }
 

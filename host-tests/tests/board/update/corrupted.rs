@@ -1,10 +1,11 @@
 //! Images that must not run, each downloaded to the bootloader on the board. The table of crate `update` is longer
 //! (`cargo test -p update --test corrupted`); this one shows that what the bus and the flash driver add keeps its promise.
 
+use bsp::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use ed25519_dalek::SigningKey;
 use sign::image::Image;
-use update::{Description, HEADER_LEN, Layout, SIGNED_LEN};
+use update::{Description, HEADER_LEN, SIGNED_LEN};
 
 use super::bench::{Bench, signed, version_a};
 
@@ -68,7 +69,7 @@ fn cut_to(length: usize) -> Vec<u8> {
 
 fn lengths() -> Vec<Kind> {
     let whole = HEADER_LEN + LENGTH;
-    let area = Layout::STM32F4.application().size();
+    let area = LAYOUT.application().size();
     vec![
         ("a single byte", cut_to(1), TRUNCATED),
         ("half a header", cut_to(256), TRUNCATED),

@@ -10,7 +10,7 @@ use crate::pressure::Pressure;
 use crate::wire::{Wire, client};
 
 fn identity(serial: u32) -> Identity {
-    Identity { vendor: node::VENDOR_ID, product: 1, revision: node::REVISION, serial }
+    Identity { vendor: product::VENDOR_ID, product: 1, revision: product::REVISION, serial }
 }
 
 fn master(network: &mut Network) -> Master<'_> {

@@ -1,7 +1,7 @@
 //! The node of this project on the simulated bus, with its parameter store.
 
 use canopen::{Action, Frame, Instant, Next, NodeId, Transmit};
-use node::{BitRate, Parcel, Personality, Protocol, Setup};
+use node::{BitRate, Personality, Protocol, Setup, StoreJob};
 use nodectl::bus::Station;
 use storage::{Memory, Pages, Store, View};
 
@@ -76,10 +76,10 @@ impl Pressure {
     }
 
     fn save(&mut self, now: Instant, out: &mut impl Transmit) {
-        let mut parcel = Parcel::new(Personality::default());
-        if self.protocol.pack(&mut parcel) {
-            let result = parcel.deliver(&mut self.store);
-            let _ = self.protocol.finish(&parcel, result, now, out);
+        let mut job = StoreJob::new(Personality::default());
+        if self.protocol.take_job(&mut job) {
+            let result = job.run(&mut self.store);
+            let _ = self.protocol.finish(&job, result, now, out);
         }
     }
 }

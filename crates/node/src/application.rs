@@ -1,0 +1,127 @@
+//! The application of the CANopen device: what the node adds to CiA 301, and its profile.
+
+use canopen::dictionary::{Entry, Group};
+use canopen::nmt::State;
+use canopen::sdo::{Abort, Multiplexer};
+use canopen::{Application, Condition, Part};
+use profiles::communication::PERSONALITY;
+use profiles::fault::Flags;
+use profiles::{AnyProfile, Snapshot};
+
+use crate::Setup;
+use crate::configured::Configured;
+use crate::fault::{CONDITIONS, flag_of};
+use crate::lost_events::LOST_EVENTS;
+use crate::stored::Stored;
+use crate::transfer_buffer::TransferBuffer;
+
+/// The application at work.
+#[derive(Debug)]
+pub(crate) struct NodeApplication {
+    pub(crate) setup: Setup,
+    pub(crate) configured: Configured,
+    pub(crate) profile: AnyProfile,
+    /// As last published: a reset of the dictionary does not reset what is measured.
+    pub(crate) snapshot: Snapshot,
+    /// The flags of active faults. A reset of the dictionary does not end a fault.
+    pub(crate) flags: Flags,
+    pub(crate) stored: Stored,
+    /// As counted by the firmware (2001h).
+    pub(crate) lost_events: [u32; LOST_EVENTS],
+    buffer: TransferBuffer,
+}
+
+impl NodeApplication {
+    pub(crate) fn new(setup: &Setup) -> NodeApplication {
+        NodeApplication {
+            setup: *setup,
+            configured: Configured::of(setup),
+            profile: AnyProfile::new(setup.personality),
+            snapshot: Snapshot::default(),
+            flags: Flags::default(),
+            stored: Stored::NOTHING,
+            lost_events: [0; LOST_EVENTS],
+            buffer: TransferBuffer::EMPTY,
+        }
+    }
+
+    /// Shows what was measured.
+    pub(crate) fn show_values(&self, image: &mut [u8]) {
+        self.profile.publish(&self.snapshot, image);
+    }
+
+    /// Shows the flags, in a profile that has objects for them.
+    pub(crate) fn show_flags(&self, image: &mut [u8]) {
+        self.profile.show_flags(self.flags, image);
+    }
+
+    /// Shows the personality after the next reset.
+    pub(crate) fn show_personality(&self, image: &mut [u8]) {
+        self.show(PERSONALITY, 0, &[self.configured.personality.number()], image);
+    }
+
+    pub(crate) fn show(&self, index: u16, sub: u8, bytes: &[u8], image: &mut [u8]) {
+        if let Ok(entry) = self.setup.personality.dictionary().find(index, sub) {
+            entry.field().set(image, bytes);
+        }
+    }
+}
+
+impl Application for NodeApplication {
+    const CONDITIONS: &'static [Condition] = &CONDITIONS;
+
+    fn initialise(&mut self, image: &mut [u8]) {
+        let setup = &self.setup;
+        let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
+        show(0x1009, 0, setup.hardware_version.as_bytes());
+        show(0x100A, 0, setup.software_version.as_bytes());
+        show(0x1018, 1, &product::VENDOR_ID.to_le_bytes());
+        show(0x1018, 2, &setup.personality.product_code().to_le_bytes());
+        show(0x1018, 3, &product::REVISION.to_le_bytes());
+        show(0x1018, 4, &setup.serial_number.to_le_bytes());
+        show(0x1F56, 1, &setup.program_id.to_le_bytes());
+        show(0x1F57, 1, &self.stored.flash_status().to_le_bytes());
+        self.profile.initialise(image);
+        self.show_personality(image);
+        self.show_flags(image);
+        self.show_lost_events(image);
+        self.show_values(image);
+    }
+
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        self.profile.write(entry, bytes, image)
+    }
+
+    fn written(&mut self, _: &Entry, image: &mut [u8]) {
+        self.profile.received(image);
+    }
+
+    fn received(&mut self, _: u16, image: &mut [u8]) {
+        self.profile.received(image);
+    }
+
+    fn state(&mut self, state: State, image: &mut [u8]) {
+        self.profile.state(state, image);
+    }
+
+    fn stored(&self, group: Group) -> canopen::Stored<'_> {
+        // The calibration is that of the device: a dictionary without it leaves it alone.
+        if self.setup.personality.has_group(group) {
+            self.stored.get(group)
+        } else {
+            canopen::Stored { packed: &[], is_sound: true }
+        }
+    }
+
+    fn loaded(&mut self, group: Group, good: bool) {
+        self.flags.set(flag_of(group), !good);
+    }
+
+    fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
+        self.buffer.read()
+    }
+
+    fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
+        self.buffer.write(part)
+    }
+}

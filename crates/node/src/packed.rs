@@ -1,0 +1,71 @@
+//! The packed values of the storage groups, as the dictionary packs and the parameter store holds them.
+
+use canopen::dictionary::Group;
+use heapless::{Vec, VecView};
+
+const COMMUNICATION: usize = profiles::packed_size(Group::Communication);
+const APPLICATION: usize = profiles::packed_size(Group::Application);
+const CALIBRATION: usize = profiles::packed_size(Group::Calibration);
+const _: () = assert!(COMMUNICATION <= storage::MAX_VALUE && APPLICATION <= storage::MAX_VALUE);
+const _: () = assert!(CALIBRATION <= storage::MAX_VALUE);
+
+/// The packed values of every group, each with room for those of the largest dictionary. Nothing but zeros while there are
+/// none, so no copy of them lies in flash.
+#[derive(Debug)]
+pub(crate) struct PackedGroups {
+    communication: Vec<u8, COMMUNICATION>,
+    application: Vec<u8, APPLICATION>,
+    calibration: Vec<u8, CALIBRATION>,
+}
+
+impl PackedGroups {
+    pub(crate) const EMPTY: PackedGroups =
+        PackedGroups { communication: Vec::new(), application: Vec::new(), calibration: Vec::new() };
+
+    pub(crate) fn get(&self, group: Group) -> &[u8] {
+        match group {
+            Group::Communication => &self.communication,
+            Group::Application => &self.application,
+            Group::Calibration => &self.calibration,
+        }
+    }
+
+    fn get_mut(&mut self, group: Group) -> &mut VecView<u8> {
+        match group {
+            Group::Communication => self.communication.as_mut_view(),
+            Group::Application => self.application.as_mut_view(),
+            Group::Calibration => self.calibration.as_mut_view(),
+        }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        for group in Group::ALL {
+            self.get_mut(group).clear();
+        }
+    }
+
+    /// Hands out all the room of a group; `fill` says how many bytes of it count.
+    pub(crate) fn fill(&mut self, group: Group, fill: impl FnOnce(&mut [u8]) -> usize) {
+        let values = self.get_mut(group);
+        values.clear();
+        let _ = values.resize(values.capacity(), 0);
+        let len = fill(values);
+        values.truncate(len);
+    }
+
+    /// Takes these values; whether there is room for them.
+    pub(crate) fn replace(&mut self, group: Group, packed: &[u8]) -> bool {
+        let values = self.get_mut(group);
+        values.clear();
+        values.extend_from_slice(packed).is_ok()
+    }
+}
+
+/// Under which name the parameter store holds a group.
+pub(crate) const fn record_of(group: Group) -> storage::Group {
+    match group {
+        Group::Communication => storage::Group::Communication,
+        Group::Application => storage::Group::Application,
+        Group::Calibration => storage::Group::Calibration,
+    }
+}

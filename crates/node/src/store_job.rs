@@ -1,0 +1,96 @@
+//! A job for the parameter store, with a copy of the values, so that nothing is locked while they are written.
+
+use canopen::dictionary::{Group, Groups};
+use canopen::sdo::Abort;
+use canopen::{Job, NodeId};
+use embedded_storage::nor_flash::NorFlash;
+use heapless::Vec;
+use profiles::{IMAGE_SIZE, Personality};
+use storage::{Change, DeviceRecord, Error, Store};
+
+use crate::packed::{PackedGroups, record_of};
+use crate::stored::{layout, layout_of};
+
+/// A job for the parameter store and all it needs. One is enough: there is one job at a time.
+#[derive(Debug)]
+pub struct StoreJob {
+    pub(crate) job: Option<Job>,
+    pub(crate) personality: Personality,
+    pub(crate) node_id: Option<NodeId>,
+    /// The values of all objects.
+    pub(crate) image: [u8; IMAGE_SIZE],
+    /// The device record, where node-ID, bit rate or personality are stored.
+    pub(crate) device: [u8; DeviceRecord::LEN],
+    /// The groups that are stored.
+    pub(crate) packed: PackedGroups,
+}
+
+impl StoreJob {
+    /// An empty one, for a node of this personality. A constant of its size would lie in flash.
+    #[must_use]
+    pub fn new(personality: Personality) -> StoreJob {
+        StoreJob {
+            job: None,
+            personality,
+            node_id: None,
+            image: [0; IMAGE_SIZE],
+            device: [0; DeviceRecord::LEN],
+            packed: PackedGroups::EMPTY,
+        }
+    }
+
+    /// Does the job: all of it or nothing. It takes as long as the flash does, some 16 us a word.
+    ///
+    /// # Errors
+    /// What to tell the client: `Hardware` when the flash has failed, `DeviceState` when there is no room left until the
+    /// node is restarted.
+    pub fn run<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
+        self.pack();
+        let changes = match self.job {
+            None => Vec::new(),
+            Some(Job::Configure(_) | Job::Setting(_)) => self.device_record(),
+            Some(Job::Store(groups)) => each(groups, |group| self.stored(group)),
+            Some(Job::Restore(groups)) => each(groups, |group| Change::Restore(record_of(group))),
+        };
+        store.save(&changes).map_err(|error| match error {
+            Error::RestartNeeded => Abort::DeviceState,
+            _ => Abort::Hardware,
+        })
+    }
+
+    /// Packs what is stored; of what is restored there is nothing to pack.
+    fn pack(&mut self) {
+        self.packed.clear();
+        let Some(Job::Store(groups)) = self.job else { return };
+        for group in groups.iter() {
+            let (dictionary, image) = (self.personality.dictionary(), &self.image);
+            self.packed.fill(group, |bytes| dictionary.pack(group, self.node_id, image, bytes).unwrap_or(0));
+        }
+    }
+
+    fn stored(&self, group: Group) -> Change<'_> {
+        let version = layout_of(group, layout(self.personality));
+        Change::Set { group: record_of(group), version, value: self.packed.get(group) }
+    }
+
+    fn device_record(&self) -> Changes<'_> {
+        let change = Change::Set {
+            group: storage::Group::Device,
+            version: DeviceRecord::VERSION,
+            value: &self.device,
+        };
+        Vec::from_array([change])
+    }
+}
+
+/// At most one change a group.
+type Changes<'a> = Vec<Change<'a>, { Group::ALL.len() }>;
+
+fn each<'a>(groups: Groups, change: impl Fn(Group) -> Change<'a>) -> Changes<'a> {
+    let mut changes = Vec::new();
+    for group in groups.iter() {
+        // There is room for every group.
+        let _ = changes.push(change(group));
+    }
+    changes
+}

@@ -1,0 +1,72 @@
+//! The protocol's side of the parameter store: what is copied for it, and what is taken over when it is done.
+
+use canopen::dictionary::Group;
+use canopen::sdo::Abort;
+use canopen::{Instant, Job, Transmit};
+use embedded_storage::nor_flash::ReadNorFlash;
+use profiles::Parameters;
+use storage::View;
+
+use crate::stored::layout;
+use crate::{Next, Protocol, StoreJob};
+
+impl Protocol {
+    /// Reads the stored parameters, for [`start`](Protocol::start) and every reset after it. Gives the parameters of the
+    /// measurement: one that has them before the start has a sample for the first PDO.
+    pub fn load<F: ReadNorFlash>(&mut self, view: &mut View<F>) -> Parameters {
+        let application = self.device.application_mut();
+        application.stored.load(layout(application.setup.personality), view);
+        self.device.load();
+        self.parameters()
+    }
+
+    /// The same for a node whose store cannot be read.
+    pub fn load_defaults(&mut self) -> Parameters {
+        self.device.load();
+        self.parameters()
+    }
+
+    /// Takes the job that `Action::Store` announced, with the values of this moment. `false` when there is none. The
+    /// values are only copied: to pack them takes half a millisecond, in which nobody should have to wait for the protocol.
+    pub fn take_job(&mut self, taken: &mut StoreJob) -> bool {
+        let application = self.device.application();
+        taken.job = self.job.take();
+        taken.personality = application.setup.personality;
+        taken.node_id = self.device.node_id();
+        match taken.job {
+            None => return false,
+            Some(Job::Store(_)) => taken.image = *self.device.image(),
+            Some(Job::Restore(_)) => {}
+            Some(job @ (Job::Configure(_) | Job::Setting(_))) => {
+                taken.device = application.configured.after(job).encode();
+            }
+        }
+        true
+    }
+
+    /// The job is done or has failed: the next reset finds what is stored now, and the client is answered.
+    pub fn finish(
+        &mut self,
+        done: &StoreJob,
+        result: Result<(), Abort>,
+        now: Instant,
+        out: &mut impl Transmit,
+    ) -> Next {
+        if let (Ok(()), Some(job)) = (result, done.job) {
+            self.take_over(job, done);
+        }
+        let next = self.device.finish(result, now, out);
+        self.note(next)
+    }
+
+    fn take_over(&mut self, job: Job, done: &StoreJob) {
+        let application = self.device.application_mut();
+        application.configured = application.configured.after(job);
+        if let Job::Store(groups) | Job::Restore(groups) = job {
+            for group in Group::ALL.into_iter().filter(|group| groups.contains(*group)) {
+                application.stored.replace(group, done.packed.get(group));
+            }
+        }
+        self.device.show(|application, image| application.show_personality(image));
+    }
+}

@@ -1,0 +1,21 @@
+//! Identity of the product, object 1018h. Firmware, bootloader, data sheets and signed images have it from here; whoever
+//! builds a product of their own changes this file.
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(clippy::pedantic)]
+
+/// Vendor-ID, 1018h:1. 0 is no vendor: put the one here that CiA has assigned to you.
+pub const VENDOR_ID: u32 = 0;
+
+/// Revision number, 1018h:3: major in the high word, minor in the low word.
+pub const REVISION: u32 = 0x0001_0000;
+
+/// Product code, 1018h:2, of a personality by its number (object 2000h).
+#[must_use]
+pub const fn code(personality: u8) -> u32 {
+    personality as u32 + 1
+}
+
+/// Product code in the bootloader and in the header of an image. An image has all personalities, so the code belongs to
+/// the board: that of the first personality.
+pub const BOARD: u32 = code(0);

@@ -1,0 +1,21 @@
+//! What every device of the project has, 1000h to 2FFFh, and the parts of the communication segment in which devices
+//! differ, as functions.
+
+mod node;
+mod objects;
+mod pdos;
+mod start_up;
+
+pub use node::{LOST_EVENT_KINDS, LOST_EVENT_ROWS, LOST_EVENTS, PERSONALITY, TRANSFER_BUFFER, personality};
+pub use objects::{ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, device_name, device_type, error_behaviour};
+pub use pdos::{
+    RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, sync_start, tpdo_mappings, tpdos,
+    transmission_type,
+};
+pub use start_up::START_UP;
+
+use canopen::dictionary::Object;
+
+/// The rows that every device has.
+pub const COMMON: &[&[Object]] =
+    &[&[ERROR_REGISTER], ERRORS_AND_SYNC, SERVICES, START_UP, LOST_EVENT_ROWS, &[TRANSFER_BUFFER]];

@@ -1,0 +1,44 @@
+//! Manufacturer-specific objects that every device of the project has.
+
+use canopen::dictionary::{Access, Object, Type};
+
+/// Index of the object that says which personality the node has after the next reset.
+pub const PERSONALITY: u16 = 0x2000;
+
+/// 2000h, in a node with so many personalities. Stored at once, with node-ID and bit rate: no 1010h is needed. The
+/// parameters that are stored belong to the personality that stored them.
+#[allow(clippy::cast_possible_wrap)] // There are only a few.
+#[must_use]
+pub const fn personality(own: u8, count: usize) -> Object {
+    Object::new(PERSONALITY, 0, "Personality", Type::Unsigned8, Access::ReadWrite)
+        .value(own as i64)
+        .limits(0, count as i64 - 1)
+        .setting()
+}
+
+/// 2F00h: a domain in RAM, for trying out transfers.
+pub const TRANSFER_BUFFER: Object =
+    Object::new(0x2F00, 0, "Transfer buffer", Type::Domain, Access::ReadWrite);
+
+/// Index of the object that counts lost events.
+pub const LOST_EVENTS: u16 = 0x2001;
+
+/// How many kinds of lost events there are: sub-indexes 1 to this one.
+pub const LOST_EVENT_KINDS: u8 = 8;
+
+const fn count(sub: u8, name: &'static str) -> Object {
+    Object::new(LOST_EVENTS, sub, name, Type::Unsigned32, Access::ReadOnly)
+}
+
+/// 2001h: events of the hardware that were lost and made good, counted since the start. A healthy board shows zeros.
+pub const LOST_EVENT_ROWS: &[Object] = &[
+    Object::highest(LOST_EVENTS, LOST_EVENT_KINDS, "Lost events"),
+    count(1, "Received frames"),
+    count(2, "Milliseconds of samples"),
+    count(3, "Restarts of the sampling"),
+    count(4, "SSI words"),
+    count(5, "Restarts of the index capture"),
+    count(6, "Timer alarms"),
+    count(7, "Writes to the backup memory"),
+    count(8, "Flash operations"),
+];

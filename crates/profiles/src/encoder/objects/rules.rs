@@ -1,0 +1,142 @@
+//! What a write to an object of the encoder means beyond storing a value.
+
+use super::values::Fields;
+use crate::encoder::{COMMISSIONING, ChannelParameters, Parameters, SCALING, SENSOR_HELD};
+use canopen::dictionary::{Entry, Field};
+use canopen::sdo::Abort;
+
+/// The rules of the encoder's own objects.
+#[derive(Clone, Copy)]
+pub(super) enum Rule {
+    /// 6000h: bits that no sensor has are refused.
+    Operating,
+    /// 6001h: not finer than every sensor.
+    PerRevolution,
+    /// 6002h: no longer than what every sensor tells apart.
+    Range,
+    /// 6003h and 6010h: the position becomes the preset.
+    Preset,
+    /// 6005h:1: not finer than every sensor.
+    Step,
+    /// 2100h to 2103h: what a sensor is.
+    Sensor,
+    /// 2107h: locked by 2108h.
+    Factory,
+    /// 2109h: clears alarms.
+    Acknowledge,
+}
+
+impl Rule {
+    /// The rule of an object.
+    pub(super) const fn of(index: u16, sub: u8) -> Option<Rule> {
+        Some(match (index, sub) {
+            (0x2100..=0x2103, 1..) => Rule::Sensor,
+            (0x2107, 1..) => Rule::Factory,
+            (0x2109, 0) => Rule::Acknowledge,
+            (0x6000, 0) => Rule::Operating,
+            (0x6001, 0) => Rule::PerRevolution,
+            (0x6002, 0) => Rule::Range,
+            (0x6003, 0) | (0x6010, 1..) => Rule::Preset,
+            (0x6005, 1) => Rule::Step,
+            _ => return None,
+        })
+    }
+}
+
+/// What 2108h takes to open 2107h: "fact".
+const FACTORY_SIGNATURE: [u8; 4] = *b"fact";
+
+impl Fields {
+    /// Decides on a write to an object with one of the rules above.
+    pub(super) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let Some(rule) = Rule::of(entry.index(), entry.sub()) else { return Ok(()) };
+        let mut word = [0; 4];
+        word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+        let value = u32::from_le_bytes(word);
+        match rule {
+            Rule::Operating => allow(is_operating(&self.parameters(image), value)),
+            Rule::PerRevolution => allow(self.parameters(image).allow_per_revolution(value)),
+            Rule::Range => allow(self.parameters(image).allow_range(value)),
+            Rule::Step => allow(self.parameters(image).allow_step(value)),
+            Rule::Preset => self.preset(entry, value, image),
+            Rule::Sensor => self.describe_sensor(entry, bytes, image),
+            Rule::Factory if self.factory_key.load(image) != FACTORY_SIGNATURE => Err(Abort::Access),
+            Rule::Factory => Ok(()),
+            Rule::Acknowledge => {
+                count(self.acknowledgements, image);
+                Ok(())
+            }
+        }
+    }
+
+    /// Gives the command for a preset, and shows the position that it leads to: whoever reads it next reads the preset.
+    fn preset(&self, entry: &Entry, value: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let ([first, second], parameters) = (&self.channels, self.parameters(image));
+        let [first_own, second_own] = &parameters.channels;
+        let (channel, own) = if entry.sub() == 2 { (second, second_own) } else { (first, first_own) };
+        check_preset(&parameters, own, channel.sensor_state.u8(image), value)?;
+        count(channel.presets, image);
+        channel.preset.store(image, value.to_le_bytes());
+        channel.position.store(image, value.to_le_bytes());
+        if entry.sub() != 2 {
+            self.preset.store(image, value.to_le_bytes());
+            self.position.store(image, value.to_le_bytes());
+        }
+        Ok(())
+    }
+
+    /// Tries what the sensor would be, and leaves it as it was when the scaling that is on could not be given.
+    fn describe_sensor(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let field = entry.field();
+        let before = Saved::of(field, image);
+        field.set(image, bytes);
+        let result = allow(self.sensors.has_format(image) && self.parameters(image).is_consistent());
+        field.set(image, before.bytes());
+        result
+    }
+}
+
+/// There is no preset to a position that is not known, and none outside of the range.
+fn check_preset(all: &Parameters, own: &ChannelParameters, state: u8, value: u32) -> Result<(), Abort> {
+    match all.sensor(own) {
+        Some(sensor) if state & SENSOR_HELD == 0 => {
+            allow(u64::from(value) < all.scale(&sensor).range().get())
+        }
+        _ => Err(Abort::DeviceState),
+    }
+}
+
+/// A value of at most four bytes.
+struct Saved {
+    bytes: [u8; 4],
+    len: usize,
+}
+
+impl Saved {
+    fn of(field: Field, image: &[u8]) -> Saved {
+        let mut bytes = [0; 4];
+        let value = field.get(image);
+        bytes.iter_mut().zip(value).for_each(|(to, from)| *to = *from);
+        Saved { bytes, len: value.len() }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&self.bytes)
+    }
+}
+
+/// Bits that are reserved, the direction of what no sensor is, and a scaling that no sensor can give are refused.
+fn is_operating(parameters: &Parameters, value: u32) -> bool {
+    let Ok(operating) = u16::try_from(value) else { return false };
+    let known = COMMISSIONING | SCALING | parameters.directions();
+    operating & !known == 0 && Parameters { operating, ..*parameters }.is_consistent()
+}
+
+/// Counts a command; 0 is only before the first.
+fn count(field: Field, image: &mut [u8]) {
+    field.store(image, [field.u8(image).checked_add(1).unwrap_or(1)]);
+}
+
+fn allow(is_allowed: bool) -> Result<(), Abort> {
+    if is_allowed { Ok(()) } else { Err(Abort::InvalidValue) }
+}

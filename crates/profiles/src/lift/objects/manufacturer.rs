@@ -1,0 +1,84 @@
+//! Manufacturer-specific objects of the lift, 2300h to 2322h: which sensors the virtual devices have, and what CiA 417
+//! leaves open. The sensors of positions are described as those of the encoder are (2100h to 2106h).
+
+use crate::lift::position::UNKNOWN;
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
+
+const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
+}
+
+/// The channel of the encoder that a position unit measures with; 0 for a unit that is not there.
+const fn source(sub: u8, name: &'static str, default: i64) -> Object {
+    parameter(0x2301, sub, name, Type::Unsigned8).limits(0, 2).value(default).handled()
+}
+
+/// What a preset or a change of direction leads to.
+const fn offset(sub: u8, name: &'static str) -> Object {
+    parameter(0x2302, sub, name, Type::Integer32).unit("6384h:1")
+}
+
+const fn state(sub: u8, name: &'static str) -> Object {
+    Object::new(0x2303, sub, name, Type::Unsigned8, Access::ReadOnly)
+        .value(UNKNOWN as i64)
+        .mappable(Mapping::Tpdo)
+}
+
+const fn lamp(sub: u8, name: &'static str) -> Object {
+    Object::new(0x2322, sub, name, Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo)
+}
+
+pub(super) const OBJECTS: &[Object] = &[
+    parameter(0x2300, 0, "Way of the car per revolution", Type::Unsigned32)
+        .limits(1, 0xFFFF_FFFF)
+        .value(200_000)
+        .unit("um")
+        .handled(),
+    Object::highest(0x2301, 4, "Position unit sources"),
+    source(1, "Position unit 1 source", 1),
+    source(2, "Position unit 2 source", 0),
+    source(3, "Position unit 3 source", 0),
+    source(4, "Position unit 4 source", 0),
+    Object::highest(0x2302, 4, "Position unit offsets"),
+    offset(1, "Position unit 1 offset"),
+    offset(2, "Position unit 2 offset"),
+    offset(3, "Position unit 3 offset"),
+    offset(4, "Position unit 4 offset"),
+    Object::highest(0x2303, 4, "Position unit states"),
+    state(1, "Position unit 1 state"),
+    state(2, "Position unit 2 state"),
+    state(3, "Position unit 3 state"),
+    state(4, "Position unit 4 state"),
+    Object::highest(0x2310, 2, "Load filter"),
+    // As 61A0h and 61A1h of CiA 404.
+    parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),
+    parameter(0x2310, 2, "Load filter constant", Type::Unsigned8).limits(1, 255).value(100),
+    // Two equal pressures: there is no load measuring unit.
+    Object::highest(0x2311, 4, "Load calibration"),
+    parameter(0x2311, 1, "Pressure at point 1", Type::Real32).unit("Pa"),
+    parameter(0x2311, 2, "Load at point 1", Type::Real32).unit("kg"),
+    parameter(0x2311, 3, "Pressure at point 2", Type::Real32).real(1.0e6).unit("Pa"),
+    parameter(0x2311, 4, "Load at point 2", Type::Real32).real(1000.0).unit("kg"),
+    // What 6486h leads to.
+    parameter(0x2312, 0, "Load offset", Type::Real32).unit("kg"),
+    Object::highest(0x2313, 2, "Load measurement"),
+    Object::new(0x2313, 1, "Load as measured", Type::Real32, Access::ReadOnly).unit("kg"),
+    // 1: the sensor or its wiring is broken.
+    Object::new(0x2313, 2, "Load sensor state", Type::Unsigned8, Access::ReadOnly).mappable(Mapping::Tpdo),
+    // Two equal words: the button is not used, and without one there is no input panel unit.
+    Object::highest(0x2320, 4, "Button words"),
+    parameter(0x2320, 1, "Virtual input of button 1 released", Type::Unsigned48),
+    parameter(0x2320, 2, "Virtual input of button 1 pressed", Type::Unsigned48),
+    parameter(0x2320, 3, "Virtual input of button 2 released", Type::Unsigned48),
+    parameter(0x2320, 4, "Virtual input of button 2 pressed", Type::Unsigned48),
+    // Two equal words: the lamp is not used, and without one there is no output panel unit.
+    Object::highest(0x2321, 4, "Lamp words"),
+    parameter(0x2321, 1, "Virtual output that puts lamp 1 out", Type::Unsigned48),
+    parameter(0x2321, 2, "Virtual output that lights lamp 1", Type::Unsigned48),
+    parameter(0x2321, 3, "Virtual output that puts lamp 2 out", Type::Unsigned48),
+    parameter(0x2321, 4, "Virtual output that lights lamp 2", Type::Unsigned48),
+    // Not 0: lit. A multiplexed PDO may write it, and an SDO client.
+    Object::highest(0x2322, 2, "Lamps"),
+    lamp(1, "Lamp 1"),
+    lamp(2, "Lamp 2"),
+];

@@ -1,0 +1,131 @@
+//! Application profile objects, 6000h to 64FFh (CiA 417): of the position unit sub-index n is unit n.
+
+use crate::encoder::SUPPORTED_WARNINGS;
+use canopen::dictionary::{Access, Group, Mapping, Object, Type};
+
+const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Application)
+}
+
+const fn handled(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    parameter(index, sub, name, kind).handled()
+}
+
+const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadOnly)
+}
+
+/// Process data: in a PDO of its own, or in the multiplexed one.
+const fn sent(row: Object) -> Object {
+    row.mappable(Mapping::Tpdo)
+}
+
+/// The same row for each of four units. A macro, as names are made of literals.
+macro_rules! units {
+    ($index:literal, $what:literal, $names:literal, $row:expr) => {
+        [
+            Object::highest($index, 4, $names),
+            $row(1, concat!("Position unit 1 ", $what)),
+            $row(2, concat!("Position unit 2 ", $what)),
+            $row(3, concat!("Position unit 3 ", $what)),
+            $row(4, concat!("Position unit 4 ", $what)),
+        ]
+    };
+}
+
+/// Unit of positions: what 6384h:1 says.
+const POSITION: &str = "6384h:1";
+
+const fn operating(sub: u8, name: &'static str) -> Object {
+    handled(0x6380, sub, name, Type::Unsigned16)
+}
+
+const fn preset(sub: u8, name: &'static str) -> Object {
+    handled(0x6382, sub, name, Type::Unsigned32).unit(POSITION)
+}
+
+const fn position(sub: u8, name: &'static str) -> Object {
+    sent(measured(0x6383, sub, name, Type::Unsigned32)).unit(POSITION)
+}
+
+/// Not for PDOs: no pre-defined one has it, and as a multiplexed PDO each change would be a frame, a thousand a second.
+const fn speed(sub: u8, name: &'static str) -> Object {
+    measured(0x6390, sub, name, Type::Integer16).unit("6384h:2")
+}
+
+const fn low_limit(sub: u8, name: &'static str) -> Object {
+    parameter(0x63B4, sub, name, Type::Integer32).unit(POSITION)
+}
+
+const fn high_limit(sub: u8, name: &'static str) -> Object {
+    parameter(0x63B8, sub, name, Type::Integer32).value(0x7FFF_FFFF).unit(POSITION)
+}
+
+const fn operating_status(sub: u8, name: &'static str) -> Object {
+    sent(measured(0x63C0, sub, name, Type::Unsigned16))
+}
+
+const fn resolution(sub: u8, name: &'static str) -> Object {
+    measured(0x63C1, sub, name, Type::Unsigned32).unit("steps or nm")
+}
+
+const fn revolutions(sub: u8, name: &'static str) -> Object {
+    measured(0x63C2, sub, name, Type::Unsigned32)
+}
+
+const fn supported_warnings(sub: u8, name: &'static str) -> Object {
+    measured(0x63C4, sub, name, Type::Unsigned16).value(SUPPORTED_WARNINGS as i64)
+}
+
+const fn warnings(sub: u8, name: &'static str) -> Object {
+    sent(measured(0x63C5, sub, name, Type::Unsigned16))
+}
+
+const fn limit(sub: u8, name: &'static str) -> Object {
+    parameter(0x6483, sub, name, Type::Unsigned16).unit("kg")
+}
+
+/// All of them, in the order of the table.
+pub(super) const PARTS: &[&[Object]] = &[
+    &[
+        // A bit for each lift. The PDOs are those of lift 1.
+        parameter(0x6001, 0, "Lift number", Type::Unsigned8).limits(1, 1).value(1),
+        sent(measured(0x6010, 0, "Virtual input", Type::Unsigned48)),
+        Object::new(0x6011, 0, "Virtual output", Type::Unsigned48, Access::ReadWrite).mappable(Mapping::Rpdo),
+    ],
+    &units!(0x6380, "operating parameters", "Position unit operating parameters", operating),
+    &units!(0x6382, "preset", "Position unit presets", preset),
+    &units!(0x6383, "position", "Positions", position),
+    &[
+        Object::highest(0x6384, 2, "Position unit measuring steps"),
+        handled(0x6384, 1, "Position measuring step", Type::Unsigned16)
+            .limits(1, 0xFFFF)
+            .value(100)
+            .unit("10 um"),
+        parameter(0x6384, 2, "Speed measuring step", Type::Unsigned16)
+            .limits(1, 0xFFFF)
+            .value(10)
+            .unit("0.1 mm/s"),
+    ],
+    &units!(0x6390, "speed", "Speeds", speed),
+    &units!(0x63B4, "low limit", "Position unit low limits", low_limit),
+    &units!(0x63B8, "high limit", "Position unit high limits", high_limit),
+    &units!(0x63C0, "operating status", "Position unit operating status", operating_status),
+    &units!(0x63C1, "resolution", "Position unit resolutions", resolution),
+    &units!(0x63C2, "revolutions", "Position unit revolutions", revolutions),
+    &units!(0x63C4, "supported warnings", "Position unit supported warnings", supported_warnings),
+    &units!(0x63C5, "warnings", "Position unit warnings", warnings),
+    &[
+        Object::highest(0x6480, 1, "Load values"),
+        sent(measured(0x6480, 1, "Load value", Type::Unsigned16)).unit("kg"),
+        Object::highest(0x6482, 1, "Load signals"),
+        sent(measured(0x6482, 1, "Load signal", Type::Unsigned8)),
+        // 0: not signalled.
+        Object::highest(0x6483, 4, "Load signalling limits"),
+        limit(1, "Zero load limit"),
+        limit(2, "Half load limit"),
+        limit(3, "Full load limit"),
+        limit(4, "Overload limit"),
+        handled(0x6486, 0, "Car reference weight", Type::Unsigned16).unit("kg"),
+    ],
+];

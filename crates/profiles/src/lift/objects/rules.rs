@@ -1,0 +1,147 @@
+//! What a write to an object of the lift means beyond storing a value.
+
+use super::values::{Fields, UnitFields};
+use crate::lift::position::{INVERTED, UNKNOWN};
+use crate::pressure::objects::calibration;
+use canopen::dictionary::{Entry, Field};
+use canopen::sdo::Abort;
+
+/// The rules of the lift's own objects.
+#[derive(Clone, Copy)]
+pub(super) enum Rule {
+    /// 6380h: the direction of a unit.
+    Operating,
+    /// 6382h: the position becomes the preset.
+    Preset,
+    /// 6384h:1, 2300h, 2100h to 2103h: in what a position is measured.
+    Measure,
+    /// 6486h: the load in the car is this.
+    Reference,
+    /// 2301h: the sensor of a unit.
+    Source,
+    /// 2200h to 2203h.
+    Calibration(calibration::Rule),
+}
+
+impl Rule {
+    /// The rule of an object.
+    pub(super) const fn of(index: u16, sub: u8) -> Option<Rule> {
+        Some(match (index, sub) {
+            (0x2100..=0x2103, 1..) | (0x2300, 0) | (0x6384, 1) => Rule::Measure,
+            (0x2301, 1..) => Rule::Source,
+            (0x6380, 1..) => Rule::Operating,
+            (0x6382, 1..) => Rule::Preset,
+            (0x6486, 0) => Rule::Reference,
+            _ => match calibration::Rule::of(index, sub) {
+                Some(rule) => Rule::Calibration(rule),
+                None => return None,
+            },
+        })
+    }
+}
+
+impl Fields {
+    /// Decides on a write to an object with one of the rules above.
+    pub(super) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let Some(rule) = Rule::of(entry.index(), entry.sub()) else { return Ok(()) };
+        let unit = usize::from(entry.sub()).wrapping_sub(1);
+        let value = word(bytes);
+        match rule {
+            Rule::Operating => self.operate(unit, value, image),
+            Rule::Preset => self.preset(unit, value, image),
+            Rule::Measure => self.measure_anew(entry.field(), bytes, image),
+            Rule::Source => self.take_source(unit, entry.field(), bytes, image),
+            Rule::Reference => self.weigh(value, image),
+            Rule::Calibration(rule) => self.transducer.write(rule, entry, bytes, image),
+        }
+    }
+
+    /// A unit that is turned round stays where it is: the offset follows.
+    fn operate(&self, number: usize, value: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let operating = u16::try_from(value).ok().filter(|bits| bits & !INVERTED == 0);
+        let operating = operating.ok_or(Abort::InvalidValue)?;
+        let unit = self.unit(number)?;
+        if operating != unit.operating.u16(image) {
+            let position = unit.position.u32(image);
+            let turned = self.position_parameters(image).turned(number, position);
+            unit.offset.store(image, turned.unwrap_or(0).to_le_bytes());
+        }
+        Ok(())
+    }
+
+    /// Finds the offset, and shows the position that it leads to: whoever reads it next reads the preset.
+    fn preset(&self, number: usize, preset: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let unit = self.unit(number)?;
+        if unit.source.u8(image) == 0 || unit.state.u8(image) & UNKNOWN != 0 {
+            return Err(Abort::DeviceState);
+        }
+        let position = unit.position.u32(image);
+        let offset = self.position_parameters(image).preset(number, position, preset);
+        unit.offset.store(image, offset.ok_or(Abort::InvalidValue)?.to_le_bytes());
+        unit.position.store(image, preset.to_le_bytes());
+        Ok(())
+    }
+
+    /// Tries another measuring step, way or sensor; what no sensor can give is refused. In other units the offsets have
+    /// lost their meaning and are 0 again, as that of CiA 406 is.
+    fn measure_anew(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let before = Value::of(field, image);
+        field.set(image, bytes);
+        let is_possible = self.sensors.has_format(image) && self.position_parameters(image).is_consistent();
+        field.set(image, before.bytes());
+        if !is_possible {
+            return Err(Abort::InvalidValue);
+        }
+        if bytes != before.bytes() {
+            self.units.iter().for_each(|unit| unit.offset.store(image, [0; 4]));
+        }
+        Ok(())
+    }
+
+    fn take_source(&self, number: usize, field: Field, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if bytes != field.get(image) {
+            self.unit(number)?.offset.store(image, [0; 4]);
+        }
+        Ok(())
+    }
+
+    /// Says what is in the car now. A load that is not measured is no reference.
+    fn weigh(&self, kilograms: u32, image: &mut [u8]) -> Result<(), Abort> {
+        let is_measured = self.load_parameters(image).is_calibrated() && self.load_state.u8(image) == 0;
+        let reference = u16::try_from(kilograms).map_err(|_| Abort::InvalidValue)?;
+        if !is_measured {
+            return Err(Abort::DeviceState);
+        }
+        let offset = self.load_offset.f32(image) + f32::from(reference) - self.measured_load.f32(image);
+        self.load_offset.store(image, offset.to_le_bytes());
+        self.measured_load.store(image, f32::from(reference).to_le_bytes());
+        self.load.store(image, reference.to_le_bytes());
+        Ok(())
+    }
+
+    fn unit(&self, number: usize) -> Result<&UnitFields, Abort> {
+        self.units.get(number).ok_or(Abort::General)
+    }
+}
+
+/// The number in at most four bytes.
+fn word(bytes: &[u8]) -> u32 {
+    bytes.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
+}
+
+/// A value of at most four bytes.
+struct Value {
+    bytes: [u8; 4],
+    len: usize,
+}
+
+impl Value {
+    fn of(field: Field, image: &[u8]) -> Value {
+        let value = field.get(image);
+        Value { bytes: word(value).to_le_bytes(), len: value.len() }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or(&self.bytes)
+    }
+}

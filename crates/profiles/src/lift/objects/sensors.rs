@@ -1,0 +1,15 @@
+//! The position sensors of the lift are described as those of the encoder are: 2100h to 2106h.
+
+use crate::encoder;
+use canopen::dictionary::Object;
+
+/// The encoder's rows that describe sensors; those after them belong to CiA 406.
+pub(super) const OBJECTS: &[Object] = before(encoder::objects::SENSORS, 0x2107);
+
+const fn before(rows: &'static [Object], index: u16) -> &'static [Object] {
+    let mut count = 0;
+    while count < rows.len() && rows[count].index < index {
+        count += 1;
+    }
+    rows.split_at(count).0
+}

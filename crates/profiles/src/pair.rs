@@ -1,0 +1,112 @@
+//! Two profiles in one dictionary, as one profile.
+
+use canopen::dictionary::Entry;
+use canopen::nmt::State;
+use canopen::sdo::Abort;
+
+use crate::board::{DIGITAL_OUTPUTS, Inputs, Outputs, PositionInputs, PowerOn, RETAINED_WORDS};
+use crate::fault::{Fault, Flags};
+use crate::profile::{Chain, Parameters, Profile, Snapshot};
+
+/// Two protocol halves, whose objects do not overlap.
+#[derive(Debug)]
+pub struct Pair<A, B>(A, B);
+
+/// The two sampling halves that belong to them.
+#[derive(Clone, Debug)]
+pub struct ChainPair<A, B>(A, B);
+
+impl<A: Chain, B: Chain> Chain for ChainPair<A, B> {
+    type Parameters = (A::Parameters, B::Parameters);
+    type Snapshot = (A::Snapshot, B::Snapshot);
+
+    fn new(power_on: &PowerOn) -> Self {
+        ChainPair(A::new(power_on), B::new(power_on))
+    }
+
+    fn apply(&mut self, (first, second): &Self::Parameters) {
+        self.0.apply(first);
+        self.1.apply(second);
+    }
+
+    fn update(&mut self, inputs: &Inputs, (first, second): &mut Self::Snapshot) {
+        self.0.update(inputs, first);
+        self.1.update(inputs, second);
+    }
+
+    fn position_inputs((first, second): &Self::Parameters) -> PositionInputs {
+        let (first, second) = (A::position_inputs(first), B::position_inputs(second));
+        PositionInputs {
+            are_used: first.are_used || second.are_used,
+            ssi_bits: first.ssi_bits.or(second.ssi_bits),
+        }
+    }
+
+    /// There is one memory for both: the first that wants it has it.
+    fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
+        self.0.retain(words) || self.1.retain(words)
+    }
+}
+
+impl<A: Profile, B: Profile> Profile for Pair<A, B> {
+    type Chain = ChainPair<A::Chain, B::Chain>;
+    type Fields = (A::Fields, B::Fields);
+
+    fn new((first, second): &'static Self::Fields) -> Self {
+        Pair(A::new(first), B::new(second))
+    }
+
+    fn initialise(&mut self, image: &mut [u8]) {
+        self.0.initialise(image);
+        self.1.initialise(image);
+    }
+
+    fn parameters(&self, image: &[u8]) -> Parameters<Self> {
+        (self.0.parameters(image), self.1.parameters(image))
+    }
+
+    fn publish(&self, (first, second): &Snapshot<Self>, image: &mut [u8]) {
+        self.0.publish(first, image);
+        self.1.publish(second, image);
+    }
+
+    fn handles(&self, index: u16, sub: u8) -> bool {
+        self.0.handles(index, sub) || self.1.handles(index, sub)
+    }
+
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if self.0.handles(entry.index(), entry.sub()) {
+            self.0.write(entry, bytes, image)
+        } else {
+            self.1.write(entry, bytes, image)
+        }
+    }
+
+    fn received(&mut self, image: &mut [u8]) {
+        self.0.received(image);
+        self.1.received(image);
+    }
+
+    fn state(&mut self, state: State, image: &mut [u8]) {
+        self.0.state(state, image);
+        self.1.state(state, image);
+    }
+
+    fn faults((first, second): &Snapshot<Self>, each: &mut impl FnMut(&'static Fault, bool)) {
+        A::faults(first, each);
+        B::faults(second, each);
+    }
+
+    fn show_flags(&self, flags: Flags, image: &mut [u8]) {
+        self.0.show_flags(flags, image);
+        self.1.show_flags(flags, image);
+    }
+
+    /// A digital output is on when one of them wants it on.
+    fn outputs(&self, image: &[u8]) -> Outputs {
+        let (first, second) = (self.0.outputs(image).digital, self.1.outputs(image).digital);
+        let mut digital: [bool; DIGITAL_OUTPUTS] = first;
+        digital.iter_mut().zip(second).for_each(|(on, other)| *on |= other);
+        Outputs { digital }
+    }
+}

@@ -1,0 +1,166 @@
+//! Calibration, 2200h to 2204h: manufacturer objects that are written in production and locked after it.
+//!
+//! The formulas are those of [`PressureCalibration`] and [`Thermistor`]. A write needs the key in 2203h, else it is
+//! refused with 0601 0000h; a value that would leave a calibration which is not valid is refused with 0604 0043h. What is
+//! written acts from the next sample on, and is kept when 2204h gets "save". 1010h and 1011h do not touch it.
+
+use crate::pressure::{
+    Calibration, Polynomial, PressureCalibration, TemperatureCalibration, Thermistor, Thermometer,
+};
+use canopen::dictionary::{Access, Dictionary, Entry, Field, Group, Object, Type};
+use canopen::sdo::Abort;
+
+/// The rules of these objects.
+#[derive(Clone, Copy)]
+pub(crate) enum Rule {
+    /// 2200h and 2201h: a value of the calibration.
+    Value,
+    /// 2202h: a record about the calibration.
+    Record,
+    /// 2203h: the lock of the others.
+    Lock,
+}
+
+impl Rule {
+    /// The rule of an object.
+    pub(crate) const fn of(index: u16, sub: u8) -> Option<Rule> {
+        match (index, sub) {
+            (0x2200 | 0x2201, 1..) => Some(Rule::Value),
+            (0x2202, 1..) => Some(Rule::Record),
+            (0x2203, 0) => Some(Rule::Lock),
+            _ => None,
+        }
+    }
+}
+
+/// What 2203h takes to open the lock until the node is reset: "cali". 0 closes it.
+const KEY: [u8; 4] = *b"cali";
+
+const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
+    Object::new(index, sub, name, kind, Access::ReadWrite).stored(Group::Calibration).handled()
+}
+
+const fn real(index: u16, sub: u8, name: &'static str, default: f32) -> Object {
+    parameter(index, sub, name, Type::Real32).real(default)
+}
+
+const fn command(index: u16, name: &'static str) -> Object {
+    Object::new(index, 0, name, Type::Unsigned32, Access::ReadWrite)
+}
+
+pub(crate) const CALIBRATION: &[Object] = &[
+    Object::highest(0x2200, 11, "Pressure calibration"),
+    real(0x2200, 1, "Pressure at start of range", 0.0).unit("Pa"),
+    real(0x2200, 2, "Pressure at end of range", 1_000_000.0).unit("Pa"),
+    real(0x2200, 3, "Zero ratio", 0.1),
+    real(0x2200, 4, "Zero linear coefficient", 0.0).unit("1/K"),
+    real(0x2200, 5, "Zero quadratic coefficient", 0.0).unit("1/K2"),
+    real(0x2200, 6, "Span ratio", 0.8),
+    real(0x2200, 7, "Span linear coefficient", 0.0).unit("1/K"),
+    real(0x2200, 8, "Span quadratic coefficient", 0.0).unit("1/K2"),
+    real(0x2200, 9, "Reference temperature", 298.15).unit("K"),
+    real(0x2200, 10, "Lowest ratio of an intact sensor", 0.025),
+    real(0x2200, 11, "Highest ratio of an intact sensor", 0.975),
+    Object::highest(0x2201, 9, "Temperature calibration"),
+    // 0: the sensor of the chip, 1: the thermistor.
+    parameter(0x2201, 1, "Thermometer", Type::Unsigned8).limits(0, 1),
+    real(0x2201, 2, "Temperature factor", 1.0),
+    real(0x2201, 3, "Temperature offset", 0.0).unit("K"),
+    // 10 kohm at 25 degC, beta 3950 K.
+    real(0x2201, 4, "Thermistor coefficient A", 0.001_022_29).unit("1/K"),
+    real(0x2201, 5, "Thermistor coefficient B", 0.000_253_164_55).unit("1/K"),
+    real(0x2201, 6, "Thermistor coefficient C", 0.0).unit("1/K"),
+    real(0x2201, 7, "Resistor of the thermistor", 10_000.0).unit("ohm"),
+    real(0x2201, 8, "Lowest ratio of an intact thermistor", 0.01),
+    real(0x2201, 9, "Highest ratio of an intact thermistor", 0.99),
+    Object::highest(0x2202, 2, "Calibration record"),
+    parameter(0x2202, 1, "Number of calibrations", Type::Unsigned32),
+    // As decimal digits, year, month and day: 20251231. 0 for a device that was not calibrated.
+    parameter(0x2202, 2, "Date of calibration", Type::Unsigned32).limits(0, 99_991_231),
+    command(0x2203, "Calibration lock").handled(),
+    command(0x2204, "Save calibration").stores_calibration().value(1),
+];
+
+/// Where the values are.
+#[derive(Debug)]
+pub(crate) struct Places {
+    pressure: [Field; 11],
+    thermometer: Field,
+    temperature: [Field; 8],
+    lock: Field,
+}
+
+impl Places {
+    pub(crate) const fn new(d: &Dictionary) -> Places {
+        Places {
+            pressure: fields(d, 0x2200, 1),
+            thermometer: d.field(0x2201, 1),
+            temperature: fields(d, 0x2201, 2),
+            lock: d.field(0x2203, 0),
+        }
+    }
+
+    /// The calibration in the image. One that no write could have put there acts as the default one.
+    pub(crate) fn calibration(&self, image: &[u8]) -> Calibration {
+        Some(self.load(image)).filter(Calibration::is_valid).unwrap_or_default()
+    }
+
+    fn load(&self, image: &[u8]) -> Calibration {
+        let [start, end, z0, z1, z2, s0, s1, s2, reference, break_low, break_high] =
+            self.pressure.map(|field| field.f32(image));
+        let [factor, offset, a, b, c, series, lowest, highest] =
+            self.temperature.map(|field| field.f32(image));
+        let [zero, span] = [(z0, z1, z2), (s0, s1, s2)].map(|(constant, linear, quadratic)| Polynomial {
+            constant,
+            linear,
+            quadratic,
+        });
+        let thermometer = match self.thermometer.u8(image) {
+            0 => Thermometer::Internal,
+            _ => Thermometer::Thermistor,
+        };
+        let thermistor = Thermistor { a, b, c, series, break_low: lowest, break_high: highest };
+        Calibration {
+            pressure: PressureCalibration { start, end, zero, span, reference, break_low, break_high },
+            temperature: TemperatureCalibration { thermometer, factor, offset, thermistor },
+        }
+    }
+
+    /// Tries the value, and leaves the image as it was: the device stores what is admitted.
+    fn admits(&self, field: Field, bytes: &[u8], image: &mut [u8]) -> bool {
+        // A shorter value has others behind it, which are put back as they were.
+        let before: [u8; 4] = field.load(image);
+        field.set(image, bytes);
+        let is_valid = self.load(image).is_valid();
+        field.store(image, before);
+        is_valid
+    }
+
+    /// Decides on a write to an object with one of the rules above.
+    pub(crate) fn write(
+        &self,
+        rule: Rule,
+        entry: &Entry,
+        bytes: &[u8],
+        image: &mut [u8],
+    ) -> Result<(), Abort> {
+        match rule {
+            Rule::Lock if bytes == KEY || bytes == [0; 4] => Ok(()),
+            Rule::Lock => Err(Abort::NotStored),
+            Rule::Value | Rule::Record if self.lock.load(image) != KEY => Err(Abort::Access),
+            Rule::Value if !self.admits(entry.field(), bytes, image) => Err(Abort::Parameter),
+            Rule::Value | Rule::Record => Ok(()),
+        }
+    }
+}
+
+/// The places of `N` values from a sub-index on.
+const fn fields<const N: usize>(d: &Dictionary, index: u16, first: u8) -> [Field; N] {
+    let mut fields = [d.field(index, first); N];
+    let mut i: u8 = 0;
+    while (i as usize) < N {
+        fields[i as usize] = d.field(index, first + i);
+        i += 1;
+    }
+    fields
+}

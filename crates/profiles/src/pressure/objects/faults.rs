@@ -1,0 +1,59 @@
+//! Faults of the pressure and temperature inputs, and the flags that show the faults of the device: 3000h, 1002h.
+
+use canopen::dictionary::{Dictionary, Field};
+use canopen::emcy::Condition;
+
+use crate::fault::{Fault, Flags};
+use crate::pressure::Conditions;
+
+/// The signal is outside what an intact sensor can give.
+pub(crate) const SENSOR_BREAK: Fault =
+    Fault { name: "SensorBreak", condition: Condition::new(0x5006), flags: Flags::sensor(5) };
+/// The pressure input is at a rail of the converter.
+const PRESSURE_RAIL: Fault =
+    Fault { name: "PressureRail", condition: Condition::new(0x8002), flags: Flags::sensor(4) };
+/// The temperature is not measured.
+const TEMPERATURE_RAIL: Fault =
+    Fault { name: "TemperatureRail", condition: Condition::new(0x8001), flags: Flags::sensor(3) };
+
+/// All of them.
+pub const FAULTS: &[Fault] = &[SENSOR_BREAK, PRESSURE_RAIL, TEMPERATURE_RAIL];
+
+impl Conditions {
+    /// Calls `each` with every fault, and whether it is there.
+    pub(super) fn faults(self, each: &mut impl FnMut(&'static Fault, bool)) {
+        each(&SENSOR_BREAK, self.sensor_break);
+        each(&PRESSURE_RAIL, self.pressure_rail);
+        each(&TEMPERATURE_RAIL, self.temperature_rail);
+    }
+}
+
+/// Where the flags are.
+#[derive(Debug)]
+pub(super) struct FlagFields {
+    sensor: Field,
+    internal: Field,
+    system: Field,
+    summary: Field,
+}
+
+impl FlagFields {
+    pub(super) const fn new(d: &Dictionary) -> FlagFields {
+        FlagFields {
+            sensor: d.field(0x3000, 1),
+            internal: d.field(0x3000, 2),
+            system: d.field(0x3000, 3),
+            summary: d.field(0x1002, 0),
+        }
+    }
+
+    /// Writes the flags and their summary: bit 0 any sensor error, bit 1 any internal protocol error (there is none),
+    /// bit 2 any system error.
+    pub(super) fn show(&self, flags: Flags, image: &mut [u8]) {
+        let summary = u32::from(flags.sensor != 0) | u32::from(flags.system != 0) << 2;
+        self.sensor.store(image, flags.sensor.to_le_bytes());
+        self.internal.store(image, [0; 4]);
+        self.system.store(image, flags.system.to_le_bytes());
+        self.summary.store(image, summary.to_le_bytes());
+    }
+}

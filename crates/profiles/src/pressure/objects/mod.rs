@@ -1,0 +1,98 @@
+//! What the transmitter means on the bus: its objects, and how measured values and parameters come in and out of them.
+
+pub(crate) mod calibration;
+mod faults;
+mod manufacturer;
+mod pdos;
+mod profile;
+mod rules;
+mod values;
+
+pub(crate) use calibration::{CALIBRATION, Places};
+pub use faults::FAULTS;
+pub(crate) use faults::SENSOR_BREAK;
+pub(crate) use manufacturer::{STATUS_AND_USER, STATUS_REGISTER};
+pub(crate) use profile::{INTEGER, REAL};
+pub use values::Fields;
+
+use canopen::dictionary::{self, Dictionary, Entry, Object};
+use canopen::sdo::Abort;
+
+use super::{Parameters, Snapshot, Transmitter};
+use crate::communication::{device_name, device_type, error_behaviour};
+use crate::fault::{Fault, Flags};
+use crate::profile::Profile;
+
+/// CiA 404, two analogue input blocks.
+pub(crate) const DEVICE_TYPE: i64 = 0x0002_0194;
+
+static PDOS: [Object; dictionary::count(pdos::PARTS)] = dictionary::gather(pdos::PARTS);
+
+/// The rows of the transmitter as a device of its own, but for those that all devices have.
+pub const ROWS: &[&[Object]] = &[
+    &[device_type(DEVICE_TYPE)],
+    STATUS_REGISTER,
+    &[device_name("STM32F4 pressure transmitter")],
+    &error_behaviour(0),
+    &PDOS,
+    CALIBRATION,
+    STATUS_AND_USER,
+    REAL,
+    INTEGER,
+];
+
+/// Where the values are in the image of that device.
+#[must_use]
+pub const fn fields(dictionary: &Dictionary) -> Fields {
+    Fields::new(dictionary, 0)
+}
+
+/// Whether a write to this object is decided on here.
+#[must_use]
+pub const fn handles(index: u16, sub: u8) -> bool {
+    handles_shifted(index, sub, 0)
+}
+
+/// The same where the objects of the device profile have their index plus `shift`.
+pub(crate) const fn handles_shifted(index: u16, sub: u8, shift: u16) -> bool {
+    rules::Rule::shifted(index, sub, shift).is_some()
+}
+
+/// The protocol half of the transmitter.
+#[derive(Debug)]
+pub struct Objects {
+    fields: &'static Fields,
+}
+
+impl Profile for Objects {
+    type Chain = Transmitter;
+    type Fields = Fields;
+
+    fn new(fields: &'static Fields) -> Objects {
+        Objects { fields }
+    }
+
+    fn parameters(&self, image: &[u8]) -> Parameters {
+        self.fields.parameters(image)
+    }
+
+    fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+        self.fields.publish(snapshot, image);
+    }
+
+    fn handles(&self, index: u16, sub: u8) -> bool {
+        handles_shifted(index, sub, self.fields.shift)
+    }
+
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        self.fields.write(entry, bytes, image)
+    }
+
+    fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {
+        snapshot.conditions.faults(each);
+    }
+
+    fn show_flags(&self, flags: Flags, image: &mut [u8]) {
+        self.fields.flags.show(flags, image);
+    }
+}

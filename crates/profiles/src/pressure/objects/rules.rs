@@ -1,0 +1,72 @@
+//! What a write to an object of the transmitter means beyond storing a value.
+
+use super::Fields;
+use super::calibration;
+use crate::pressure::{STATUS_INVALID, Unit};
+use canopen::dictionary::Entry;
+use canopen::sdo::Abort;
+
+/// The rules of the transmitter's own objects.
+#[derive(Clone, Copy)]
+pub(super) enum Rule {
+    /// 6125h: the present process value becomes 0.
+    Autozero,
+    /// 6131h:1 takes units of a pressure.
+    PressureUnit,
+    /// 6131h:2 takes units of a temperature.
+    TemperatureUnit,
+    /// 2200h to 2203h.
+    Calibration(calibration::Rule),
+}
+
+impl Rule {
+    /// The rule of an object of the device profile, by its index without a shift, or of the manufacturer's range.
+    pub(super) const fn of(index: u16, sub: u8) -> Option<Rule> {
+        match (index, sub) {
+            (0x6125, 1..) => Some(Rule::Autozero),
+            (0x6131, 1) => Some(Rule::PressureUnit),
+            (0x6131, 2) => Some(Rule::TemperatureUnit),
+            _ => match calibration::Rule::of(index, sub) {
+                Some(rule) => Some(Rule::Calibration(rule)),
+                None => None,
+            },
+        }
+    }
+
+    /// The same where the objects of the device profile have their index plus `shift`.
+    pub(super) const fn shifted(index: u16, sub: u8, shift: u16) -> Option<Rule> {
+        if index < 0x6000 { Rule::of(index, sub) } else { Rule::of(index.wrapping_sub(shift), sub) }
+    }
+}
+
+/// What 6125h takes: "zero".
+const ZERO_SIGNATURE: [u8; 4] = *b"zero";
+
+impl Fields {
+    /// Decides on a write to an object with one of the rules above.
+    pub(super) fn write(&self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        let code = bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+        let is_known = match Rule::shifted(entry.index(), entry.sub(), self.shift) {
+            Some(Rule::Autozero) => return self.autozero(entry.sub(), bytes, image),
+            Some(Rule::Calibration(rule)) => return self.calibration.write(rule, entry, bytes, image),
+            Some(Rule::PressureUnit) => Unit::pressure(code).is_some(),
+            Some(Rule::TemperatureUnit) => Unit::temperature(code).is_some(),
+            None => true,
+        };
+        if is_known { Ok(()) } else { Err(Abort::InvalidValue) }
+    }
+
+    /// Moves the offset so that the present process value becomes 0. A value that is not valid is no reference.
+    fn autozero(&self, sub: u8, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if bytes != ZERO_SIGNATURE {
+            return Err(Abort::NotStored);
+        }
+        let channel = if sub == 1 { &self.pressure } else { &self.temperature };
+        if channel.status.u8(image) & STATUS_INVALID != 0 {
+            return Err(Abort::DeviceState);
+        }
+        let offset = channel.offset.f32(image) - channel.process_value.f32(image);
+        channel.offset.store(image, offset.to_le_bytes());
+        Ok(())
+    }
+}

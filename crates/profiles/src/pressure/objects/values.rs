@@ -1,0 +1,116 @@
+//! Measured values into the image, parameters out of it.
+
+use super::calibration::Places;
+use super::faults::FlagFields;
+use crate::pressure::{ChannelParameters, ChannelValues, Parameters, Snapshot, Span, Unit};
+use canopen::dictionary::{Dictionary, Field};
+
+/// Where the values of one channel are.
+#[derive(Debug)]
+pub(super) struct Channel {
+    field_value: Field,
+    pub(super) process_value: Field,
+    process_value16: Field,
+    process_value32: Field,
+    pub(super) status: Field,
+    pub(super) offset: Field,
+    scaling_factor: Field,
+    scaling_offset: Field,
+    unit: Field,
+    digits: Field,
+    span: Span<Field>,
+    span16: Span<Field>,
+    span32: Span<Field>,
+    filter_type: Field,
+    filter_constant: Field,
+}
+
+/// Where the transmitter's values are in the image of a dictionary that has its objects.
+#[derive(Debug)]
+pub struct Fields {
+    pub(super) pressure: Channel,
+    pub(super) temperature: Channel,
+    pub(super) calibration: Places,
+    pub(super) flags: FlagFields,
+    /// Added to the index of every object of the profile.
+    pub(super) shift: u16,
+}
+
+impl Channel {
+    const fn new(d: &Dictionary, shift: u16, sub: u8) -> Channel {
+        Channel {
+            field_value: d.field(0x6100 + shift, sub),
+            process_value: d.field(0x6130 + shift, sub),
+            process_value16: d.field(0x7130 + shift, sub),
+            process_value32: d.field(0x9130 + shift, sub),
+            status: d.field(0x6150 + shift, sub),
+            offset: d.field(0x6124 + shift, sub),
+            scaling_factor: d.field(0x6126 + shift, sub),
+            scaling_offset: d.field(0x6127 + shift, sub),
+            unit: d.field(0x6131 + shift, sub),
+            digits: d.field(0x6132 + shift, sub),
+            span: Span { start: d.field(0x6148 + shift, sub), end: d.field(0x6149 + shift, sub) },
+            span16: Span { start: d.field(0x7148 + shift, sub), end: d.field(0x7149 + shift, sub) },
+            span32: Span { start: d.field(0x9148 + shift, sub), end: d.field(0x9149 + shift, sub) },
+            filter_type: d.field(0x61A0 + shift, sub),
+            filter_constant: d.field(0x61A1 + shift, sub),
+        }
+    }
+
+    fn publish(&self, values: &ChannelValues, image: &mut [u8]) {
+        self.field_value.store(image, values.field_value.to_le_bytes());
+        self.process_value.store(image, values.process_value.to_le_bytes());
+        self.process_value16.store(image, values.process_value16.to_le_bytes());
+        self.process_value32.store(image, values.process_value32.to_le_bytes());
+        self.status.store(image, [values.status]);
+    }
+
+    fn parameters(&self, unit: Unit, image: &[u8]) -> ChannelParameters {
+        let [start16, end16] =
+            [self.span16.start, self.span16.end].map(|at| i16::from_le_bytes(at.load(image)));
+        let [start32, end32] =
+            [self.span32.start, self.span32.end].map(|at| i32::from_le_bytes(at.load(image)));
+        ChannelParameters {
+            filter_type: self.filter_type.u8(image),
+            filter_constant: self.filter_constant.u8(image),
+            scaling_factor: self.scaling_factor.f32(image),
+            scaling_offset: self.scaling_offset.f32(image),
+            unit,
+            offset: self.offset.f32(image),
+            digits: self.digits.u8(image),
+            span: Span { start: self.span.start.f32(image), end: self.span.end.f32(image) },
+            span16: Span { start: start16, end: end16 },
+            span32: Span { start: start32, end: end32 },
+        }
+    }
+}
+
+impl Fields {
+    /// Looks them up, during compilation; every object of the profile has its index plus `shift`.
+    pub(crate) const fn new(d: &Dictionary, shift: u16) -> Fields {
+        Fields {
+            pressure: Channel::new(d, shift, 1),
+            temperature: Channel::new(d, shift, 2),
+            calibration: Places::new(d),
+            flags: FlagFields::new(d),
+            shift,
+        }
+    }
+
+    /// Takes a snapshot into the image.
+    pub(crate) fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+        self.pressure.publish(&snapshot.pressure, image);
+        self.temperature.publish(&snapshot.temperature, image);
+    }
+
+    /// The parameters in the image. A unit that no write could have put there acts as the default one.
+    pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
+        let pressure = Unit::pressure(self.pressure.unit.u32(image)).unwrap_or(Unit::BAR);
+        let temperature = Unit::temperature(self.temperature.unit.u32(image)).unwrap_or(Unit::CELSIUS);
+        Parameters {
+            pressure: self.pressure.parameters(pressure, image),
+            temperature: self.temperature.parameters(temperature, image),
+            calibration: self.calibration.calibration(image),
+        }
+    }
+}

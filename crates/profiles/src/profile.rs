@@ -1,0 +1,94 @@
+//! What a profile is: two halves that run in two priorities, and the two values that travel between them.
+//!
+//! ```text
+//!             sampling, once a millisecond            protocol, whenever a frame comes
+//! Inputs ──▶  Chain   ────── Snapshot ──────────────▶  Profile ──▶ image, Outputs
+//!                     ◀───── Parameters ─────────────
+//! ```
+
+use canopen::dictionary::Entry;
+use canopen::nmt::State;
+use canopen::sdo::Abort;
+
+use crate::board::{Inputs, Outputs, PositionInputs, PowerOn, RETAINED_WORDS};
+use crate::fault::{Fault, Flags};
+
+/// The sampling half: from what was read in a millisecond to what the profile measures. No dictionary, no bus, no clock.
+pub trait Chain {
+    /// All parameters, as one consistent set.
+    type Parameters;
+    /// All values of one millisecond, as one consistent set.
+    type Snapshot: Default;
+
+    /// After power-on. It measures from the first parameters on.
+    fn new(power_on: &PowerOn) -> Self;
+
+    /// Takes over parameters, from the next sample on.
+    fn apply(&mut self, parameters: &Self::Parameters);
+
+    /// Processes what was read in one millisecond. The snapshot is the last one, to be replaced in its place.
+    fn update(&mut self, inputs: &Inputs, snapshot: &mut Self::Snapshot);
+
+    /// How the board has to read the position sensors.
+    fn position_inputs(_parameters: &Self::Parameters) -> PositionInputs {
+        PositionInputs::default()
+    }
+
+    /// Writes what is to outlive a loss of power: [`PowerOn`] has it at the next start. `false` for a profile without such
+    /// values. In the place where they are needed, as this happens once a millisecond.
+    fn retain(&self, _words: &mut [u32; RETAINED_WORDS]) -> bool {
+        false
+    }
+}
+
+/// The protocol half: what the objects of the profile mean.
+pub trait Profile: Sized {
+    /// The other half.
+    type Chain: Chain;
+    /// Where the values of its objects are in the image of a dictionary.
+    type Fields: 'static;
+
+    /// The profile in a dictionary.
+    fn new(fields: &'static Self::Fields) -> Self;
+
+    /// Fills in what no table can know, after every reset: what follows from the identity and from the parameters.
+    fn initialise(&mut self, _image: &mut [u8]) {}
+
+    /// The parameters in the image. A value that no write could have put there acts as a valid one.
+    fn parameters(&self, image: &[u8]) -> Parameters<Self>;
+
+    /// Takes what was measured into the image.
+    fn publish(&self, snapshot: &Snapshot<Self>, image: &mut [u8]);
+
+    /// Whether it decides on writes to this object. Of the profiles in one dictionary at most one does.
+    fn handles(&self, index: u16, sub: u8) -> bool;
+
+    /// Decides on a write to an object that it handles; type and limits are checked already. It may change other values;
+    /// the device stores the bytes afterwards.
+    ///
+    /// # Errors
+    /// The reason to refuse it; nothing is stored then.
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort>;
+
+    /// An RPDO was received, or an object written: other outputs may follow.
+    fn received(&mut self, _image: &mut [u8]) {}
+
+    /// The NMT state is another one now.
+    fn state(&mut self, _state: State, _image: &mut [u8]) {}
+
+    /// Calls `each` with every fault that the profile can find, always in the same order, and whether the values show it.
+    fn faults(_snapshot: &Snapshot<Self>, _each: &mut impl FnMut(&'static Fault, bool)) {}
+
+    /// Shows which faults of the device are active, in a profile that has objects for them.
+    fn show_flags(&self, _flags: Flags, _image: &mut [u8]) {}
+
+    /// What the board has to show.
+    fn outputs(&self, _image: &[u8]) -> Outputs {
+        Outputs::default()
+    }
+}
+
+/// The parameters of a profile.
+pub type Parameters<P> = <<P as Profile>::Chain as Chain>::Parameters;
+/// The values that a profile measures.
+pub type Snapshot<P> = <<P as Profile>::Chain as Chain>::Snapshot;
