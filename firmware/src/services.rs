@@ -137,9 +137,7 @@ impl Services {
 
     /// Listens for the bit rate; goes on the bus when it is found.
     fn search(&mut self, node: &mut impl Shared) {
-        let has_frame = self.frames.dequeue().is_some();
-        if self.rate.go_on(&mut self.can, has_frame, Clock::now()) {
-            while self.frames.dequeue().is_some() {}
+        if self.rate.go_on(&mut self.can, &mut self.frames, Clock::now()) {
             let next = self.join(node);
             let _ = self.settle(next, node);
         }
@@ -225,7 +223,7 @@ impl Services {
     fn go_on_bus(&mut self, node: &mut impl Shared) -> bool {
         node.call(|_, queue| queue.clear());
         let Rate::Known(timing) = self.rate else {
-            self.rate.search(&mut self.can, Clock::now());
+            self.rate.search(&mut self.can, &mut self.frames, Clock::now());
             return false;
         };
         defmt::info!("on the bus at {=u16} kbit/s", timing.kbit());

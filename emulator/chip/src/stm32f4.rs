@@ -112,10 +112,16 @@ impl Stm32f4 {
         self.record.list()
     }
 
+    /// How many aborts of CAN1 are still to come too late.
+    pub fn late_aborts(&self) -> usize {
+        self.can.can1.transmitter.late_aborts
+    }
+
     /// Has the next events of a kind get lost.
     pub fn lose(&mut self, loss: Loss, times: usize) {
         match loss {
-            Loss::TransmitComplete => self.can.can1.transmitter.to_lose += times,
+            Loss::TransmitComplete => self.can.can1.transmitter.lost_ends += times,
+            Loss::Abort => self.can.can1.transmitter.late_aborts += times,
             _ => self.losses.add(loss, times),
         }
     }
