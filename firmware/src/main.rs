@@ -117,7 +117,6 @@ mod app {
         let keeper = Keeper::new(store, cx.local.job.write(StoreJob::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let findings = Findings { crashed, no_store: !keeper.is_working() };
-        remembering::report_battery(board.reset_cause, &board.found);
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = Surroundings { watchdog_reset, ..Surroundings::default() };
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);
@@ -138,7 +137,12 @@ mod app {
             front_end: board.front_end,
             shaft: Shaft::new(board.ssi, surroundings),
             buttons: board.buttons,
-            measurement: remembering::make(cx.local.measurement_place, setup.personality, &board.found),
+            measurement: remembering::make(
+                cx.local.measurement_place,
+                setup.personality,
+                board.reset_cause,
+                &board.found,
+            ),
             transmitter: board.transmitter,
             time: board.time,
             process: Process::new(process_frames, process_alarm, board.lamps, lost),

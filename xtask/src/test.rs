@@ -22,6 +22,7 @@ fn run_all(steps: &mut Steps) -> Result<()> {
     steps.run("images", || images::build().map(|_| ()))?;
     steps.run("lint images", lint_images)?;
     steps.run("other chips", other_chips)?;
+    steps.run("embassy", embassy)?;
     steps.run("no panic", no_panic)?;
     steps.run("no panic in the images", callgraph::check_panics)?;
     steps.run("stack", || callgraph::stack(false))?;
@@ -77,6 +78,14 @@ fn other_chips() -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The library in an async main for the target. It is never run.
+fn embassy() -> Result<()> {
+    let example = ["--release", "-p", "canopen-device", "--example", "embassy"];
+    let scripts = root().join("crates/canopen/examples/embassy");
+    let search = format!("-Clink-arg=-L{}", scripts.display());
+    run(Toolchain::ensure()?.cargo("rustc", &example).args(["--", "-Clink-arg=-Tlink.x", &search]))
 }
 
 /// Links everything that comes from the bus with a panic handler that cannot link; and shows that it would not link.

@@ -58,7 +58,7 @@ impl Format {
 
     /// Bytes that a value takes up: whole units.
     pub(crate) fn padded(self, len: u32) -> u32 {
-        len.next_multiple_of(self.unit)
+        len.checked_next_multiple_of(self.unit).unwrap_or(len)
     }
 }
 

@@ -22,6 +22,7 @@ use crate::peripherals::{Effect, IrqLines};
 use crate::plant::Plant;
 use crate::pwr::Pwr;
 use crate::rcc::{Cause, Rcc};
+use crate::rules::Rules;
 use crate::spi::{Spi, Ssi};
 use crate::syscfg::Syscfg;
 use crate::timer::Timer;
@@ -59,6 +60,7 @@ pub struct Stm32f4 {
     pub(crate) clocks: Clocks,
     pub(crate) effects: VecDeque<Effect>,
     pub(crate) record: Record,
+    pub(crate) rules: Rules,
     pub(crate) losses: Losses,
     /// The reset that the chip itself has asked for.
     pub(crate) asked: Option<Cause>,
@@ -94,6 +96,7 @@ impl Stm32f4 {
             clocks,
             effects: VecDeque::new(),
             record: Record::default(),
+            rules: Rules::default(),
             losses: Losses::default(),
             asked: None,
             lines: IrqLines::default(),
