@@ -12,7 +12,7 @@ use bsp::{Clock, Received, retained};
 use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
 use update::{Next, Phase, Updater};
 
-use crate::dictionary::{DICTIONARY, IMAGE_SIZE};
+use crate::dictionary::{DICTIONARY, ROWS};
 use crate::outbox::Outbox;
 use crate::program::Program;
 use crate::start::Reason;
@@ -31,7 +31,7 @@ const FAREWELL: Duration = Duration::from_millis(20);
 
 /// Everything but the queues.
 pub(crate) struct Session {
-    device: Device<Program, IMAGE_SIZE>,
+    device: canopen::device!(Program, ROWS),
     can: Controller,
     timing: BitTiming,
     back_off: BackOff,

@@ -1,5 +1,6 @@
 //! At which bit rate the node runs: the configured one, or the one that a silent search finds.
 
+use bsp::Frames;
 use bsp::bit_rate_detection::{Detector, Heard, Step};
 use bsp::bit_timing::BitTiming;
 use bsp::can::Controller;
@@ -26,26 +27,35 @@ impl Rate {
     }
 
     /// Begins the search.
-    pub(crate) fn search(&mut self, can: &mut Controller, now: Instant) {
+    pub(crate) fn search(&mut self, can: &mut Controller, frames: &mut Frames, now: Instant) {
         defmt::info!("looking for the bit rate");
         let detector = Detector::new(now);
         can.listen(detector.timing());
+        drop_all(frames);
         *self = Rate::Searched(detector);
     }
 
-    /// Goes on with the search, if one is going on. True when it has come to its end.
-    pub(crate) fn go_on(&mut self, can: &mut Controller, has_frame: bool, now: Instant) -> bool {
+    /// Goes on with the search, if one is going on. True when the search has come to its end. Takes all frames.
+    ///
+    /// A frame counts for the rate at which the controller has listened to it. The controller changes its rate at the end of the
+    /// frame that is on the bus, so the last frame of a rate may come when the change is already asked for.
+    pub(crate) fn go_on(&mut self, can: &mut Controller, frames: &mut Frames, now: Instant) -> bool {
         let Rate::Searched(detector) = self else { return false };
-        let heard = if has_frame { Heard::Frame } else { can.heard() };
+        let heard = if frames.dequeue().is_some() { Heard::Frame } else { can.heard() };
         match detector.step(heard, now) {
             Step::Stay => return false,
             Step::Listen(timing) => can.listen(timing),
             Step::Found(timing) => *self = Rate::Known(timing),
         }
+        drop_all(frames);
         matches!(self, Rate::Known(_))
     }
 
     pub(crate) fn is_searched(&self) -> bool {
         matches!(self, Rate::Searched(_))
     }
+}
+
+fn drop_all(frames: &mut Frames) {
+    while frames.dequeue().is_some() {}
 }

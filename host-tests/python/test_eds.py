@@ -1,6 +1,7 @@
 """Every EDS is read by the importers that registries offer: python-canopen and Lely's dcf-tools (PyPI), canopen (npm)."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 import canopen
 import pytest
 from canopen import objectdictionary as od
+from simulator import PATIENCE, Master, Simulator
 
 ROOT = Path(__file__).parents[2]
 SHEETS = sorted((ROOT / "eds").glob("*.eds"))
@@ -73,3 +75,27 @@ def test_canopen_of_npm_has_every_entry(path: Path, npm: Path):
     done = subprocess.run(["node", "-e", SCRIPT, npm, path], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["count"] == entries(path)
+
+
+def check(path: Path) -> None:
+    checker = Path(sys.executable).with_name("dcfchk")
+    done = subprocess.run([checker, path], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_a_dump_of_a_node_is_read_by_all(simulator: Simulator, npm: Path, tmp_path: Path):
+    """`nodectl dump` writes a DCF (CiA 306): the data sheet with the values of one node."""
+    path = tmp_path / "node.dcf"
+    Master(simulator).close()
+    bus = f"socketcand://127.0.0.1:{simulator.socketcand}/vcan0"
+    command = [os.environ["NODECTL_COMMAND"], "--bus", bus, "--node", "1"]
+    for arguments in (["write", "1017", "500"], ["write", "6124:1", "0.25"], ["dump", str(path)]):
+        subprocess.run([*command, *arguments], check=True, stdout=subprocess.DEVNULL, timeout=PATIENCE)
+    check(path)
+    dictionary = canopen.import_od(str(path))
+    assert dictionary.node_id == 1
+    assert (dictionary[0x1017].value, dictionary[0x1017].default) == (500, 1000)
+    done = subprocess.run(["node", "-e", SCRIPT, npm, path], capture_output=True, text=True, check=False)
+    assert json.loads(done.stdout)["count"] == entries(path)
+    # Lely reads the bits of a real number.
+    assert "ParameterValue=0x3E800000" in path.read_text(encoding="utf-8")

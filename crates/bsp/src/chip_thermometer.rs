@@ -30,7 +30,7 @@ impl Calibration {
 mod tests {
     use super::*;
 
-    fn kelvin(calibration: &Calibration, sensor: f32, reference: f32) -> f32 {
+    fn kelvin(calibration: Calibration, sensor: f32, reference: f32) -> f32 {
         let (offset, slope) = calibration.line();
         offset + slope * sensor / reference
     }
@@ -39,8 +39,8 @@ mod tests {
     fn both_points_are_on_the_line_at_any_supply() {
         let own = Calibration { temperature_30: 940, temperature_110: 1210, reference: 1500 };
         for supply in [0.5, 1.0, 1.1] {
-            assert!((kelvin(&own, 940.0 / supply, 1500.0 / supply) - 303.15).abs() < 1e-3);
-            assert!((kelvin(&own, 1210.0 / supply, 1500.0 / supply) - 383.15).abs() < 1e-3);
+            assert!((kelvin(own, 940.0 / supply, 1500.0 / supply) - 303.15).abs() < 1e-3);
+            assert!((kelvin(own, 1210.0 / supply, 1500.0 / supply) - 383.15).abs() < 1e-3);
         }
     }
 
@@ -48,7 +48,7 @@ mod tests {
     fn a_chip_without_two_points_has_no_line() {
         for code in [0, 1000, 0xFFFF] {
             let own = Calibration { temperature_30: code, temperature_110: code, reference: 1500 };
-            assert!(!kelvin(&own, 1000.0, 1500.0).is_finite());
+            assert!(!kelvin(own, 1000.0, 1500.0).is_finite());
         }
     }
 }

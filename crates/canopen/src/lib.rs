@@ -1,13 +1,4 @@
-//! Sans-IO CANopen (CiA 301, 305): frame and time in, frames and the next deadline out.
-//!
-//! [`Device`] is a whole CANopen device. It owns its protocols and the values of its object dictionary; what the
-//! dictionary contains is a table ([`dictionary`](mod@dictionary)), and what the device does beyond CANopen is its [`Application`].
-//! Each message of the protocol has a type that can only be valid, with `parse` and `encode`.
-//!
-//! Nothing here reads a clock, blocks, allocates or panics, whatever arrives from the bus.
-//!
-//! `#[inline(never)]` is there for the size: on what many places call, and on what most frames do not need. What it is
-//! worth, `cargo xtask bench` counts.
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
@@ -22,6 +13,7 @@ pub mod eds;
 pub mod embedded_can;
 pub mod emcy;
 mod frame;
+pub mod guide;
 mod heartbeat;
 pub mod lss;
 pub mod nmt;

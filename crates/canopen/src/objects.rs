@@ -22,6 +22,9 @@
 //! assert_eq!(DICTIONARY.find(0x1A00, 1).map(|entry| entry.index()), Ok(0x1A00));
 //! ```
 
+// The rows of an object are at most 128.
+#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
+
 use crate::dictionary::{Access, DefaultValue, Group, Object, Type};
 use crate::pdo::MappedObject;
 

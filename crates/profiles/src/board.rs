@@ -129,12 +129,15 @@ pub struct PowerOn {
     pub thermometer: ChipThermometer,
     /// What has outlived the loss of power.
     pub retained: Retained,
+    /// The main supply was gone, and the battery has not kept the memory: the battery is empty or missing, or the board is new.
+    /// `false` also where the main supply was never gone, so that nothing can be said of the battery.
+    pub battery_failed: bool,
 }
 
 impl Default for PowerOn {
     /// A new board, whose chip has no calibration.
     fn default() -> PowerOn {
-        PowerOn { thermometer: ChipThermometer::UNKNOWN, retained: Retained::Nothing }
+        PowerOn { thermometer: ChipThermometer::UNKNOWN, retained: Retained::Nothing, battery_failed: false }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::loss::Loss;
 use crate::map::{self, Block, Unit};
 use crate::peripherals::BusFault;
 use crate::rcc::Rcc;
+use crate::rules::Breach;
 use crate::signature;
 use crate::stm32f4::Stm32f4;
 use crate::unmodelled::{Direction, Reason};
@@ -75,13 +76,29 @@ impl Stm32f4 {
             _ if block.has_byte_lanes() => lane.insert(self.load_word(block, offset, now), value),
             _ => lane.repeat(value),
         };
-        match self.write_unit(block.unit, offset, word, now) {
+        let done = self.write_unit(block.unit, offset, word, now);
+        self.check_rules(block.unit, offset, word);
+        match done {
             Err(Refusal::NotModelled) => self.note(block, offset, Direction::Write, Reason::NotModelled),
             Err(Refusal::Protected) => self.note(block, offset, Direction::Write, Reason::Protected),
             Err(Refusal::Bus) => return Err(BusFault),
             Ok(()) => {}
         }
         Ok(())
+    }
+
+    /// After a store that rules may be about.
+    fn check_rules(&mut self, unit: Unit, offset: u32, value: u32) {
+        match unit {
+            // CAN_MCR: neither INRQ nor SLEEP.
+            Unit::Can(0) if offset == 0 && value & 0b11 == 0 => self.check_can(),
+            Unit::Rcc | Unit::Pwr | Unit::Flash => {
+                self.rules.conversions_checked = false;
+                self.check_clocks();
+            }
+            Unit::Adc | Unit::AdcCommon | Unit::Gpio(_) => self.rules.conversions_checked = false,
+            _ => {}
+        }
     }
 
     fn load_word(&mut self, block: &Block, offset: u32, now: Time) -> u32 {
@@ -100,6 +117,11 @@ impl Stm32f4 {
     }
 
     fn note(&mut self, block: &Block, offset: u32, direction: Direction, reason: Reason) {
+        match reason {
+            Reason::ClockOff => self.rules.check(false, Breach::ClockOff { name: block.name }),
+            Reason::Protected => self.rules.check(false, Breach::Protected { name: block.name }),
+            Reason::NotModelled => {}
+        }
         self.record.add(block.name, block.base, offset, direction, reason);
     }
 

@@ -43,6 +43,7 @@ impl Stm32f4 {
         let core_changed = clocks.hclk != self.clocks.hclk;
         self.clocks = clocks;
         self.apply_clocks(now);
+        self.check_clocks();
         if core_changed {
             self.announce_clock();
         }

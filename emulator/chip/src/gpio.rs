@@ -111,6 +111,11 @@ impl Gpio {
         self.mode(pin) == Mode::Alternate && field(self.plain.get(register), pin % 8 * 4, 4) == function
     }
 
+    /// Whether a pin is switched to its analogue function.
+    pub(crate) fn is_analogue(&self, pin: u32) -> bool {
+        self.mode(pin) == Mode::Analog
+    }
+
     /// The level that the input stage sees.
     pub(crate) fn level(&self, pin: u32, outside: Outside) -> bool {
         if self.mode(pin) == Mode::Analog {

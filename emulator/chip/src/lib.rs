@@ -9,6 +9,7 @@
 //! | `stm32f4`, `schedule`, `clock_and_reset` | the peripherals together: time, interrupt lines, clocks, resets |
 //! | `converter`, `pins` | what crosses peripherals: timer to ADC to DMA to memory; encoders and buttons to their pins |
 //! | one file or folder each | the peripherals, which know nothing of each other |
+//! | `rules` | what silicon does not forgive: clocks, wait states, pins, sampling times |
 //! | `loss` | events that a test has the chip lose |
 //! | `plant` | pressure, temperature, shaft, buttons, faults and the board's analogue front end |
 //!
@@ -43,6 +44,7 @@ pub mod plant;
 mod pwr;
 mod rcc;
 mod register;
+mod rules;
 mod schedule;
 mod signature;
 mod spi;
@@ -57,6 +59,7 @@ pub use clocks::Clocks;
 pub use flash::Flash;
 pub use loss::Loss;
 pub use peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
+pub use rules::Breach;
 pub use stm32f4::Stm32f4;
 pub use unmodelled::{Direction, Reason, Unmodelled};
 pub use variant::{FLASH_BASE, Variant};

@@ -19,6 +19,9 @@ pub enum Loss {
     },
     /// The end of a transmission of CAN1: the frame was sent, its flag stays down.
     TransmitComplete,
+    /// The moment at which CAN1 could have given up a frame: the transmission of the frame begins just before the abort request, so the
+    /// end of the transmission decides.
+    Abort,
     /// A store into the backup SRAM.
     BackupStore,
 }

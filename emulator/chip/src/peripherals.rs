@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use canbus::Time;
 
+use crate::rules::Breach;
+
 /// Levels of the chip's interrupt lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct IrqLines {
@@ -79,6 +81,11 @@ pub trait Peripherals {
 
     /// The interrupt lines now.
     fn lines(&self) -> IrqLines;
+
+    /// Takes the next rule that was found broken, each once.
+    fn breach(&mut self) -> Option<Breach> {
+        None
+    }
 
     /// Takes the next effect that earlier calls asked for.
     fn effect(&mut self) -> Option<Effect>;

@@ -33,6 +33,25 @@ impl Pwr {
         self.keep_backup(keeps);
     }
 
+    /// The scale of the voltage of the core, 1 to 3 (RM0390 and RM0090 section 5.4.1, VOS).
+    pub(crate) fn scale(&self) -> u32 {
+        let control = self.plain.get(CR);
+        match control >> 14 & 0b11 {
+            0b11 => 1,
+            0b10 => 2,
+            0b01 if self.over_drive => 3,
+            // The F405 has one bit.
+            0b01 => 1,
+            _ if self.over_drive => 3,
+            _ => 2,
+        }
+    }
+
+    /// Whether the core is switched to over-drive: ODEN and ODSWEN.
+    pub(crate) fn over_drives(&self) -> bool {
+        self.over_drive && self.plain.get(CR) >> 16 & 0b11 == 0b11
+    }
+
     /// Whether the backup SRAM can be written.
     pub(crate) fn backup_is_writable(&self) -> bool {
         bit(self.plain.get(CR), DBP)

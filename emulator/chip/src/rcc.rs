@@ -337,6 +337,14 @@ impl Rcc {
         }
     }
 
+    /// Input and VCO of the PLL in hertz, while it is on.
+    pub(crate) fn pll(&self) -> Option<(u64, u64)> {
+        let config = self.plain.get(PLLCFGR);
+        let source = if bit(config, 22) { self.hse_hertz.unwrap_or(HSI_HERTZ) } else { HSI_HERTZ };
+        let input = source / u64::from(field(config, 0, 6).max(1));
+        self.sources[PLL].on.then_some((input, input * u64::from(field(config, 6, 9))))
+    }
+
     fn system_clock(&self) -> u64 {
         match self.in_use {
             0 => HSI_HERTZ,

@@ -8,6 +8,7 @@ use crate::loss::Loss;
 use crate::map::{ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS};
 use crate::peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
 use crate::rcc::Cause;
+use crate::rules::Breach;
 use crate::spi::Far;
 use crate::stm32f4::Stm32f4;
 use crate::timer::Timer;
@@ -57,6 +58,10 @@ impl Peripherals for Stm32f4 {
             irqs.iter().zip([tx, rx0, rx1, sce]).for_each(|(&irq, level)| lines.set(irq, level));
         }
         lines
+    }
+
+    fn breach(&mut self) -> Option<Breach> {
+        self.rules.take()
     }
 
     fn effect(&mut self) -> Option<Effect> {

@@ -22,6 +22,7 @@ use crate::peripherals::{Effect, IrqLines};
 use crate::plant::Plant;
 use crate::pwr::Pwr;
 use crate::rcc::{Cause, Rcc};
+use crate::rules::Rules;
 use crate::spi::{Spi, Ssi};
 use crate::syscfg::Syscfg;
 use crate::timer::Timer;
@@ -59,6 +60,7 @@ pub struct Stm32f4 {
     pub(crate) clocks: Clocks,
     pub(crate) effects: VecDeque<Effect>,
     pub(crate) record: Record,
+    pub(crate) rules: Rules,
     pub(crate) losses: Losses,
     /// The reset that the chip itself has asked for.
     pub(crate) asked: Option<Cause>,
@@ -94,6 +96,7 @@ impl Stm32f4 {
             clocks,
             effects: VecDeque::new(),
             record: Record::default(),
+            rules: Rules::default(),
             losses: Losses::default(),
             asked: None,
             lines: IrqLines::default(),
@@ -109,10 +112,16 @@ impl Stm32f4 {
         self.record.list()
     }
 
+    /// How many aborts of CAN1 are still to come too late.
+    pub fn late_aborts(&self) -> usize {
+        self.can.can1.transmitter.late_aborts
+    }
+
     /// Has the next events of a kind get lost.
     pub fn lose(&mut self, loss: Loss, times: usize) {
         match loss {
-            Loss::TransmitComplete => self.can.can1.transmitter.to_lose += times,
+            Loss::TransmitComplete => self.can.can1.transmitter.lost_ends += times,
+            Loss::Abort => self.can.can1.transmitter.late_aborts += times,
             _ => self.losses.add(loss, times),
         }
     }

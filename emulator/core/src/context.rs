@@ -39,6 +39,9 @@ const IT: u32 = 0x0600_FC00;
 const SPSEL: u32 = 1 << 1;
 const FPCA: u32 = 1 << 2;
 
+/// CCR: Thread mode may be entered while exceptions are active.
+const NONBASETHRDENA: u32 = 1 << 0;
+
 /// EXC_RETURN: no floating-point registers in the frame; return to Thread mode; return to the process stack.
 const NO_FLOATS: u32 = 1 << 4;
 const TO_THREAD: u32 = 1 << 3;
@@ -135,7 +138,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     pub(crate) fn leave(&mut self) {
         let exc_return = self.register(RegisterARM::PC) | 1;
         let ending = Exception((self.register(RegisterARM::XPSR) & 0x7F) as u8);
-        if !self.cpu.get_data().nvic.is_active(ending) || exc_return & 0xFFFF_FFE0 != 0xFFFF_FFE0 {
+        if !self.may_return(ending, exc_return) {
             return self.take_fault(Fault::bad_return(exc_return));
         }
         let core = self.cpu.get_data_mut();
@@ -150,6 +153,17 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
         self.pop_frame(exc_return);
         self.cpu.get_data_mut().spend(0, cost::EXIT);
+    }
+
+    /// The checks of an exception return (ARMv7-M, B1.5.8): the exception is active, the value is one of six, and it leads to
+    /// Thread mode if and only if nothing else is active.
+    fn may_return(&self, ending: Exception, exc_return: u32) -> bool {
+        let core = self.cpu.get_data();
+        let is_valid = matches!(exc_return | NO_FLOATS, 0xFFFF_FFF1 | 0xFFFF_FFF9 | 0xFFFF_FFFD);
+        let to_thread = exc_return & TO_THREAD != 0;
+        let is_last = core.nvic.active_count() == 1;
+        let fits = to_thread == is_last || to_thread && core.scb.ccr & NONBASETHRDENA != 0;
+        is_valid && fits && core.nvic.is_active(ending)
     }
 
     /// The exception that follows without unstacking.

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use canbus::Time;
-use chip::{Effect, Peripherals};
+use chip::{Breach, Effect, Peripherals};
 
 use crate::cost::Costs;
 use crate::exception::Exception;
@@ -31,6 +31,8 @@ pub(crate) enum Halt {
     Breakpoint,
     /// An exception of the CPU library's own, such as an access that it forbids.
     Undefined,
+    /// A usage fault with this status, seen before the instruction runs.
+    Usage(u32),
     /// A data access that nothing answers, seen by the chip or by the system space.
     DataFault(u32),
 }
@@ -62,6 +64,10 @@ pub(crate) struct Core<P> {
     pub(crate) stepping: Option<Stepping>,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
+    /// Rules that were found broken: when, and where the program was.
+    pub(crate) breaches: VecDeque<(Time, u32, Breach)>,
+    /// The code that was charged last.
+    pub(crate) place: u32,
     pub(crate) effects: VecDeque<Effect>,
     /// When an exception became pending, for its latency.
     pub(crate) pended: [Time; Exception::COUNT],
@@ -103,6 +109,8 @@ impl<P: Peripherals> Core<P> {
             stepping: None,
             halt: None,
             unmapped: None,
+            breaches: VecDeque::new(),
+            place: 0,
             effects: VecDeque::new(),
             pended: [Time::ZERO; Exception::COUNT],
             costs: Costs::default(),
@@ -165,10 +173,18 @@ impl<P: Peripherals> Core<P> {
         while let Some(effect) = self.chip.effect() {
             self.effects.push_back(effect);
         }
+        while let Some(breach) = self.chip.breach() {
+            self.report(breach);
+        }
         let before = self.nvic.pending_set();
         self.nvic.sample(self.chip.lines());
         self.stamp(self.nvic.pending_set() & !before);
         self.due = self.deadline();
+    }
+
+    /// A rule is broken, here and now.
+    pub(crate) fn report(&mut self, breach: Breach) {
+        self.breaches.push_back((self.now, self.place, breach));
     }
 
     pub(crate) fn pend(&mut self, exception: Exception) {
@@ -195,6 +211,8 @@ impl<P: Peripherals> Core<P> {
     pub(crate) fn set_clock(&mut self, hertz: u64) {
         let count = self.cyccnt();
         self.cycle = Time::of_cycle(hertz.max(1));
+        self.systick.change_clock(self.now, self.cycle);
+        self.due = self.deadline();
         self.set_cyccnt(self.cyccnt_runs(), count);
     }
 

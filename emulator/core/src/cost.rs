@@ -10,6 +10,8 @@ pub(crate) struct Cost {
     pub(crate) cycles: u32,
     /// An exclusive access begins in it: LDREX, LDREXB or LDREXH.
     pub(crate) exclusive: bool,
+    /// It uses the floating-point unit.
+    pub(crate) floats: bool,
 }
 
 /// The costs of blocks that ran before, one place for each address modulo the size of the table.
@@ -63,12 +65,18 @@ fn of_block(code: &[u8]) -> Cost {
             0b11101..=0b11111 => {
                 let second = halves.next().unwrap_or(0);
                 cost.exclusive |= begins_exclusive(first, second);
+                cost.floats |= is_floating(first, second);
                 wide(first, second)
             }
             _ => narrow(first),
         };
     }
     cost
+}
+
+/// An instruction of coprocessors 10 and 11.
+fn is_floating(first: u16, second: u16) -> bool {
+    first & 0xEC00 == 0xEC00 && second >> 9 & 7 == 0b101
 }
 
 /// LDREX, LDREXB or LDREXH (ARMv7-M, A5.3.6).

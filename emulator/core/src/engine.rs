@@ -10,7 +10,8 @@ use crate::cost::Cost;
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::nvic::Masks;
-use crate::{ppb, stepping};
+use crate::scb::{DIV_0_TRP, cfsr};
+use crate::{alignment, ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
@@ -94,7 +95,10 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     }
     let mut code = [0; 18];
     let charged = cpu.get_data().memory.read(place, &mut code).map_or(size, |()| stepping::length(&code));
-    if pass(cpu, address, charged) {
+    let traps_division = cpu.get_data().scb.ccr & DIV_0_TRP != 0;
+    if let Some(status) = alignment::fault(&code, traps_division, |number| core_register(cpu, number)) {
+        refuse(cpu, status);
+    } else if pass(cpu, address, charged) {
         let core = cpu.get_data_mut();
         let wait = core.stepping.as_mut().map_or(0, |stepping| {
             stepping.charged(place, size, charged);
@@ -102,6 +106,16 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
         });
         core.spend(0, wait);
     }
+}
+
+/// R0 to R14 by number.
+fn core_register<P>(cpu: &Unicorn<Core<P>>, number: u16) -> u32 {
+    let register = match number {
+        0..=12 => RegisterARM::R0 as i32 + i32::from(number),
+        13 => RegisterARM::SP as i32,
+        _ => RegisterARM::LR as i32,
+    };
+    cpu.reg_read(register).unwrap_or(0) as u32
 }
 
 /// Charges code that is about to run, or stops before it when something is due.
@@ -115,10 +129,21 @@ fn pass<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) -> 
     }
     let cost = core.costs.get(address as u32, size).unwrap_or_else(|| learn(cpu, address, size));
     let core = cpu.get_data_mut();
+    if cost.floats && !core.scb.allows_floats() {
+        return refuse(cpu, cfsr::NOCP);
+    }
+    core.place = address as u32;
     core.exclusive |= cost.exclusive;
     core.profile.visit(address as u32, size);
     core.spend(cost.instructions, cost.cycles);
     true
+}
+
+/// Stops before code that faults.
+fn refuse<P>(cpu: &mut Unicorn<Core<P>>, status: u32) -> bool {
+    cpu.get_data_mut().halt = Some(Halt::Usage(status));
+    let _ = cpu.emu_stop();
+    false
 }
 
 /// Lets loads from flash fail while it is busy, or lets them through again.
@@ -262,9 +287,14 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
 
 fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
     let read = |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize| {
-        let ipsr = cpu.reg_read(RegisterARM::IPSR).unwrap_or(0) as u32 & 0x1FF;
+        let ipsr = ipsr(cpu);
         let address = ppb::BASE + offset as u32;
+        let refused = is_unprivileged(cpu, ipsr);
         let core = cpu.get_data_mut();
+        if refused {
+            finish(core, address, None);
+            return 0;
+        }
         let word = core.ppb_read(address & !3, ipsr);
         finish(core, address, word.map(|_| ()));
         let value = word.unwrap_or(0) >> (8 * (address & 3));
@@ -272,13 +302,26 @@ fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
     };
     let write = |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize, value: u64| {
         let address = ppb::BASE + offset as u32;
+        let refused = is_unprivileged(cpu, ipsr(cpu));
         let core = cpu.get_data_mut();
+        if refused {
+            return finish(core, address, None);
+        }
         let word = if size == 4 { Some(value as u32) } else { merged(core, address, size, value as u32) };
         let result = word.and_then(|word| core.ppb_write(address & !3, word));
         finish(core, address, result);
     };
     cpu.mmio_map(ppb::BASE.into(), ppb::SIZE.into(), Some(read), Some(write))?;
     Ok(())
+}
+
+fn ipsr<P>(cpu: &Unicorn<Core<P>>) -> u32 {
+    cpu.reg_read(RegisterARM::IPSR).unwrap_or(0) as u32 & 0x1FF
+}
+
+/// Thread mode without privileges reaches nothing of the system space (ARMv7-M, B3.1.1).
+fn is_unprivileged<P>(cpu: &Unicorn<Core<P>>, ipsr: u32) -> bool {
+    ipsr == 0 && cpu.reg_read(RegisterARM::CONTROL).unwrap_or(0) & 1 != 0
 }
 
 /// A byte or halfword put into its word; the priority registers are written so.

@@ -21,11 +21,13 @@ pub struct Fault {
     pub address: Option<u32>,
     /// Its bits in CFSR.
     pub status: u32,
+    /// It is an exception that became a HardFault because it could not be taken.
+    pub escalated: bool,
 }
 
 impl Fault {
     fn new(pc: u32, status: u32) -> Fault {
-        Fault { pc, lr: 0, address: None, status }
+        Fault { pc, lr: 0, address: None, status, escalated: false }
     }
 
     pub(crate) fn data(pc: u32, address: u32) -> Fault {
@@ -34,6 +36,16 @@ impl Fault {
 
     pub(crate) fn fetch(pc: u32) -> Fault {
         Fault::new(pc, cfsr::IBUSERR)
+    }
+
+    /// A usage fault with this status.
+    pub(crate) fn usage(pc: u32, status: u32) -> Fault {
+        Fault::new(pc, status)
+    }
+
+    /// SVC where its exception cannot be taken: it has no status but that of the escalation.
+    pub(crate) fn refused_call(pc: u32) -> Fault {
+        Fault { escalated: true, ..Fault::new(pc, 0) }
     }
 
     pub(crate) fn undefined(pc: u32) -> Fault {
@@ -84,6 +96,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         let scb = &mut self.cpu.get_data_mut().scb;
         match fault.address {
             Some(address) if fault.status == cfsr::PRECISERR => scb.note_data_fault(address),
+            _ if fault.escalated => scb.note_escalation(),
             _ if fault.status == 0 => scb.note_breakpoint(),
             _ => scb.cfsr |= fault.status,
         }

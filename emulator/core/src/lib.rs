@@ -12,7 +12,7 @@
 //! | `core` | what hooks and run loop share |
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
 //! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
-//! | `stepping` | the mode in which interrupts come between any two instructions |
+//! | `stepping`, `alignment` | the mode in which interrupts come between any two instructions; what only that mode notices |
 //! | `cost`, `stats`, `profile` | cycles of a block; what was counted, and where |
 //! | `loader` | ELF files |
 //!
@@ -26,8 +26,11 @@
 //!   its block. Accesses to unmapped memory have the exact one.
 //! * Flash becomes busy with the end of the block that has stored to it. A load from busy flash in an IT block is done once more from the start of the block.
 //! * WFE is a hint that never sleeps; there is no MPU, no bit-band alias of RAM and no alias of flash at address 0.
-//! * The floating-point unit works whatever CPACR says.
+//! * Where CPACR does not allow the floating-point unit, the fault comes at the start of the block that uses it.
+//! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and a division by zero that is trapped (CCR.DIV_0_TRP), fault after
+//!   [`Machine::interleave`] only, and not in an IT block; CCR.UNALIGN_TRP is not modelled and reported as a [`chip::Breach`].
 
+mod alignment;
 mod context;
 mod core;
 mod cost;

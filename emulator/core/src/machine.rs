@@ -252,6 +252,9 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// Everything that is due before the next block: events, effects, resets.
     fn attend(&mut self) -> Option<Stop> {
         self.advance_chip();
+        while let Some((at, pc, rule)) = self.cpu.get_data_mut().breaches.pop_front() {
+            self.incidents.push((at, Incident::Breach { rule, pc }));
+        }
         while let Some(effect) = self.cpu.get_data_mut().effects.pop_front() {
             if let Some(stop) = self.carry_out(effect) {
                 return Some(stop);
@@ -346,9 +349,10 @@ impl<P: Peripherals + 'static> Machine<P> {
         match (result, self.cpu.get_data_mut().halt.take()) {
             (_, Some(Halt::Attention)) => {}
             (_, Some(Halt::ExceptionReturn)) => self.leave(),
-            (_, Some(Halt::SupervisorCall)) => self.raise(Exception::SV_CALL),
+            (_, Some(Halt::SupervisorCall)) => self.supervisor_call(),
             (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),
             (_, Some(Halt::Undefined)) => self.take_fault(Fault::undefined(self.pc())),
+            (_, Some(Halt::Usage(status))) => self.take_fault(Fault::usage(self.pc(), status)),
             (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
             (Err(uc_error::READ_PROT), None) if self.cpu.get_data().flash_closed => self.loading = true,
             (Err(error), None) => self.take_fault(self.fault_of(error)),
@@ -366,9 +370,15 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// Pends an exception of the core itself.
-    fn raise(&mut self, exception: Exception) {
-        self.cpu.get_data_mut().pend(exception);
+    /// A call that cannot be taken at once becomes a HardFault (ARMv7-M, B1.5.2).
+    fn supervisor_call(&mut self) {
+        let masks = engine::masks(&self.cpu);
+        let core = self.cpu.get_data_mut();
+        if core.nvic.may_preempt(Exception::SV_CALL, masks) {
+            core.pend(Exception::SV_CALL);
+        } else {
+            self.take_fault(Fault::refused_call(self.pc()));
+        }
     }
 
     pub(crate) fn note(&mut self, incident: Incident) {

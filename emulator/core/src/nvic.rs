@@ -76,6 +76,37 @@ impl Nvic {
         self.active != 0
     }
 
+    /// Exceptions that are active.
+    pub(crate) fn active_count(&self) -> u32 {
+        self.active.count_ones()
+    }
+
+    /// The pending and enabled exception of the highest priority.
+    pub(crate) fn first_pending(&self) -> Option<Exception> {
+        self.first()
+    }
+
+    /// Active and pending system exceptions as SHCSR shows them (ARMv7-M, B3.2.13).
+    pub(crate) fn system_states(&self) -> u32 {
+        let active = [
+            (Exception::MEM_MANAGE, 0),
+            (Exception::BUS_FAULT, 1),
+            (Exception::USAGE_FAULT, 3),
+            (Exception::SV_CALL, 7),
+            (Exception::PEND_SV, 10),
+            (Exception::SYS_TICK, 11),
+        ];
+        let pending = [
+            (Exception::USAGE_FAULT, 12),
+            (Exception::MEM_MANAGE, 13),
+            (Exception::BUS_FAULT, 14),
+            (Exception::SV_CALL, 15),
+        ];
+        let active = active.into_iter().filter(|(exception, _)| self.is_active(*exception));
+        let pending = pending.into_iter().filter(|(exception, _)| self.is_pending(*exception));
+        active.chain(pending).fold(0, |word, (_, bit)| word | 1 << bit)
+    }
+
     /// Whether an interrupt (not a system exception) is pending.
     pub(crate) fn any_irq_pending(&self) -> bool {
         self.pending >> 16 != 0

@@ -1,9 +1,10 @@
 //! The private peripheral bus: every register of the core by address (ARMv7-M, B3.1).
 
-use chip::Peripherals;
+use chip::{Breach, Peripherals};
 
 use crate::core::Core;
 use crate::exception::Exception;
+use crate::scb::{DIV_0_TRP, UNALIGN_TRP};
 
 /// Where the system space begins.
 pub(crate) const BASE: u32 = 0xE000_0000;
@@ -24,11 +25,18 @@ const PENDSVCLR: u32 = 1 << 27;
 const PENDSTSET: u32 = 1 << 26;
 const PENDSTCLR: u32 = 1 << 25;
 const ISRPENDING: u32 = 1 << 22;
+const VECTPENDING: u32 = 12;
+const RETTOBASE: u32 = 1 << 11;
+
+/// DEMCR: the trace units, the DWT among them, are on.
+const TRCENA: u32 = 1 << 24;
 
 impl<P: Peripherals> Core<P> {
     /// A word of the system space; `None` where there is no register.
     pub(crate) fn ppb_read(&mut self, address: u32, ipsr: u32) -> Option<u32> {
         Some(match address {
+            // Without TRCENA the DWT stands still and cannot be written (ARMv7-M, C1.8.1 and C1.6.5).
+            0xE000_1000..=0xE000_1004 if !self.traces() => 0,
             0xE000_1000 => u32::from(self.cyccnt_runs()) | 0x4000_0000,
             0xE000_1004 => self.cyccnt(),
             0xE000_1FB0..=0xE000_1FFF => 0,
@@ -48,7 +56,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_ED10 => self.scb.scr,
             0xE000_ED14 => self.scb.ccr,
             0xE000_ED18..=0xE000_ED20 => self.priorities(4 + (address - 0xE000_ED18)),
-            0xE000_ED24 => self.scb.shcsr,
+            0xE000_ED24 => self.scb.shcsr | self.nvic.system_states(),
             0xE000_ED28 => self.scb.cfsr,
             0xE000_ED2C => self.scb.hfsr,
             0xE000_ED34 => self.scb.mmfar,
@@ -67,6 +75,7 @@ impl<P: Peripherals> Core<P> {
     /// Writes a word of the system space; `None` where there is no register.
     pub(crate) fn ppb_write(&mut self, address: u32, value: u32) -> Option<()> {
         match address {
+            0xE000_1000..=0xE000_1004 if !self.traces() => {}
             0xE000_1000 => self.set_cyccnt(value & 1 != 0, self.cyccnt()),
             0xE000_1004 => self.set_cyccnt(self.cyccnt_runs(), value),
             // The lock access register of the DWT: unlocked as a debugger would see it.
@@ -87,7 +96,7 @@ impl<P: Peripherals> Core<P> {
             }
             0xE000_ED0C => self.set_aircr(value),
             0xE000_ED10 => self.scb.scr = value & 0x16,
-            0xE000_ED14 => self.scb.ccr = value,
+            0xE000_ED14 => self.set_ccr(value),
             0xE000_ED18..=0xE000_ED20 => self.set_priorities(4 + (address - 0xE000_ED18), value),
             0xE000_ED24 => self.scb.shcsr = value & 0x0007_0000,
             0xE000_ED28 => self.scb.cfsr &= !value,
@@ -95,7 +104,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_ED34 => self.scb.mmfar = value,
             0xE000_ED38 => self.scb.bfar = value,
             0xE000_ED88 => self.scb.cpacr = value,
-            0xE000_EDFC => self.scb.demcr = value,
+            0xE000_EDFC => self.set_demcr(value),
             0xE000_EF00 => self.pend_irqs((value >> 5) & 3, 1 << (value & 31)),
             0xE000_EF34 => self.scb.fpccr = value,
             DBGMCU..=DBGMCU_END => self.chip.write(address, 4, value, self.now).ok()?,
@@ -128,7 +137,13 @@ impl<P: Peripherals> Core<P> {
     fn icsr(&self, ipsr: u32) -> u32 {
         let flag = |exception, bit| if self.nvic.is_pending(exception) { bit } else { 0 };
         let irq = if self.nvic.any_irq_pending() { ISRPENDING } else { 0 };
-        ipsr | irq | flag(Exception::PEND_SV, PENDSVSET) | flag(Exception::SYS_TICK, PENDSTSET)
+        let pending = self.nvic.first_pending().map_or(0, |exception| u32::from(exception.0) << VECTPENDING);
+        let to_base = if self.nvic.active_count() <= 1 { RETTOBASE } else { 0 };
+        ipsr | irq
+            | pending
+            | to_base
+            | flag(Exception::PEND_SV, PENDSVSET)
+            | flag(Exception::SYS_TICK, PENDSTSET)
     }
 
     fn set_icsr(&mut self, value: u32) {
@@ -143,6 +158,27 @@ impl<P: Peripherals> Core<P> {
             if value & bit != 0 {
                 self.nvic.clear(exception.bit());
             }
+        }
+    }
+
+    fn traces(&self) -> bool {
+        self.scb.demcr & TRCENA != 0
+    }
+
+    fn set_demcr(&mut self, value: u32) {
+        self.scb.demcr = value;
+        if !self.traces() {
+            self.set_cyccnt(false, self.cyccnt());
+        }
+    }
+
+    fn set_ccr(&mut self, value: u32) {
+        self.scb.ccr = value;
+        if value & UNALIGN_TRP != 0 {
+            self.report(Breach::NotModelled { what: "CCR.UNALIGN_TRP" });
+        }
+        if value & DIV_0_TRP != 0 && self.stepping.is_none() {
+            self.report(Breach::NotModelled { what: "CCR.DIV_0_TRP, but with --interleave," });
         }
     }
 

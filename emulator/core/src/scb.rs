@@ -11,6 +11,9 @@ pub(crate) mod cfsr {
     pub(crate) const BFARVALID: u32 = 1 << 15;
     pub(crate) const UNDEFINSTR: u32 = 1 << 16;
     pub(crate) const INVPC: u32 = 1 << 18;
+    pub(crate) const NOCP: u32 = 1 << 19;
+    pub(crate) const UNALIGNED: u32 = 1 << 24;
+    pub(crate) const DIVBYZERO: u32 = 1 << 25;
 }
 
 /// HFSR: a configurable fault escalated.
@@ -52,7 +55,16 @@ impl Default for Scb {
     }
 }
 
+/// CCR: traps of unaligned accesses and of divisions by zero.
+pub(crate) const UNALIGN_TRP: u32 = 1 << 3;
+pub(crate) const DIV_0_TRP: u32 = 1 << 4;
+
 impl Scb {
+    /// Whether CPACR lets the program use the floating-point unit: privileged access to CP10 and CP11.
+    pub(crate) fn allows_floats(&self) -> bool {
+        self.cpacr >> 20 & 0b0101 == 0b0101
+    }
+
     /// Notes a fault that was taken as HardFault instead.
     pub(crate) fn note_escalation(&mut self) {
         self.hfsr |= FORCED;

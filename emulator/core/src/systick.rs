@@ -13,7 +13,9 @@ pub(crate) struct SysTick {
     control: u32,
     reload: u32,
     flag: bool,
-    /// The instant of the next change from 1 to 0.
+    /// The value while it stands.
+    held: u32,
+    /// The instant of the next change from 1 to 0, while it runs.
     zero: Time,
     tick: Time,
 }
@@ -47,20 +49,34 @@ impl SysTick {
 
     /// `cycle` is the length of a core cycle now.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time, cycle: Time) {
+        let count = self.count(now);
         match offset {
-            0x0 => {
-                self.control = value & (ENABLE | TICKINT | CLKSOURCE);
-                // The external reference clock of the STM32F4 is HCLK / 8 (RM0390, 10.1).
-                self.tick = if value & CLKSOURCE == 0 { Time(cycle.0 * 8) } else { cycle };
-                self.restart(now);
-            }
+            0x0 => self.control = value & (ENABLE | TICKINT | CLKSOURCE),
             0x4 => self.reload = value & 0x00FF_FFFF,
-            0x8 => {
-                self.flag = false;
-                self.restart(now);
-            }
-            _ => {}
+            0x8 => self.flag = false,
+            _ => return,
         }
+        self.set_cycle(cycle);
+        self.go_on(if offset == 0x8 { 0 } else { count }, now);
+    }
+
+    /// The core clock has changed: the count goes on from where it is.
+    pub(crate) fn change_clock(&mut self, now: Time, cycle: Time) {
+        let count = self.count(now);
+        self.set_cycle(cycle);
+        self.go_on(count, now);
+    }
+
+    /// The external reference clock of the STM32F4 is HCLK / 8 (RM0390, 10.1).
+    fn set_cycle(&mut self, cycle: Time) {
+        self.tick = if self.control & CLKSOURCE == 0 { Time(cycle.0 * 8) } else { cycle };
+    }
+
+    /// From zero it is reloaded with the next tick.
+    fn go_on(&mut self, count: u32, now: Time) {
+        self.held = count;
+        let ticks = if count == 0 { u64::from(self.reload) + 1 } else { count.into() };
+        self.zero = now + Time(self.tick.0 * ticks);
     }
 
     fn runs(&self) -> bool {
@@ -71,14 +87,12 @@ impl SysTick {
         Time(self.tick.0 * (u64::from(self.reload) + 1))
     }
 
-    fn restart(&mut self, now: Time) {
-        self.zero = now + self.period();
-    }
-
     fn count(&self, now: Time) -> u32 {
         if !self.runs() {
-            return 0;
+            return self.held;
         }
-        ((self.zero.since(now).0 / self.tick.0) as u32) & 0x00FF_FFFF
+        let left = self.zero.since(now).0.div_ceil(self.tick.0.max(1)) as u32;
+        // Before the first tick it still is zero.
+        if left > self.reload.max(self.held) { 0 } else { left }
     }
 }

@@ -81,6 +81,13 @@ fn a_stack_overflow_reaches_the_fault_handler() {
 }
 
 #[test]
+fn system_registers_are_as_the_architecture_says() {
+    let mut bench = Bench::new("system_registers");
+    let verdict = bench.run();
+    assert_eq!(verdict, Verdict::Passed, "{:x?}", bench.machine.incidents().first());
+}
+
+#[test]
 fn hints_do_nothing() {
     assert_eq!(Bench::new("hints").run(), Verdict::Passed);
 }

@@ -3,7 +3,7 @@
 mod bench;
 
 use bench::{Bench, Verdict};
-use emulator::Exception;
+use emulator::{Exception, Incident};
 
 /// TIM2.
 const INTERRUPT: Exception = Exception::irq(28);
@@ -84,6 +84,19 @@ fn programs_without_races_pass_with_every_seed() {
             assert_eq!(bench.run(), Verdict::Passed, "{program}, seed {seed}");
         }
     }
+}
+
+/// What silicon refuses: in the usual mode only the floating-point unit that is off.
+#[test]
+fn instructions_that_silicon_refuses_fault() {
+    let mut bench = Bench::new("traps");
+    assert_eq!(bench.run(), Verdict::Failed(2), "the first unaligned access");
+    let breaches = bench.machine.incidents().iter();
+    let breaches = breaches.filter(|(_, incident)| matches!(incident, Incident::Breach { .. }));
+    assert_eq!(breaches.count(), 1, "a trap of the division that would not come is reported");
+    let mut bench = Bench::new("traps");
+    bench.machine.interleave(None).unwrap();
+    assert_eq!(bench.run(), Verdict::Passed);
 }
 
 #[test]

@@ -4,8 +4,8 @@ use std::rc::Rc;
 
 use anyhow::{Context, Result};
 use canbus::{Controller, Time};
-use chip::{Board as Wiring, Stm32f4, Variant};
-use emulator::{Machine, Model, Stop};
+use chip::{Board as Wiring, FLASH_BASE, Stm32f4, Variant};
+use emulator::{Incident, Machine, Model, Stop};
 use update::HEADER_LEN;
 
 use crate::figures;
@@ -20,6 +20,8 @@ use crate::traffic::Heard;
 
 /// Where the application's header is (memory.x).
 const HEADER_ADDRESS: u32 = 0x0801_0000;
+/// Where RAM begins.
+const RAM: u32 = 0x2000_0000;
 
 /// The ELF files that every board runs.
 pub struct Images {
@@ -171,6 +173,22 @@ impl Board {
         self.machine.peripherals().kept_by_battery(self.machine.now())
     }
 
+    /// Rules of the chip that its program has broken.
+    pub(crate) fn broken_rules(&self) -> Vec<String> {
+        let images = [Some(&self.images.firmware), self.images.bootloader.as_ref()];
+        figures::broken_rules(&self.machine, |pc| {
+            // The bootloader lies below the application, and runs from RAM.
+            let ours =
+                if (FLASH_BASE..HEADER_ADDRESS).contains(&pc) || pc >= RAM { images[1] } else { images[0] };
+            ours.or(images[0])?.place(pc)
+        })
+    }
+
+    /// Whether its program has broken a rule of the chip.
+    pub(crate) fn has_broken_rules(&self) -> bool {
+        self.machine.incidents().iter().any(|(_, incident)| matches!(incident, Incident::Breach { .. }))
+    }
+
     pub(crate) fn status(&self, node_id: u8, heard: Heard) -> NodeStatus {
         let (now, plant) = (self.machine.now(), self.machine.peripherals().plant());
         NodeStatus {
@@ -200,6 +218,7 @@ impl Board {
                 &self.firmware,
                 self.bootloader_flash,
             ),
+            broken_rules: self.broken_rules(),
             incidents: figures::incidents(&self.machine).chain(locked_up).collect(),
             unmodelled: figures::unmodelled(&self.machine),
         }

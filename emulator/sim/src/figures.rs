@@ -70,13 +70,26 @@ fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
     (stack.len() - untouched) as u32
 }
 
+/// Rules of the chip that the program has broken, with the places in its source.
+pub(crate) fn broken_rules(machine: &Machine<Stm32f4>, place: impl Fn(u32) -> Option<String>) -> Vec<String> {
+    let broken = machine.incidents().iter().filter_map(|(at, incident)| match incident {
+        Incident::Breach { rule, pc } => Some((at, rule, pc)),
+        _ => None,
+    });
+    let told = broken.map(|(at, rule, &pc)| {
+        format!("{at} s: {rule}, at {}", place(pc).unwrap_or_else(|| format!("{pc:#010x}")))
+    });
+    told.collect()
+}
+
 /// Faults and resets after power-on; of a board that resets in circles only the first of them.
 pub(crate) fn incidents(machine: &Machine<Stm32f4>) -> impl Iterator<Item = String> {
     const SHOWN: usize = 10;
-    let incidents = machine.incidents();
-    let shown = incidents.iter().take(SHOWN).map(|(at, incident)| format!("{at} s: {}", describe(incident)));
+    let is_told = |incident: &&(Time, Incident)| !matches!(incident.1, Incident::Breach { .. });
+    let incidents: Vec<&(Time, Incident)> = machine.incidents().iter().filter(is_told).collect();
     let rest = incidents.len().checked_sub(SHOWN + 1).map(|rest| format!("and {} more", rest + 1));
-    shown.chain(rest)
+    let shown = incidents.into_iter().take(SHOWN);
+    shown.map(|(at, incident)| format!("{at} s: {}", describe(incident))).chain(rest)
 }
 
 fn describe(incident: &Incident) -> String {
@@ -86,6 +99,7 @@ fn describe(incident: &Incident) -> String {
                 fault.address.map(|address| format!(", access to {address:#010x}")).unwrap_or_default();
             format!("fault at {:#010x}, CFSR {:#x}{access}", fault.pc, fault.status)
         }
+        Incident::Breach { rule, .. } => rule.to_string(),
         Incident::SoftwareReset => "reset by software".to_owned(),
         Incident::ChipReset => "reset by the chip (watchdog)".to_owned(),
     }

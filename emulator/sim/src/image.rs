@@ -36,6 +36,15 @@ impl Image {
     }
 }
 
+impl Image {
+    /// Where the code at an address is written: a file and a line.
+    pub(crate) fn place(&self, address: u32) -> Option<String> {
+        let loader = addr2line::Loader::new(&self.path).ok()?;
+        let place = loader.find_location(address.into()).ok()??;
+        Some(format!("{}:{}", place.file?, place.line?))
+    }
+}
+
 fn symbol(file: &object::File, name: &str) -> Option<u32> {
     use object::{Object, ObjectSymbol};
     file.symbol_by_name(name).and_then(|symbol| symbol.address().try_into().ok())

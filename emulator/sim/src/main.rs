@@ -8,6 +8,8 @@ use sim::cli::Options;
 
 /// Something that the user can put right: a flag, a file, a port in use.
 const USAGE: u8 = 2;
+/// A program did what its chip does not forgive; the summary says what and where.
+const BROKEN_RULE: u8 = 1;
 
 fn main() -> ExitCode {
     let options = match Options::try_parse() {
@@ -21,13 +23,13 @@ fn main() -> ExitCode {
     };
     let json = options.json;
     let summary = match sim::app::run(options) {
-        Ok(summary) if json => format!("{}\n", serde_json::json!(summary)),
-        Ok(summary) => summary.to_string(),
+        Ok(summary) => summary,
         Err(error) => return refuse(&format!("error: {error:#}"), json),
     };
+    let text = if json { format!("{}\n", serde_json::json!(summary)) } else { summary.to_string() };
     // Nobody may be reading any more.
-    let _ = io::stdout().write_all(summary.as_bytes());
-    ExitCode::SUCCESS
+    let _ = io::stdout().write_all(text.as_bytes());
+    if summary.has_broken_rules() { ExitCode::from(BROKEN_RULE) } else { ExitCode::SUCCESS }
 }
 
 /// As `nodectl` does: with --json an error is an object on the standard output.

@@ -57,6 +57,8 @@ pub struct NodeSummary {
     pub cpu: Cpu,
     /// What the image takes.
     pub memory: Memory,
+    /// Rules of the chip that the program has broken, each once, with the place in its source.
+    pub broken_rules: Vec<String>,
     /// Faults and resets after power-on, each with its time.
     pub incidents: Vec<String>,
     /// Accesses to registers that the chip model does not have.
@@ -110,6 +112,11 @@ pub struct Memory {
 }
 
 impl Summary {
+    /// Whether a program has broken a rule of its chip: then the run has failed.
+    pub fn has_broken_rules(&self) -> bool {
+        self.nodes.iter().any(|node| !node.broken_rules.is_empty())
+    }
+
     /// Virtual seconds in a host second.
     pub fn ratio(&self) -> f64 {
         if self.host_seconds > 0.0 { self.virtual_seconds / self.host_seconds } else { 0.0 }
@@ -164,6 +171,7 @@ impl fmt::Display for NodeSummary {
             "  memory: flash {} B (bootloader {} B), RAM {} B, deepest stack {} B",
             memory.flash, memory.bootloader_flash, memory.ram, memory.stack
         )?;
+        self.broken_rules.iter().try_for_each(|rule| writeln!(f, "  rule broken: {rule}"))?;
         self.incidents.iter().try_for_each(|incident| writeln!(f, "  {incident}"))?;
         self.unmodelled.iter().try_for_each(|access| writeln!(f, "  unmodelled register: {access}"))
     }

@@ -49,6 +49,7 @@ pub struct World {
     records: Records,
     /// Measured only for who asks: the clock of the host costs time as well.
     host_time: Option<HostTime>,
+    enforces_rules: bool,
 }
 
 /// A port and whether a client has it.
@@ -93,6 +94,7 @@ impl World {
             ports: Vec::new(),
             records,
             host_time: None,
+            enforces_rules: false,
         }
     }
 
@@ -158,6 +160,9 @@ impl World {
     }
 
     /// Lets everything up to `end` happen.
+    ///
+    /// # Panics
+    /// When a program has broken a rule of its chip after [`World::enforce_rules`].
     pub fn run_until(&mut self, end: Time) {
         loop {
             let start = self.host_time.is_some().then(Instant::now);
@@ -177,6 +182,15 @@ impl World {
         }
         while self.host.receive().is_some() {}
         self.boards.iter_mut().for_each(|board| board.read_log(&mut self.records.log));
+        if self.enforces_rules && self.boards.iter().any(Board::has_broken_rules) {
+            let broken: Vec<String> = self.boards.iter().flat_map(Board::broken_rules).collect();
+            panic!("a rule of the chip is broken: {}", broken.join("; "));
+        }
+    }
+
+    /// From now on a broken rule of the chip fails the test, or is only told by the summary: for a test that breaks one itself.
+    pub fn enforce_rules(&mut self, on: bool) {
+        self.enforces_rules = on;
     }
 
     /// Measures from now on what the host's time goes to.

@@ -177,6 +177,27 @@ fn a_node_finds_the_bit_rate_by_listening_and_disturbs_nobody() {
     }
 }
 
+/// A frame that ends while the node moves on to the next rate was heard at the rate before. Long frames at every phase: the node may
+/// miss some of them, but the node never takes one for a frame of another rate, whose bus it would then destroy.
+#[test]
+fn a_frame_of_the_rate_before_is_not_taken_for_one_of_the_next() {
+    for rate in [10, 20, 50, 125] {
+        for phase in 0..6 {
+            let mut world = world(&format!("--bitrate {rate} --node 1:pressure --node 5:pressure@auto"));
+            let master = Master::join_at(&mut world, rate * 1000);
+            let found = (0..150).any(|look| {
+                world.run_until(Time::from_micros(3_001 * phase + 41_003 * look));
+                master.send(&mut world, 0x77F, &[0x55; 8]);
+                world.traffic().node(5).boot_ups > 0
+            });
+            let summary = run(&mut world, SECOND);
+            assert_eq!(summary.bus.errors, 0, "{rate} kbit/s, phase {phase}: {summary}");
+            assert!(summary.nodes.iter().all(|node| node.incidents.is_empty()), "{summary}");
+            assert!(found, "{rate} kbit/s, phase {phase}");
+        }
+    }
+}
+
 #[test]
 fn program_control_restarts_without_an_answer() {
     let mut world = world("--bitrate 1000");

@@ -230,6 +230,51 @@ fn a_lost_end_of_a_transmission_holds_nothing_up() {
     assert_silent(&mut world);
 }
 
+/// A frame is to make way for more urgent ones, and its transmission begins at that very moment. The frame is sent once, whether
+/// this transmission was good or not.
+#[test]
+fn a_frame_that_makes_way_too_late_is_sent_once() {
+    const MORE_URGENT: u16 = 0x001;
+    const HEARTBEAT: u16 = 0x701;
+    const EVENT_TIMER: (u16, u8) = (0x6200, 0);
+    for (seed, noise) in [(1, 0.0), (1, 0.4), (2, 0.4), (3, 0.4), (4, 0.4)] {
+        let (mut world, master) = start("");
+        write(&mut world, &master, EVENT_TIMER, 2, 1700);
+        master.send(&mut world, START_ALL.0, &START_ALL.1);
+        wait(&mut world, 50);
+        lose(&mut world, Loss::Abort, 1);
+        world.take_frames();
+        // No gap for two seconds, in which heartbeat, SDO response, TPDO 2 and TPDO 1 come to wait, each more urgent than those before.
+        for step in 0..20 {
+            (0..if step == 0 { 1000 } else { 900 })
+                .for_each(|_| master.send(&mut world, MORE_URGENT, &[0x55; 8]));
+            if step == 10 {
+                master.send(&mut world, 0x601, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+            }
+            if step == 12 {
+                master.send(&mut world, SYNC, &[]);
+            }
+            wait(&mut world, 100);
+        }
+        assert_eq!(world.machine(0).peripherals().late_aborts(), 0, "a frame was to make way");
+        world.bus().faults.noise(seed, noise);
+        let silent = world.take_frames();
+        let of = |frames: &[canbus::Stamped], id| {
+            frames.iter().filter(|stamped| stamped.frame.id() == frame(id, &[]).id()).count()
+        };
+        assert_eq!(of(&silent, HEARTBEAT), 0, "the bus was full");
+        wait(&mut world, 500);
+        world.bus().faults.quiet();
+        wait(&mut world, 20);
+        let told = world.take_frames();
+        assert_eq!((of(&told, SDO_RESPONSE), of(&told, TPDO2)), (1, 1));
+        // The one in the mailbox and the newest.
+        assert_eq!(of(&told, HEARTBEAT), 2, "noise {seed} {noise}");
+        let summary = run(&mut world, Time::ZERO);
+        assert!(summary.nodes[0].incidents.is_empty(), "{summary}");
+    }
+}
+
 /// Stores into the memory behind the battery do not arrive: the next millisecond makes up for it.
 #[test]
 fn a_lost_write_to_the_backup_memory_is_made_good() {

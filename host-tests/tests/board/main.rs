@@ -13,6 +13,7 @@ mod lost_events;
 mod measuring;
 mod power_cycles;
 mod races;
+mod rules;
 mod running;
 mod saves;
 mod stack;

@@ -7,7 +7,9 @@ use sim::stimuli::Stimulus;
 use sim::summary::Summary;
 use sim::traffic::NmtState;
 
-use crate::support::{Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, SYNC, TPDO1, frame, run, world};
+use crate::support::{
+    Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, SYNC, TPDO1, frame, read, run, world,
+};
 
 /// Nothing happened that must not happen.
 fn assert_clean(summary: &Summary) {
@@ -90,6 +92,9 @@ fn sampling_keeps_its_pace_on_a_full_bus() {
     assert_eq!(responses, requests, "every SDO request is answered");
     assert!(requests as u64 > SYNCS / 2, "an answer comes within two milliseconds");
     assert_eq!(tpdos, SYNCS, "every SYNC is answered");
+    for kind in 1..=8 {
+        assert_eq!(read(&mut world, &master, (0x2001, kind)), 0, "lost events of kind {kind}");
+    }
 }
 
 /// One frame in twenty is destroyed by a bit error: the controllers repeat it, and every request is answered once.

@@ -53,7 +53,9 @@ pub(crate) fn world_of(bootloader: &str, flags: &str) -> World {
     let images =
         ["sim", "--bootloader", bootloader.to_str().unwrap(), "--firmware", firmware.to_str().unwrap()];
     let options = Options::try_parse_from(images.into_iter().chain(flags.split_whitespace())).unwrap();
-    sim::setup::world(&options).unwrap()
+    let mut world = sim::setup::world(&options).unwrap();
+    world.enforce_rules(true);
+    world
 }
 
 /// A node that has run for a second, its log taken.

@@ -47,6 +47,7 @@ fn number_of_entries(index: u16, count: u8) -> Entry {
         data_type: DataType::UNSIGNED8,
         access: Access::ReadOnly,
         default: Some(Formula::Constant(Value::Integer(count.into()))),
+        value: None,
         low: None,
         high: None,
         mappable: false,

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod compact;
+mod dcf;
 mod device;
 mod error;
 mod find;
@@ -19,6 +20,7 @@ mod types;
 mod value;
 mod write;
 
+pub use dcf::Commissioning;
 pub use device::{DEVICES, Device};
 pub use error::{Error, Problem};
 pub use find::{LookupError, address};

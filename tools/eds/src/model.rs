@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::{Access, DataType, Formula, ObjectType};
+use crate::{Access, Commissioning, DataType, Formula, ObjectType};
 
 /// A data sheet: the device, and every object it has.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -11,6 +11,8 @@ pub struct Eds {
     pub device: DeviceInfo,
     /// The objects by index.
     pub objects: BTreeMap<u16, Object>,
+    /// Which device the values are for; `None` for a data sheet, which has no values.
+    pub commissioning: Option<Commissioning>,
 }
 
 impl Eds {
@@ -83,6 +85,8 @@ pub struct Entry {
     pub access: Access,
     /// Value after a reset with nothing saved.
     pub default: Option<Formula>,
+    /// The value in a device (`ParameterValue`); only a configuration file has one.
+    pub value: Option<Formula>,
     /// Smallest value accepted, where narrower than the type.
     pub low: Option<Formula>,
     /// Largest value accepted, where narrower than the type.

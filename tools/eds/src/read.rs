@@ -3,7 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ini::{Ini, Section};
-use crate::{Access, DataType, DeviceInfo, Eds, Entry, Error, Formula, Object, ObjectType, Problem, compact};
+use crate::{
+    Access, Commissioning, DataType, DeviceInfo, Eds, Entry, Error, Formula, Object, ObjectType, Problem,
+    compact,
+};
 
 /// The bit rates that a data sheet has a key for, in kbit/s.
 pub(crate) const BIT_RATES: [(u16, &str); 8] = [
@@ -42,7 +45,9 @@ impl Eds {
                 object.entries.insert(sub, entry(section, index, sub)?);
             }
         }
-        Ok(Eds { device, objects })
+        // CiA 306 spells it with one m; not everybody does.
+        let commissioning = ini.section("devicecomissioning").or_else(|| ini.section("devicecommissioning"));
+        Ok(Eds { device, objects, commissioning: commissioning.map(self::commissioning).transpose()? })
     }
 
     /// [`Eds::parse`] of a file whose characters may be UTF-8 or, as older editors write, Latin-1.
@@ -95,6 +100,14 @@ fn device_info(section: Section) -> Result<DeviceInfo, Error> {
     })
 }
 
+fn commissioning(section: Section) -> Result<Commissioning, Error> {
+    Ok(Commissioning {
+        node_id: section.number("NodeID")?,
+        bit_rate: section.number("Baudrate")?,
+        serial: section.number("LSS_SerialNumber")?,
+    })
+}
+
 fn flag(section: Section, key: &'static str) -> Result<bool, Error> {
     section.number::<u8>(key).map(|value| value != 0)
 }
@@ -135,6 +148,7 @@ fn entry(section: Section, index: u16, sub: u8) -> Result<Entry, Error> {
         data_type,
         access: access(section)?,
         default: formula(section, "DefaultValue", data_type)?,
+        value: formula(section, "ParameterValue", data_type)?,
         low: formula(section, "LowLimit", data_type)?,
         high: formula(section, "HighLimit", data_type)?,
         mappable: flag(section, "PDOMapping")?,

@@ -19,7 +19,7 @@ impl Device {
     #[must_use]
     pub fn eds(&self) -> Eds {
         let objects = self.objects().map(|rows| self.object(rows)).map(|object| (object.index, object));
-        Eds { device: self.info(), objects: objects.collect() }
+        Eds { device: self.info(), objects: objects.collect(), commissioning: None }
     }
 
     /// The rows of each object.
@@ -69,6 +69,7 @@ impl Device {
             data_type: DataType(row.kind.code()),
             access: access(row),
             default: self.default(row),
+            value: None,
             low: row.limits.map(|(low, _)| constant(low)),
             high: row.limits.map(|(_, high)| constant(high)),
             mappable: row.mapping != Mapping::No,

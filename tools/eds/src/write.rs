@@ -42,12 +42,9 @@ impl Device {
         let eds = self.eds();
         self.file_info(out)?;
         device_info(&eds.device, out)?;
-        out.section("DummyUsage", "")?;
-        DUMMIES.into_iter().try_for_each(|(key, used)| out.key(key, used))?;
+        dummies(out)?;
         comments(out)?;
-        eds.objects("MandatoryObjects", is_mandatory, out)?;
-        eds.objects("OptionalObjects", |index| !is_mandatory(index) && !is_manufacturer(index), out)?;
-        eds.objects("ManufacturerObjects", is_manufacturer, out)
+        object_lists(&eds, out)
     }
 
     fn file_info(&self, out: &mut Sections) -> fmt::Result {
@@ -66,7 +63,7 @@ impl Device {
     }
 }
 
-fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Result {
+pub(crate) fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Result {
     out.section("DeviceInfo", "")?;
     out.key("VendorName", &device.vendor_name)?;
     out.key("VendorNumber", hex32(device.vendor_number))?;
@@ -85,6 +82,23 @@ fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Result {
     out.key("NrOfRXPDO", device.rpdos)?;
     out.key("NrOfTXPDO", device.tpdos)?;
     out.key("LSS_Supported", u8::from(device.lss))
+}
+
+/// What a configuration file has of the data sheet besides the device.
+pub(crate) fn write_lists(eds: &Eds, out: &mut Sections) -> fmt::Result {
+    dummies(out)?;
+    object_lists(eds, out)
+}
+
+fn dummies(out: &mut Sections) -> fmt::Result {
+    out.section("DummyUsage", "")?;
+    DUMMIES.into_iter().try_for_each(|(key, used)| out.key(key, used))
+}
+
+fn object_lists(eds: &Eds, out: &mut Sections) -> fmt::Result {
+    eds.objects("MandatoryObjects", is_mandatory, out)?;
+    eds.objects("OptionalObjects", |index| !is_mandatory(index) && !is_manufacturer(index), out)?;
+    eds.objects("ManufacturerObjects", is_manufacturer, out)
 }
 
 fn comments(out: &mut Sections) -> fmt::Result {
@@ -140,9 +154,13 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
     out.key("ObjectType", format_args!("0x{:X}", entry.object_type().code()))?;
     out.key("DataType", format_args!("0x{:04X}", entry.data_type.0))?;
     out.key("AccessType", entry.access.text())?;
-    for (key, value) in
-        [("DefaultValue", &entry.default), ("LowLimit", &entry.low), ("HighLimit", &entry.high)]
-    {
+    let values = [
+        ("DefaultValue", &entry.default),
+        ("ParameterValue", &entry.value),
+        ("LowLimit", &entry.low),
+        ("HighLimit", &entry.high),
+    ];
+    for (key, value) in values {
         if let Some(value) = value {
             out.key(key, value.text(entry.data_type))?;
         }
@@ -155,14 +173,14 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
 }
 
 /// Sections of keys, with the line ends that CiA 306 asks for.
-struct Sections<'a> {
-    out: &'a mut String,
+pub(crate) struct Sections<'a> {
+    pub(crate) out: &'a mut String,
 }
 
 impl Sections<'_> {
     /// Begins a section. The unit stands above it: there every reader takes a comment. A key `Unit`, which python-canopen
     /// would read, makes Lely's tools refuse the whole file.
-    fn section(&mut self, name: &str, unit: &str) -> fmt::Result {
+    pub(crate) fn section(&mut self, name: &str, unit: &str) -> fmt::Result {
         if !self.out.is_empty() {
             self.out.write_str("\r\n")?;
         }
@@ -172,7 +190,7 @@ impl Sections<'_> {
         write!(self.out, "[{name}]\r\n")
     }
 
-    fn key(&mut self, key: &str, value: impl Display) -> fmt::Result {
+    pub(crate) fn key(&mut self, key: &str, value: impl Display) -> fmt::Result {
         write!(self.out, "{key}={value}\r\n")
     }
 }

@@ -2,7 +2,7 @@
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
-use eds::{DEVICES, DataType, Eds, Entry, LookupError};
+use eds::{DEVICES, DataType, DeviceInfo, Eds, Entry, LookupError};
 
 /// The first index that is not of the communication profile, which is the same in all devices (CiA 301).
 const FIRST_OF_VENDOR: u16 = 0x2000;
@@ -51,6 +51,12 @@ impl Catalogue {
             Err(LookupError::Address(at)) => Ok(at),
             Err(error) => Err(error),
         }
+    }
+
+    /// The data sheet.
+    #[must_use]
+    pub fn into_sheet(self) -> Eds {
+        self.sheet
     }
 
     /// What is known about an object.
@@ -111,6 +117,8 @@ impl Catalogue {
 fn common() -> Eds {
     let mut eds = DEVICES.first().map(eds::Device::eds).unwrap_or_default();
     eds.objects.retain(|&index, _| index < FIRST_OF_VENDOR);
+    // It is the profile of every device, and the sheet of none.
+    eds.device = DeviceInfo::default();
     eds
 }
 

@@ -19,6 +19,7 @@ pub mod acquisition;
 pub mod bus;
 mod catalogue;
 pub mod cli;
+pub mod configuration;
 pub mod heartbeat;
 pub mod lift;
 pub mod lss;

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 
 use super::host;
 use super::report::Step;
-use crate::command::{cargo, run};
+use crate::command::{cargo, root, run};
 use crate::setup::{self, Need, python};
 use crate::target::Toolchain;
 use crate::{bench, images, progress};
@@ -33,6 +33,7 @@ pub(super) fn lane_of_images() -> Vec<Step> {
         Step::new("no panic", no_panic),
         Step::new("lint images", lint_images),
         Step::new("other chips", other_chips),
+        Step::new("embassy", embassy),
     ]
 }
 
@@ -66,6 +67,15 @@ fn other_chips() -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The library in an async main for the target. It is never run.
+fn embassy() -> Result<()> {
+    let example = ["--release", "-p", "canopen-device", "--example", "embassy"];
+    let scripts = root().join("crates/canopen/examples/embassy");
+    let mut command = Toolchain::ensure()?.cargo("rustc", &example);
+    command.args(["--", "-Clink-arg=-Tlink.x"]).arg(format!("-Clink-arg=-L{}", scripts.display()));
+    progress::build("embassy", &mut command)
 }
 
 /// Links everything that comes from the bus with a panic handler that cannot link; and shows that it would not link.

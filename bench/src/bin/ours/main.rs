@@ -78,8 +78,10 @@ impl From<Bits> for Received {
 }
 
 struct Ours {
-    device: Device<Keeper, { dictionary::SIZE }>,
+    device: canopen::device!(Keeper, dictionary::ROWS),
     driver: Driver,
+    /// When each half wants to be called, as the firmware keeps it.
+    alarms: [Instant; 2],
 }
 
 impl Node for Ours {
@@ -104,11 +106,13 @@ impl Node for Ours {
     }
 
     fn process(&mut self, Received(frame): Received, now: u64) {
-        black_box(self.device.on_process_frame(&frame, Instant(now), &mut self.driver));
+        let next = self.device.on_process_frame(&frame, Instant(now), &mut self.driver);
+        self.alarms[0] = next.process;
     }
 
     fn serve(&mut self, Received(frame): Received, now: u64) {
-        black_box(self.device.on_service_frame(&frame, Instant(now), &mut self.driver));
+        let next = self.device.on_service_frame(&frame, Instant(now), &mut self.driver);
+        self.alarms[1] = next.services;
     }
 }
 
@@ -117,6 +121,7 @@ impl Ours {
         Ours {
             device: Device::new(&dictionary::DICTIONARY, NodeId::new(ID), Keeper(Domain::new())),
             driver: Driver { room: black_box(usize::MAX) },
+            alarms: [Instant(0); 2],
         }
     }
 

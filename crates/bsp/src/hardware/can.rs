@@ -83,8 +83,10 @@ impl Controller {
         }
     }
 
-    /// What has been heard since the last call, but for frames that wait in a FIFO.
+    /// What has been heard since the last call, but for frames that wait in a FIFO; acknowledges the error interrupt, which would
+    /// come again and again otherwise.
     pub fn heard(&mut self) -> Heard {
+        registers().msr().write(|w| w.erri().set_bit());
         let code = registers().esr().read().lec().bits();
         self.mark_error_code();
         match code {

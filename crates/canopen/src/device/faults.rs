@@ -54,9 +54,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub fn set_condition(&mut self, number: u8, active: bool, now: Instant) -> Next {
         let fault = Fault::Application(number);
         if active {
-            self.core.raise(fault, now)
+            self.core.raise(fault, now);
         } else {
-            self.core.clear(fault, now)
+            self.core.clear(fault, now);
         }
         self.process_next()
     }

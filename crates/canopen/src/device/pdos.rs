@@ -45,8 +45,9 @@ impl Pdo {
     }
 
     /// Those that a dictionary has, one way.
-    fn all(dictionary: &Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
-        dictionary.pdos(direction).map(|communication| Pdo { communication })
+    fn all(dictionary: &'static Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
+        let communication = (0..).map_while(move |place| dictionary.pdo(direction, place));
+        communication.map(|communication| Pdo { communication })
     }
 }
 
@@ -76,8 +77,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
     fn place(&self, pdo: Pdo) -> Option<u16> {
-        let mut ranked = (0..).zip(self.dictionary.pdos(pdo.direction()));
-        ranked.find(|(_, index)| *index == pdo.communication).map(|(place, _)| place)
+        let mut ranked = (0..).zip(Pdo::all(self.dictionary, pdo.direction()));
+        ranked.find(|(_, other)| other.communication == pdo.communication).map(|(place, _)| place)
+    }
+
+    /// The same for a TPDO by its number, 1 to 512.
+    pub(super) fn tpdo_place(&self, number: u16) -> Option<u16> {
+        self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
     }
 
     fn apply(&mut self, pdo: Pdo, place: u16, now: Instant) {
@@ -101,6 +107,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let settings = self.rpdo_settings(pdo);
         if let Some(rpdo) = self.rpdos.get_mut(usize::from(place)) {
             rpdo.configure(settings);
+            rpdo.index = pdo.communication;
         }
         self.forget_rpdo_faults(place, now);
     }

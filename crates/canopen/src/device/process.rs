@@ -2,7 +2,7 @@
 
 use super::{Application, Core, Device, Next, STALE};
 use crate::nmt::Command;
-use crate::pdo::{Chain, Direction, Rpdo, Tpdo};
+use crate::pdo::{Chain, Rpdo, Tpdo};
 use crate::transmit::Turn;
 use crate::{CanId, Frame, Instant, Transmit};
 
@@ -10,19 +10,29 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     Device<A, N, T, R, W, M>
 {
     /// Takes a frame, whatever half it is for.
+    #[inline]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        let _ = self.on_process_frame(frame, now, out);
+        self.take_process_frame(frame, now, out);
         self.on_service_frame(frame, now, out)
     }
 
     /// Sends what is due in both halves.
+    #[inline]
     pub fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let _ = self.poll_process(now, out);
         self.poll_services(now, out)
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
+    // What follows is put together where the caller needs it; the work has its place once.
+    #[inline]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        self.take_process_frame(frame, now, out);
+        self.process_next()
+    }
+
+    #[inline(never)]
+    fn take_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         let turn = &mut self.turn(now, out);
         if frame.id() == CanId::NMT.get() {
             self.on_nmt(frame);
@@ -30,7 +40,6 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             self.core.on_pdo_frame(frame, turn);
         }
         self.send_process(turn);
-        self.process_next()
     }
 
     #[inline(never)]
@@ -41,9 +50,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Sends what is due of process data.
+    #[inline]
     pub fn poll_process(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        let turn = &mut self.turn(now, out);
-        self.send_process(turn);
+        if now >= self.core.process_due {
+            let turn = &mut self.turn(now, out);
+            self.send_process(turn);
+        }
         self.process_next()
     }
 
@@ -53,16 +65,23 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             core.process_due = Instant::NEVER;
             return;
         }
-        if turn.now >= core.process_due {
-            core.poll_sync(turn.now);
-            let mut due = core.poll_rpdos(turn.now);
-            core.each_tpdo(Chain::Valid, |tpdo, image| {
-                tpdo.poll(image, turn);
-                due = due.min(tpdo.due());
-            });
-            core.scanner.poll(&core.image, turn);
-            core.process_due = due.min(core.scanner.due()).min(core.sync.due());
+        if turn.now < core.process_due {
+            return;
         }
+        self.run_process(turn);
+    }
+
+    #[inline(never)]
+    fn run_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        let core = &mut self.core;
+        core.poll_sync(turn.now);
+        let mut due = core.poll_rpdos(turn.now);
+        core.each_tpdo(Chain::Valid, |tpdo, image| {
+            tpdo.poll(image, turn);
+            due = due.min(tpdo.due());
+        });
+        core.scanner.poll(&core.image, turn);
+        core.process_due = due.min(core.scanner.due()).min(core.sync.due());
     }
 
     /// Lets the application update values in the image, and sends what their change triggers. The first call after a start
@@ -82,10 +101,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// found. `tpdo` is the number, 1 to 512; one that is not valid, or of another type, is not sent.
     pub fn send_tpdo(&mut self, tpdo: u16, now: Instant, out: &mut impl Transmit) -> Next {
         let turn = &mut self.turn(now, out);
-        let mut numbers = self.core.dictionary.pdos(Direction::Transmit).map(|index| (index & 0x1FF) + 1);
-        let place = numbers.position(|number| number == tpdo);
+        let place = self.core.tpdo_place(tpdo);
         if self.core.state.has_pdos()
-            && let Some(tpdo) = place.and_then(|place| self.core.tpdos.get_mut(place))
+            && let Some(tpdo) = place.and_then(|place| self.core.tpdos.get_mut(usize::from(place)))
         {
             tpdo.on_event();
             self.core.process_due = STALE;

@@ -3,7 +3,7 @@
 use super::{Application, Core, STALE};
 use crate::dictionary::{Entry, Rule, little_endian};
 use crate::emcy::Fault;
-use crate::pdo::{Chain, Direction, MappedObject, Reception, Rpdo, RpdoFault};
+use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Instant};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
@@ -18,18 +18,20 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         while let Some(rpdo) = self.rpdos.get(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
-            self.take_rpdo(place, frame, now);
+            if rpdo.id().is_some_and(|id| id.get() == frame.id()) {
+                self.take_rpdo(place, frame, now);
+            }
         }
     }
 
     fn take_rpdo(&mut self, place: usize, frame: &Frame, now: Instant) {
-        let late = self.sync.is_window_over(now);
         let Some(rpdo) = self.rpdos.get_mut(place) else { return };
-        let Some((reception, data)) = rpdo.take(frame, now, late) else { return };
+        let late = rpdo.is_synchronous() && self.sync.is_window_over(now);
+        let (reception, is_valid) = rpdo.take(frame, now, late);
         self.process_due = self.process_due.min(rpdo.due());
         let has_faults = rpdo.has_faults();
-        if let Some(data) = data {
-            self.store_rpdo(place, data);
+        if is_valid {
+            self.store_rpdo(place, frame.bytes());
         }
         if let Reception::Multiplexed(addressing) = reception {
             self.on_mpdo(frame.bytes(), addressing, now);
@@ -41,21 +43,19 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Takes the data of an RPDO into the image, and tells the application.
     pub(super) fn store_rpdo(&mut self, place: usize, data: [u8; 8]) {
-        let layout = self.rpdos.get(place).and_then(Rpdo::layout);
-        match layout {
+        let Some(rpdo) = self.rpdos.get(place) else { return };
+        let index = rpdo.index;
+        match rpdo.layout() {
             Some(layout) if !layout.is_checked() => layout.scatter(data, &mut self.image),
-            _ => self.store_checked(place, data),
+            _ => self.store_checked(index, data),
         }
-        if let Some(communication) = self.dictionary.pdos(Direction::Receive).nth(place) {
-            self.application.received((communication & 0x1FF) + 1, &mut self.image);
-        }
+        self.application.received((index & 0x1FF) + 1, &mut self.image);
     }
 
     /// The same where objects have limits or rules: each value is checked as a write by SDO is, and one that is refused is
     /// left out.
     #[inline(never)]
-    fn store_checked(&mut self, place: usize, data: [u8; 8]) {
-        let Some(communication) = self.dictionary.pdos(Direction::Receive).nth(place) else { return };
+    fn store_checked(&mut self, communication: u16, data: [u8; 8]) {
         let (mapping, mut rest) = (communication | 0x0200, data.as_slice());
         let [count, ..] = self.number(mapping, 0).to_le_bytes();
         for slot in 0..count {
@@ -85,6 +85,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
+    #[inline(never)]
     fn on_reception(&mut self, place: usize, reception: Reception, now: Instant) {
         self.set_rpdo_fault(place, RpdoFault::TooShort, reception == Reception::TooShort, now);
         self.set_rpdo_fault(place, RpdoFault::TooLong, reception == Reception::TooLong, now);
@@ -93,6 +94,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
+    #[inline(never)]
     fn set_rpdo_fault(&mut self, place: usize, kind: RpdoFault, active: bool, now: Instant) {
         let Some(rpdo) = self.rpdos.get_mut(place) else { return };
         if !rpdo.set_fault(kind, active) {

@@ -16,7 +16,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     Device<A, N, T, R, W, M>
 {
     /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
+    #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        self.take_service_frame(frame, now, out);
+        self.services_next()
+    }
+
+    #[inline(never)]
+    fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
         if frame.id() == self.core.service(SDO_REQUEST).get() {
             self.on_sdo(frame, now, out);
         } else if frame.id() == lss::REQUEST.get() {
@@ -24,7 +31,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         } else if frame.id() & 0x780 == ERROR_CONTROL && !A::SERVICES_ONLY {
             self.core.on_heartbeat(frame, now);
         }
-        self.poll_services(now, out)
+        if now >= self.core.services_due {
+            self.send_services(now, out);
+        }
     }
 
     /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
@@ -82,6 +91,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Sends what is due of the services, and hands over what is left to the caller.
+    #[inline]
     pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         if now >= self.core.services_due {
             self.send_services(now, out);

@@ -38,8 +38,9 @@ impl Scope {
 
 /// What waits for the caller.
 #[derive(Debug)]
+#[allow(clippy::struct_excessive_bools)] // Each waits for its own.
 pub(super) struct Pending {
-    /// Something of the following is there to be handed over.
+    /// An action waits to be handed over.
     is_waiting: bool,
     /// What the next start covers; told to the caller once.
     reset: Reset,
@@ -84,7 +85,7 @@ impl Pending {
     }
 
     pub(super) fn parameters_changed(&mut self) {
-        (self.parameters, self.is_waiting) = (true, true);
+        self.parameters = true;
     }
 }
 
@@ -124,27 +125,29 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// What follows from a call of the process half.
+    #[inline]
     pub(super) fn process_next(&self) -> Next {
         let Core { process_due, services_due, .. } = self.core;
         Next { process: process_due, services: services_due, action: None, parameters: false }
     }
 
     /// What follows from a call of the services half.
+    #[inline]
     pub(super) fn services_next(&mut self) -> Next {
-        let next = self.process_next();
-        if self.core.pending.is_waiting { self.hand_over() } else { next }
+        let parameters = core::mem::take(&mut self.core.pending.parameters);
+        let action = if self.core.pending.is_waiting { self.hand_over() } else { None };
+        Next { action, parameters, ..self.process_next() }
     }
 
     #[inline(never)]
-    fn hand_over(&mut self) -> Next {
-        let parameters = core::mem::take(&mut self.core.pending.parameters);
+    fn hand_over(&mut self) -> Option<Action> {
         let action = self.take_action();
         let is_waiting = self.core.pending.has_action() || self.core.jobs.is_untold();
         self.core.pending.is_waiting = is_waiting;
         if is_waiting {
             self.core.services_due = STALE;
         }
-        Next { action, parameters, ..self.process_next() }
+        action
     }
 
     /// The next thing that is left to the caller.

@@ -59,8 +59,7 @@ const fn check_row(row: &Object) {
             assert!(capacity as usize <= BUFFER, "an SDO transfer has no room for the text");
             assert!(text.is_ascii() && text.len() <= capacity as usize, "the default does not fit");
         }
-        (DefaultValue::NodeId(_), Type::Unsigned32) => (),
-        (DefaultValue::None, Type::Domain) => (),
+        (DefaultValue::NodeId(_), Type::Unsigned32) | (DefaultValue::None, Type::Domain) => (),
         _ => panic!("the default is of another type"),
     }
     let mappable = !matches!(row.mapping, Mapping::No);
@@ -72,9 +71,8 @@ const fn check_row(row: &Object) {
     assert!(!row.mapping.allows_rpdo() || row.access.is_writable(), "an RPDO writes what can be written");
     let takes_values = matches!(row.rule, Rule::Plain | Rule::Application);
     assert!(!row.mapping.allows_rpdo() || takes_values, "an RPDO writes no object of the protocol");
-    match row.rule.size() {
-        Some(size) => assert!(row.kind.size() == size, "the object has another type"),
-        None => (),
+    if let Some(size) = row.rule.size() {
+        assert!(row.kind.size() == size, "the object has another type");
     }
     let is_time = matches!(row.kind, Type::Unsigned16) && row.group.is_none();
     assert!(

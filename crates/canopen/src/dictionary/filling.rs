@@ -24,6 +24,7 @@ const MOST_DEFAULTS: usize = 1 << 16;
 const MOST_ATTRIBUTES: usize = 256;
 
 #[allow(clippy::cast_possible_truncation)] // `check` has seen the ranges, and there is no room for more numbers.
+#[allow(clippy::large_stack_arrays)] // It is filled during compilation.
 impl Filling {
     pub(super) const fn of(all: &[&[Object]]) -> Filling {
         let mut filling = Filling {

@@ -105,16 +105,23 @@ impl Dictionary {
         self.defaults.get(first..first + usize::from(series.given)).unwrap_or_default()
     }
 
-    /// The indexes of the communication objects of its PDOs one way, ascending.
-    pub(crate) fn pdos(&self, direction: Direction) -> impl Iterator<Item = u16> {
+    /// The index of the communication object of a PDO: the one at this place among those that the dictionary has one way,
+    /// ascending.
+    #[inline(never)]
+    pub(crate) fn pdo(&self, direction: Direction, place: u16) -> Option<u16> {
         let first = match direction {
             Direction::Transmit => 0x1800,
             Direction::Receive => 0x1400,
         };
         let begin = self.series.partition_point(|series| series.index < first);
-        let series = self.series.get(begin..).unwrap_or_default().iter();
-        let of_pdos = series.take_while(move |series| series.index & 0xFE00 == first);
-        of_pdos.flat_map(|series| (0..series.objects.into()).map(|number| series.index.wrapping_add(number)))
+        let mut rest = place;
+        for series in self.series.get(begin..)?.iter().take_while(|series| series.index & 0xFE00 == first) {
+            match rest.checked_sub(series.objects.into()) {
+                None => return Some(series.index.wrapping_add(rest)),
+                Some(less) => rest = less,
+            }
+        }
+        None
     }
 
     /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.

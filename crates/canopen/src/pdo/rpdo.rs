@@ -66,6 +66,8 @@ pub(crate) enum RpdoFault {
 pub(crate) struct Rpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
+    /// Index of its communication object.
+    pub(crate) index: u16,
     settings: Option<RpdoSettings>,
     /// Data that waits for SYNC, the newest.
     waiting: Option<[u8; 8]>,
@@ -77,7 +79,7 @@ pub(crate) struct Rpdo {
 
 impl Rpdo {
     pub(crate) const fn new() -> Rpdo {
-        Rpdo { links: Links::END, settings: None, waiting: None, due: Instant::NEVER, faults: 0 }
+        Rpdo { links: Links::END, index: 0, settings: None, waiting: None, due: Instant::NEVER, faults: 0 }
     }
 
     /// Whether its data waits for the SYNC.
@@ -101,18 +103,14 @@ impl Rpdo {
         self.settings.as_ref().map(|settings| settings.id)
     }
 
-    /// Takes a data frame if it is this PDO's: how its length compares, and the data if it is valid at once. `late` is true
-    /// when the synchronous window is over: a synchronous PDO is then ignored.
-    pub(crate) fn take(
-        &mut self,
-        frame: &Frame,
-        now: Instant,
-        late: bool,
-    ) -> Option<(Reception, Option<[u8; 8]>)> {
-        let settings = self.settings.as_ref().filter(|settings| settings.id.get() == frame.id())?;
+    /// Takes a data frame of this PDO: how its length compares, and whether the data is valid at once. `late` is true when
+    /// the synchronous window is over: a synchronous PDO is then ignored.
+    #[inline]
+    pub(crate) fn take(&mut self, frame: &Frame, now: Instant, late: bool) -> (Reception, bool) {
+        let Some(settings) = &self.settings else { return (Reception::TooShort, false) };
         let mapped = settings.len();
         if frame.len() < mapped {
-            return Some((Reception::TooShort, None));
+            return (Reception::TooShort, false);
         }
         self.due = match settings.deadline {
             0 => Instant::NEVER,
@@ -120,13 +118,13 @@ impl Rpdo {
         };
         let reception = if frame.len() == mapped { Reception::Complete } else { Reception::TooLong };
         match (&settings.content, settings.is_synchronous) {
-            (Content::Multiplexed(addressing), _) => Some((Reception::Multiplexed(*addressing), None)),
-            (Content::Objects(_), false) => Some((reception, Some(frame.bytes()))),
+            (Content::Multiplexed(addressing), _) => (Reception::Multiplexed(*addressing), false),
+            (Content::Objects(_), false) => (reception, true),
             (Content::Objects(_), true) => {
                 if !late {
                     self.waiting = Some(frame.bytes());
                 }
-                Some((reception, None))
+                (reception, false)
             }
         }
     }

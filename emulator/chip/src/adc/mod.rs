@@ -213,6 +213,12 @@ impl Adc {
         if scan { self.sequence.length() } else { 1 }
     }
 
+    /// The channels of the sequence, each with its sample time.
+    pub(crate) fn sampling(&self) -> Vec<(u32, Time)> {
+        let time = |rank| times(self.cycle, self.sequence.sample_cycles(rank));
+        (0..self.length()).map(|rank| (self.sequence.channel(rank), time(rank))).collect()
+    }
+
     /// When the conversion under way ends.
     pub(crate) fn conversion_end(&self) -> Time {
         self.conversion.map_or(Time::NEVER, |conversion| conversion.end)

@@ -118,6 +118,11 @@ impl BxCan {
         *self = BxCan { monitor, reception, poke: true, ..BxCan::new(self.slave, self.clock) };
     }
 
+    /// CAN_BTR.
+    pub(crate) fn timing(&self) -> u32 {
+        self.timing
+    }
+
     /// What the receive FIFOs were given.
     pub fn reception(&self) -> Reception {
         self.reception

@@ -107,8 +107,9 @@ impl Mailbox {
 pub(crate) struct Transmitter {
     mailboxes: [Mailbox; MAILBOXES],
     turns: u64,
-    /// Completions that a test wants lost.
-    pub(crate) to_lose: usize,
+    /// Completions that a test wants lost, and aborts that it wants too late.
+    pub(crate) lost_ends: usize,
+    pub(crate) late_aborts: usize,
 }
 
 impl Transmitter {
@@ -148,7 +149,13 @@ impl Transmitter {
     /// Writes CAN_TSR.
     pub(crate) fn write_status(&mut self, value: u32) {
         for (n, mailbox) in self.mailboxes.iter_mut().enumerate() {
-            mailbox.write_status(value >> (8 * n) & 0xFF);
+            let value = value >> (8 * n) & 0xFF;
+            let is_late = self.late_aborts > 0 && bit(value, ABRQ) && mailbox.state == State::Pending;
+            if is_late {
+                self.late_aborts -= 1;
+                mailbox.abort = true;
+            }
+            mailbox.write_status(if is_late { value & !(1 << ABRQ) } else { value });
         }
     }
 
@@ -234,8 +241,8 @@ impl Transmitter {
     }
 
     pub(crate) fn sent(&mut self) {
-        let is_lost = self.to_lose > 0;
-        self.to_lose = self.to_lose.saturating_sub(1);
+        let is_lost = self.lost_ends > 0;
+        self.lost_ends = self.lost_ends.saturating_sub(1);
         if let Some(mailbox) = self.on_wire() {
             mailbox.outcome = Outcome::Sent;
             mailbox.complete();

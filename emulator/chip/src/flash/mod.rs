@@ -122,6 +122,11 @@ impl Flash {
         self.stuck_until = until;
     }
 
+    /// FLASH_ACR.LATENCY.
+    pub(crate) fn wait_states(&self) -> u32 {
+        field(self.acr, 0, 4)
+    }
+
     /// Operations so far.
     pub fn operations(&self) -> u64 {
         self.operations

@@ -8,6 +8,7 @@ mod flash;
 mod flash_interface;
 mod others;
 mod protection;
+mod rules;
 mod support;
 mod timers;
 mod watchdog;

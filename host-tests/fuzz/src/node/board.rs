@@ -107,7 +107,10 @@ impl Board {
             parameters = self.protocol.load(&mut view);
             self.store = Store::prepare(view).ok();
         }
-        self.measurement = Measurement::new(self.personality, &PowerOn { thermometer: CHIP, retained });
+        self.measurement = Measurement::new(
+            self.personality,
+            &PowerOn { thermometer: CHIP, retained, ..PowerOn::default() },
+        );
         self.measurement.apply(&parameters);
         self.start();
     }

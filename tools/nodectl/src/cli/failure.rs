@@ -23,7 +23,8 @@ Exit codes:
   4  the bus cannot be opened, or is lost
   5  the node did not accept the new program, or has another than it was given
   6  the program is not for this node; nothing was changed
-  7  a file cannot be read or written";
+  7  a file cannot be read or written
+  8  two configurations differ (diff)";
 
 /// Why a command failed.
 #[derive(Debug, Error)]
@@ -63,6 +64,12 @@ pub enum Failure {
         /// Of the first that could not.
         exit_code: u8,
     },
+    /// Two configurations are not the same.
+    #[error("{0} parameters differ")]
+    Different(usize),
+    /// A node does not have what was written to it.
+    #[error("still different after it was written: {0}")]
+    NotApplied(String),
     /// Somebody did not answer.
     #[error("{0}")]
     Silence(String),
@@ -108,6 +115,8 @@ impl Failure {
     pub fn exit_code(&self) -> u8 {
         match self {
             Failure::Usage(_) => 2,
+            Failure::Different(_) => 8,
+            Failure::NotApplied(_) => 1,
             Failure::Sdo(error) => sdo_code(error),
             Failure::Lss(lss::Error::Service(Service::Refused(..))) => 1,
             Failure::Lss(lss::Error::Service(Service::NoAnswer(_))) | Failure::Silence(_) => 3,

@@ -1,8 +1,11 @@
 //! The command line: one file for each command.
 
+mod dump;
 mod failure;
 mod info;
+mod list;
 mod lss;
+mod map;
 mod monitor;
 mod nmt;
 mod node_set;
@@ -45,6 +48,12 @@ enum Command {
     Info(info::Info),
     Read(read::Read),
     Write(write::Write),
+    List(list::List),
+    Map(map::Map),
+    Unmap(map::Unmap),
+    Dump(dump::Dump),
+    Diff(dump::Diff),
+    Apply(dump::Apply),
     Monitor(monitor::Monitor),
     Record(record::Record),
     Save(store::Save),
@@ -74,6 +83,12 @@ impl Cli {
             Command::Info(info) => info.run(session),
             Command::Read(read) => read.run(session),
             Command::Write(write) => write.run(session),
+            Command::List(list) => list.run(session),
+            Command::Map(map) => map.run(session),
+            Command::Unmap(unmap) => unmap.run(session),
+            Command::Dump(dump) => dump.run(session),
+            Command::Diff(diff) => diff.run(session),
+            Command::Apply(apply) => apply.run(session),
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
             Command::Save(save) => save.run(session),

@@ -158,6 +158,18 @@ impl Reading {
         )
     }
 
+    /// The value with its unit and what it stands for.
+    pub(super) fn value_text(&self) -> String {
+        let meaning = self.meaning.as_ref().map(|meaning| format!(" [{meaning}]")).unwrap_or_default();
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        format!("{}{unit}{meaning}", visible(&self.value.to_string()))
+    }
+
+    /// The value as JSON has it.
+    pub(super) fn json_value(&self) -> serde_json::Value {
+        serde_json::to_value(&self.value).unwrap_or_default()
+    }
+
     /// Of a value that is decoded.
     pub(super) fn of(
         node: u8,

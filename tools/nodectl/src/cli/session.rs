@@ -9,9 +9,11 @@ use canopen::nmt::State;
 use canopen::sdo::Multiplexer;
 use canopen::{Instant, NodeId};
 use eds::Eds;
+use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{Failure, Options, Output};
+use crate::configuration::Configuration;
 use crate::object::at;
 use crate::sdo::{self, Client};
 use crate::text::visible_lines;
@@ -85,6 +87,34 @@ impl Session {
         Ok(self.catalogues.entry(node).or_insert(catalogue).clone())
     }
 
+    /// The data sheet of a node, for what needs one.
+    pub(super) fn sheet_of(&mut self, node: NodeId) -> Result<Eds, Failure> {
+        let sheet = self.catalogue(node)?.into_sheet();
+        if sheet.device.product_name.is_empty() {
+            let node = node.get();
+            return Err(Failure::Usage(format!(
+                "no data sheet is known for node {node}: give it with --eds"
+            )));
+        }
+        Ok(sheet)
+    }
+
+    /// The values of all parameters of a node.
+    pub(super) fn configuration(&mut self, node: NodeId, sheet: &Eds) -> Result<Configuration, Failure> {
+        self.catalogue(node)?;
+        let bar = ProgressBar::new(0).with_message(format!("reading node {}", node.get()));
+        let values = Configuration::of_node(
+            |at| self.client(node).upload(at),
+            sheet,
+            |done, all| {
+                bar.set_length(all as u64);
+                bar.set_position(done as u64);
+            },
+        );
+        bar.finish_and_clear();
+        values.map_err(|error| self.named(error))
+    }
+
     fn identify(&mut self, node: NodeId) -> Result<Option<Catalogue>, Failure> {
         let (vendor, product) = (self.word(node, at(0x1018, 1))?, self.word(node, at(0x1018, 2))?);
         Ok(vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)))
@@ -128,7 +158,7 @@ impl Session {
             (0x0609_0030..=0x0609_0032, _) => {
                 catalogue?.range(error.at, error.node).map(|range| format!("it takes {range}"))
             }
-            (_, 0x1400..=0x1BFF) if code >> 24 == 6 || code >> 24 == 8 => {
+            (0x0601_0000 | 0x0800_0022, 0x1400..=0x1BFF) => {
                 let communication = error.at.index & !0x0200;
                 Some(format!(
                     "a PDO is changed while it is switched off (bit 31 of {communication:04X}h:1) and its mapping is \
@@ -155,7 +185,8 @@ impl Session {
     }
 }
 
-fn sheet(path: &Path) -> Result<Eds, Failure> {
+/// A data sheet or a configuration file.
+pub(super) fn sheet(path: &Path) -> Result<Eds, Failure> {
     let size = fs::metadata(path).map_err(|error| Failure::file(path, error))?.len();
     if size > LARGEST_SHEET {
         return Err(Failure::file(path, "it is larger than any data sheet (4 MiB)"));

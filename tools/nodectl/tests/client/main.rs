@@ -3,6 +3,7 @@
 mod bad_input;
 mod blocks;
 mod commands;
+mod configuration;
 mod hostile;
 mod loader;
 mod lss;

@@ -15,27 +15,30 @@ use crate::configuration;
 pub(crate) fn make(
     place: &'static mut MaybeUninit<Measurement>,
     personality: Personality,
+    cause: ResetCause,
     found: &Found,
 ) -> &'static mut Measurement {
-    place.write(Measurement::new(personality, &power_on(found)))
+    place.write(Measurement::new(personality, &power_on(cause, found)))
 }
 
-/// Says what the start tells of the battery.
-pub(crate) fn report_battery(cause: ResetCause, found: &Found) {
-    match Battery::after(cause, found) {
+/// Whether the battery has failed; what the start tells of the battery is in the log as well.
+fn battery_failed(cause: ResetCause, found: &Found) -> bool {
+    let battery = Battery::after(cause, found);
+    match battery {
         Battery::Unknown => {}
         Battery::Holds => defmt::info!("the battery has kept the backup SRAM"),
         Battery::Lost => {
             defmt::warn!("no battery has kept the backup SRAM: it is empty or missing, or the board is new")
         }
     }
+    battery == Battery::Lost
 }
 
 /// What the board knows when the power comes.
 ///
 /// Memory without a trace of a copy is that of a new board, and after a loss of power that of one without a battery, or with
 /// an empty one: the two cannot be told apart, and the encoder begins anew.
-fn power_on(found: &Found) -> PowerOn {
+fn power_on(cause: ResetCause, found: &Found) -> PowerOn {
     let retained = match found {
         Found::Nothing => Retained::Nothing,
         Found::Kept(words) => Retained::Words(*words),
@@ -44,5 +47,6 @@ fn power_on(found: &Found) -> PowerOn {
             Retained::Damaged
         }
     };
-    PowerOn { thermometer: configuration::thermometer(), retained }
+    let battery_failed = battery_failed(cause, found);
+    PowerOn { thermometer: configuration::thermometer(), retained, battery_failed }
 }

@@ -1,0 +1,203 @@
+//! Rules that silicon does not forgive: limits of the data sheet, and wiring that a program must switch on. A breach does not
+//! change what the models do: it is reported, and whoever runs the chip decides that the run has failed.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::ops::RangeInclusive;
+
+use canbus::Time;
+use thiserror::Error;
+
+use crate::register::field;
+use crate::stm32f4::Stm32f4;
+use crate::variant::Variant;
+
+/// A rule that a program has broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Error)]
+pub enum Breach {
+    /// The flash is read faster than it can be (RM0390 table 5, RM0090 table 10, for 2.7 to 3.6 V).
+    #[error("{states} wait states of the flash at {hertz} Hz; it needs {least}")]
+    WaitStates {
+        /// HCLK.
+        hertz: u64,
+        /// FLASH_ACR.LATENCY.
+        states: u32,
+        /// What it must be.
+        least: u32,
+    },
+    /// A clock outside its limits (DS10693 and DS8626, general operating conditions and PLL characteristics).
+    #[error("{name} at {hertz} Hz; the data sheet allows {least} to {most} Hz")]
+    Clock {
+        /// Which one.
+        name: &'static str,
+        /// Its frequency.
+        hertz: u64,
+        /// The lowest one allowed.
+        least: u64,
+        /// The highest one allowed.
+        most: u64,
+    },
+    /// A peripheral is used whose pin is not switched to it.
+    #[error("P{port}{pin} is not switched to {function}")]
+    Pin {
+        /// `'A'` to `'I'`.
+        port: char,
+        /// 0 to 15.
+        pin: u32,
+        /// What the board wires it to.
+        function: &'static str,
+    },
+    /// A source is sampled for too short a time (DS10693, temperature sensor and internal reference characteristics).
+    #[error("ADC channel {channel} is sampled for {nanoseconds} ns; it takes {least} ns")]
+    SamplingTime {
+        /// The channel.
+        channel: u32,
+        /// How long.
+        nanoseconds: u64,
+        /// How long it must be.
+        least: u64,
+    },
+    /// CAN samples outside the range that CiA 301 gives, 85 to 90 % of the bit.
+    #[error("CAN samples at {permille} permille of a bit; CiA 301 allows 850 to 900")]
+    SamplePoint {
+        /// The sample point.
+        permille: u32,
+    },
+    /// A peripheral is accessed whose clock is off or whose reset is held.
+    #[error("{name} is accessed without its clock")]
+    ClockOff {
+        /// The peripheral.
+        name: &'static str,
+    },
+    /// The backup domain is written while it is protected.
+    #[error("{name} is written while the backup domain is protected")]
+    Protected {
+        /// The peripheral.
+        name: &'static str,
+    },
+    /// Something is asked for that the emulator has not.
+    #[error("{what} is not modelled")]
+    NotModelled {
+        /// What.
+        what: &'static str,
+    },
+}
+
+/// What was broken, each breach once.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rules {
+    known: BTreeSet<Breach>,
+    fresh: VecDeque<Breach>,
+    /// Nothing that conversions depend on has changed since they were looked at.
+    pub(crate) conversions_checked: bool,
+}
+
+impl Rules {
+    pub(crate) fn check(&mut self, holds: bool, breach: Breach) {
+        if !holds && self.known.insert(breach) {
+            self.fresh.push_back(breach);
+        }
+    }
+
+    /// The next breach that nobody has been told of.
+    pub(crate) fn take(&mut self) -> Option<Breach> {
+        self.fresh.pop_front()
+    }
+}
+
+const MEGA: u64 = 1_000_000;
+/// HCLK that a wait state is good for at 2.7 to 3.6 V.
+const PER_WAIT_STATE: u64 = 30 * MEGA;
+/// Input and VCO of the PLL.
+const PLL_INPUT: RangeInclusive<u64> = 950_000..=2_100_000;
+const PLL_VCO: RangeInclusive<u64> = 100 * MEGA..=432 * MEGA;
+/// The ADC clock at 2.4 to 3.6 V.
+const ADC_CLOCK: RangeInclusive<u64> = 600_000..=36 * MEGA;
+/// What the temperature sensor and the internal reference need.
+const INTERNAL_SOURCE: Time = Time::from_micros(10);
+/// The range of sample points in CiA 301, table 1, in permille.
+const SAMPLE_POINT: RangeInclusive<u32> = 850..=900;
+
+/// Ports.
+const A: usize = 0;
+const B: usize = 1;
+const C: usize = 2;
+/// The transceiver of the board is at PB8 and PB9, which AF9 switches to CAN1 (DS10693 table 11).
+const CAN_FUNCTION: u32 = 9;
+const CAN_RX: u32 = 8;
+const CAN_TX: u32 = 9;
+/// The inputs of ADC1 that the board uses, with their pins.
+const ANALOGUE: [(u32, usize, char, u32); 3] = [(0, A, 'A', 0), (1, A, 'A', 1), (12, C, 'C', 2)];
+/// The internal reference.
+const REFERENCE: u32 = 17;
+
+impl Stm32f4 {
+    fn check_clock(&mut self, name: &'static str, hertz: u64, range: &RangeInclusive<u64>) {
+        let (least, most) = (*range.start(), *range.end());
+        self.rules.check(range.contains(&hertz), Breach::Clock { name, hertz, least, most });
+    }
+
+    /// After a change of the clock tree, the regulator or the wait states.
+    pub(crate) fn check_clocks(&mut self) {
+        let clocks = self.clocks;
+        let (hclk, pclk1, pclk2) = self.highest_clocks();
+        self.check_clock("HCLK", clocks.hclk, &(0..=hclk));
+        self.check_clock("PCLK1", clocks.pclk1(), &(0..=pclk1));
+        self.check_clock("PCLK2", clocks.hclk / u64::from(clocks.apb2_divider), &(0..=pclk2));
+        if let Some((input, vco)) = self.rcc.pll() {
+            self.check_clock("the input of the PLL", input, &PLL_INPUT);
+            self.check_clock("the VCO of the PLL", vco, &PLL_VCO);
+        }
+        let (states, hertz) = (self.flash.wait_states(), clocks.hclk);
+        let least = hertz.div_ceil(PER_WAIT_STATE).saturating_sub(1) as u32;
+        self.rules.check(states >= least, Breach::WaitStates { hertz, states, least });
+    }
+
+    /// HCLK, PCLK1 and PCLK2 as the voltage of the core allows them.
+    fn highest_clocks(&self) -> (u64, u64, u64) {
+        let over = self.pwr.over_drives();
+        let hclk = match (self.variant, self.pwr.scale()) {
+            (Variant::F446, 1) if over => 180,
+            (Variant::F446, 2) if over => 168,
+            (Variant::F446, 3) => 120,
+            (_, 1) => 168,
+            _ => 144,
+        };
+        let (pclk1, pclk2) = if over { (45, 90) } else { (42, 84) };
+        (hclk * MEGA, pclk1 * MEGA, pclk2 * MEGA)
+    }
+
+    /// When CAN1 is about to go on the bus.
+    pub(crate) fn check_can(&mut self) {
+        let timing = self.can.can1.timing();
+        let (looped, silent) = (field(timing, 30, 1) != 0, field(timing, 31, 1) != 0);
+        let pin = |pin, function| Breach::Pin { port: 'B', pin, function };
+        let hears = looped || self.ports[B].alternate(CAN_RX, CAN_FUNCTION);
+        self.rules.check(hears, pin(CAN_RX, "CAN1_RX"));
+        let speaks = looped || silent || self.ports[B].alternate(CAN_TX, CAN_FUNCTION);
+        self.rules.check(speaks, pin(CAN_TX, "CAN1_TX"));
+        let (before, after) = (field(timing, 16, 4) + 2, field(timing, 20, 3) + 1);
+        let permille = 1000 * before / (before + after);
+        self.rules.check(SAMPLE_POINT.contains(&permille), Breach::SamplePoint { permille });
+    }
+
+    /// Before a conversion, once for each setting.
+    pub(crate) fn check_conversions(&mut self) {
+        if std::mem::replace(&mut self.rules.conversions_checked, true) {
+            return;
+        }
+        let clock = self.clocks.hclk / u64::from(self.clocks.apb2_divider * self.adc_common.divider());
+        self.check_clock("ADCCLK", clock, &ADC_CLOCK);
+        for (channel, sampled) in self.adc.sampling() {
+            if channel == REFERENCE || channel == self.variant.temperature_channel() {
+                let nanoseconds = |time: Time| time.0 * 1000 / Time::PER_MICRO;
+                let (nanoseconds, least) = (nanoseconds(sampled), nanoseconds(INTERNAL_SOURCE));
+                let breach = Breach::SamplingTime { channel, nanoseconds, least };
+                self.rules.check(sampled >= INTERNAL_SOURCE, breach);
+            }
+            for (_, index, port, pin) in ANALOGUE.into_iter().filter(|place| place.0 == channel) {
+                let breach = Breach::Pin { port, pin, function: "analogue" };
+                self.rules.check(self.ports[index].is_analogue(pin), breach);
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! System registers and exceptions where they are easily got wrong: SysTick, the cycle counter, states of exceptions, SVC under
+//! PRIMASK, returns that do not fit, and Thread mode without privileges.
+#![no_std]
+#![no_main]
+
+use core::arch::{asm, global_asm};
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+use cortex_m_rt::{entry, exception};
+use mechanics_images::{expect, finish};
+
+const SYST_CSR: *mut u32 = 0xE000_E010 as *mut u32;
+const SYST_RVR: *mut u32 = 0xE000_E014 as *mut u32;
+const SYST_CVR: *mut u32 = 0xE000_E018 as *mut u32;
+const ICSR: *mut u32 = 0xE000_ED04 as *mut u32;
+const SHCSR: *mut u32 = 0xE000_ED24 as *mut u32;
+const DEMCR: *mut u32 = 0xE000_EDFC as *mut u32;
+const DWT_CTRL: *mut u32 = 0xE000_1000 as *mut u32;
+const DWT_CYCCNT: *mut u32 = 0xE000_1004 as *mut u32;
+
+/// What handlers have seen: SHCSR and ICSR in SVCall, HFSR and CFSR in HardFault.
+static STATES: AtomicU32 = AtomicU32::new(0);
+static CONTROL_STATE: AtomicU32 = AtomicU32::new(0);
+static HARD: AtomicU32 = AtomicU32::new(0);
+static STATUS: AtomicU32 = AtomicU32::new(0);
+
+fn read(register: *mut u32) -> u32 {
+    unsafe { register.read_volatile() }
+}
+
+fn write(register: *mut u32, value: u32) {
+    unsafe { register.write_volatile(value) }
+}
+
+/// It is zero after a write, counts from the reload value, and keeps its count while it stands.
+fn systick() -> Result<(), u32> {
+    write(SYST_RVR, 99_999);
+    write(SYST_CVR, 1);
+    expect(read(SYST_CVR) == 0, 1)?;
+    write(SYST_CSR, 0b101);
+    unsafe { asm!("isb", "nop", "nop") };
+    let running = read(SYST_CVR);
+    expect(running > 99_000 && running <= 99_999, 2)?;
+    write(SYST_CSR, 0);
+    let held = read(SYST_CVR);
+    unsafe { asm!("isb", "nop", "nop") };
+    expect(held > 99_000 && read(SYST_CVR) == held, 3)
+}
+
+fn cycle_counter() -> Result<(), u32> {
+    write(DEMCR, 0);
+    write(DWT_CTRL, 1);
+    unsafe { asm!("isb") };
+    expect(read(DWT_CYCCNT) == 0 && read(DWT_CTRL) & 1 == 0, 11)?;
+    write(DEMCR, 1 << 24);
+    write(DWT_CTRL, 1);
+    unsafe { asm!("isb") };
+    expect(read(DWT_CYCCNT) > 0, 12)
+}
+
+fn states() -> Result<(), u32> {
+    unsafe { asm!("svc 0") };
+    expect(STATES.load(Relaxed) & 1 << 7 != 0, 21)?;
+    let control = CONTROL_STATE.load(Relaxed);
+    expect(control & 0x1FF == 11 && control & 1 << 11 != 0, 22)?;
+    expect(control >> 12 & 0x1FF == 14, 23)?;
+    expect(read(SHCSR) & 1 << 7 == 0, 24)
+}
+
+/// Masked, a call cannot be taken: HardFault, forced.
+fn masked_call() -> Result<(), u32> {
+    unsafe { asm!("cpsid i", "svc 0", "nop", "cpsie i") };
+    expect(HARD.swap(0, Relaxed) == 1 << 30, 31)
+}
+
+fn unprivileged() -> Result<(), u32> {
+    unsafe {
+        asm!("msr control, {0}", "isb", "ldr r3, [r2]", "isb", "svc 1", in(reg) 1, in("r2") SYST_CVR, out("r3") _);
+    }
+    // PRECISERR and BFARVALID.
+    expect(STATUS.swap(0, Relaxed) == 0x8200 && HARD.swap(0, Relaxed) == 1 << 30, 41)
+}
+
+#[entry]
+fn main() -> ! {
+    finish(
+        systick()
+            .and_then(|()| cycle_counter())
+            .and_then(|()| states())
+            .and_then(|()| masked_call())
+            .and_then(|()| unprivileged()),
+    )
+}
+
+/// A call pends PendSV, to see it pending, and ends with privileges.
+#[exception]
+fn SVCall() {
+    write(ICSR, 1 << 28);
+    STATES.store(read(SHCSR), Relaxed);
+    CONTROL_STATE.store(read(ICSR), Relaxed);
+    unsafe { asm!("msr control, {0}", "isb", in(reg) 0) };
+}
+
+#[exception]
+fn PendSV() {}
+
+// Notes why, and goes on behind the instruction of 16 bits, with interrupts on.
+global_asm!(
+    ".global HardFault",
+    ".thumb_func",
+    "HardFault:",
+    "mrs r0, msp",
+    "ldr r1, [r0, #24]",
+    "adds r1, #2",
+    "str r1, [r0, #24]",
+    "ldr r0, =0xE000ED2C",
+    "ldr r1, [r0]",
+    "str r1, [r0]",
+    "ldr r2, ={hard}",
+    "str r1, [r2]",
+    "ldr r0, =0xE000ED28",
+    "ldr r1, [r0]",
+    "str r1, [r0]",
+    "ldr r2, ={status}",
+    "str r1, [r2]",
+    "cpsie i",
+    "bx lr",
+    ".ltorg",
+    hard = sym HARD,
+    status = sym STATUS,
+);

@@ -1,0 +1,47 @@
+//! A device configuration file: the data sheet with the values of one device (CiA 306).
+
+use std::fmt;
+
+use crate::Eds;
+use crate::write::{Sections, device_info, write_lists};
+
+/// Section `[DeviceComissioning]`: which device the values are for. The section is spelled so.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Commissioning {
+    /// The node-ID.
+    pub node_id: u8,
+    /// The bit rate in kbit/s.
+    pub bit_rate: u16,
+    /// The serial number, 1018h:4.
+    pub serial: u32,
+}
+
+impl Eds {
+    /// The text of a configuration file of this name. Values are those of [`Entry::value`](crate::Entry::value).
+    #[must_use]
+    pub fn to_dcf(&self, file_name: &str) -> String {
+        let mut text = String::new();
+        // A string takes everything.
+        let _ = self.write_dcf(file_name, &mut Sections { out: &mut text });
+        text
+    }
+
+    fn write_dcf(&self, file_name: &str, out: &mut Sections) -> fmt::Result {
+        out.section("FileInfo", "")?;
+        out.key("FileName", file_name)?;
+        out.key("FileVersion", 1)?;
+        out.key("FileRevision", 0)?;
+        out.key("EDSVersion", "4.0")?;
+        out.key("Description", format_args!("Configuration of {}", self.device.product_name))?;
+        out.key("CreatedBy", "nodectl")?;
+        device_info(&self.device, out)?;
+        let Commissioning { node_id, bit_rate, serial } = self.commissioning.unwrap_or_default();
+        out.section("DeviceComissioning", "")?;
+        out.key("NodeID", node_id)?;
+        out.key("Baudrate", bit_rate)?;
+        out.key("NetNumber", 0)?;
+        out.key("CANopenManager", 0)?;
+        out.key("LSS_SerialNumber", format_args!("0x{serial:08X}"))?;
+        write_lists(self, out)
+    }
+}

@@ -1,0 +1,233 @@
+//! `nodectl dump`, `nodectl diff` and `nodectl apply`: the configuration of a node as a file (CiA 306).
+
+use std::fmt;
+use std::path::PathBuf;
+
+use canopen::NodeId;
+use canopen::sdo::Multiplexer;
+use clap::Args;
+use eds::{Commissioning, Eds};
+use serde::{Serialize, Serializer};
+
+use super::read::place;
+use super::replacement::Replacement;
+use super::{Failure, Session};
+use crate::configuration::{Configuration, Difference, Write, plan};
+use crate::object::{Place, at};
+use crate::text::visible;
+use crate::value::Value;
+
+/// Writes the configuration of a node to a file: a DCF with what differs from the defaults.
+#[derive(Debug, Args)]
+pub(super) struct Dump {
+    /// The file; "-" for the standard output.
+    #[arg(default_value = "-")]
+    file: PathBuf,
+
+    /// All parameters, also those that have their defaults.
+    #[arg(long)]
+    all: bool,
+}
+
+/// Compares two configurations: files (DCF or EDS), or the node itself.
+#[derive(Debug, Args)]
+pub(super) struct Diff {
+    /// The first: a file.
+    first: PathBuf,
+
+    /// The second: a file; the node if it is left out.
+    second: Option<PathBuf>,
+}
+
+/// Writes the configuration of a file to a node, PDOs in the order that CiA 301 asks for, and reads it back.
+#[derive(Debug, Args)]
+pub(super) struct Apply {
+    /// The file: a DCF, or an EDS for the defaults.
+    file: PathBuf,
+
+    /// Only say what would be written.
+    #[arg(long)]
+    dry_run: bool,
+
+    /// Make the node keep it.
+    #[arg(long)]
+    save: bool,
+
+    /// Also where the file is for another product.
+    #[arg(long)]
+    force: bool,
+}
+
+/// So often what is still different is written again: some parameters change others.
+const PASSES: usize = 3;
+
+#[derive(Serialize)]
+struct Changed {
+    #[serde(rename = "object", serialize_with = "place")]
+    at: Multiplexer,
+    name: Option<String>,
+    #[serde(serialize_with = "or_null")]
+    first: Option<Value>,
+    #[serde(serialize_with = "or_null")]
+    second: Option<Value>,
+}
+
+#[derive(Serialize)]
+struct Step {
+    #[serde(rename = "object", serialize_with = "place")]
+    at: Multiplexer,
+    name: Option<String>,
+    value: Value,
+}
+
+#[derive(Serialize)]
+struct Done {
+    node: u8,
+    writes: usize,
+    saved: bool,
+}
+
+fn or_null<S: Serializer>(value: &Option<Value>, serializer: S) -> Result<S::Ok, S::Error> {
+    value.serialize(serializer)
+}
+
+impl Dump {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let node = session.options.node.one()?;
+        let sheet = session.sheet_of(node)?;
+        let values = session.configuration(node, &sheet)?;
+        let mut file = values.to_sheet(&sheet, node, self.all);
+        let serial = session.word(node, at(0x1018, 4))?.unwrap_or(0);
+        file.commissioning =
+            Some(Commissioning { node_id: node.get(), bit_rate: session.options.bit_rate, serial });
+        let name = self.file.file_name().and_then(|name| name.to_str()).unwrap_or("-");
+        let text = file.to_dcf(name);
+        if self.file.as_os_str() == "-" {
+            return Ok(session.output.write(text.as_bytes())?);
+        }
+        Replacement::write(&self.file, text.as_bytes())
+    }
+}
+
+impl Diff {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let node = session.options.node.one()?;
+        let sheet = super::session::sheet(&self.first)?;
+        let first = Configuration::of_sheet(&sheet, node_of(&sheet, node));
+        let second = match &self.second {
+            Some(path) => {
+                let other = super::session::sheet(path)?;
+                Configuration::of_sheet(&other, node_of(&other, node))
+            }
+            None => session.configuration(node, &sheet)?,
+        };
+        let differences = first.differences(&second);
+        for Difference { at, first, second } in &differences {
+            let name = sheet.get(at.index, at.sub).map(|entry| sheet.path(entry));
+            session.print(&Changed { at: *at, name, first: first.clone(), second: second.clone() })?;
+        }
+        match differences.len() {
+            0 => Ok(()),
+            count => Err(Failure::Different(count)),
+        }
+    }
+}
+
+impl Apply {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let node = session.options.node.one()?;
+        let sheet = super::session::sheet(&self.file)?;
+        self.check(session, node, &sheet)?;
+        let wanted = Configuration::of_sheet(&sheet, node);
+        let (mut now, mut writes) = (session.configuration(node, &sheet)?, 0);
+        for _ in 0..PASSES {
+            let steps = plan(&sheet, &now, &wanted);
+            if self.dry_run {
+                return steps.into_iter().try_for_each(|step| session.print(&self.step(&sheet, step)));
+            }
+            if steps.is_empty() {
+                return self.finish(session, node, writes);
+            }
+            writes += steps.len();
+            write_all(session, node, &sheet, &steps)?;
+            now = session.configuration(node, &sheet)?;
+        }
+        let left: Vec<String> =
+            plan(&sheet, &now, &wanted).iter().map(|step| Place(step.at).to_string()).collect();
+        if left.is_empty() {
+            return self.finish(session, node, writes);
+        }
+        Err(Failure::NotApplied(left.join(", ")))
+    }
+
+    /// A file for another product would be refused object by object; better nothing is changed.
+    fn check(&self, session: &mut Session, node: NodeId, sheet: &Eds) -> Result<(), Failure> {
+        let device = session.word(node, at(0x1018, 2))?.unwrap_or(0);
+        let product = sheet.device.product_number;
+        if device != product && !self.force {
+            let message = format!("it is for product {product:08X}h, and the node is product {device:08X}h");
+            return Err(Failure::file(&self.file, message));
+        }
+        Ok(())
+    }
+
+    fn step(&self, sheet: &Eds, step: Write) -> Step {
+        let name = sheet.get(step.at.index, step.at.sub).map(|entry| sheet.path(entry));
+        Step { at: step.at, name, value: step.value }
+    }
+
+    fn finish(&self, session: &mut Session, node: NodeId, writes: usize) -> Result<(), Failure> {
+        if self.save {
+            let saved = session.client(node).download(at(0x1010, 1), b"save", |_| ());
+            saved.map_err(|error| session.named(error))?;
+        }
+        session.print(&Done { node: node.get(), writes, saved: self.save })
+    }
+}
+
+fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) -> Result<(), Failure> {
+    for step in steps {
+        let Some(entry) = sheet.get(step.at.index, step.at.sub) else { continue };
+        let bytes = step.value.encode(entry.data_type);
+        let written = session.client(node).download(step.at, &bytes, |_| ());
+        written.map_err(|error| session.named(error))?;
+    }
+    Ok(())
+}
+
+/// The node-ID that a file is for, where it says so.
+fn node_of(sheet: &Eds, otherwise: NodeId) -> NodeId {
+    sheet.commissioning.as_ref().and_then(|to| NodeId::new(to.node_id)).unwrap_or(otherwise)
+}
+
+/// `1017h:0 Producer heartbeat time: 1000 -> 500`
+impl fmt::Display for Changed {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let text = |value: &Option<Value>| {
+            value.as_ref().map_or("-".to_owned(), |value| visible(&value.to_string()))
+        };
+        let name = self.name.as_deref().unwrap_or_default();
+        write!(f, "{} {name}: {} -> {}", Place(self.at), text(&self.first), text(&self.second))
+    }
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let name = self.name.as_deref().unwrap_or_default();
+        write!(f, "{} {name} = {}", Place(self.at), visible(&self.value.to_string()))?;
+        match &self.value {
+            Value::Integer(value) if *value > 0xFFFF => write!(f, " ({value:08X}h)"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Done {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let saved = if self.saved { ", saved" } else { "" };
+        match self.writes {
+            0 => write!(f, "node {}: has it already{saved}", self.node),
+            writes => write!(f, "node {}: {writes} writes, read back{saved}", self.node),
+        }
+    }
+}

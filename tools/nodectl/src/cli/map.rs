@@ -1,0 +1,217 @@
+//! `nodectl map` and `nodectl unmap`: the mapping of a PDO in one command.
+
+use std::fmt;
+
+use canopen::NodeId;
+use canopen::sdo::Multiplexer;
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::{Failure, Session};
+use crate::object::{Place, at};
+
+/// Maps objects into a PDO, in the five steps of CiA 301: off, empty, objects, their number, on.
+#[derive(Debug, Args)]
+pub(super) struct Map {
+    direction: Direction,
+
+    /// The number of the PDO, from 1.
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
+    number: u16,
+
+    /// Objects by index or name, from the first bit on.
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+
+    /// The transmission type; as it is if this is left out.
+    #[arg(long = "transmission", value_name = "TYPE")]
+    transmission: Option<u8>,
+}
+
+/// Switches a PDO off and empties its mapping.
+#[derive(Debug, Args)]
+pub(super) struct Unmap {
+    direction: Direction,
+
+    /// The number of the PDO, from 1.
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
+    number: u16,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Direction {
+    /// What the node sends.
+    Tpdo,
+    /// What the node receives.
+    Rpdo,
+}
+
+#[derive(Serialize)]
+struct Done {
+    node: u8,
+    pdo: String,
+    cob_id: u32,
+    objects: usize,
+    bits: u32,
+}
+
+const OFF: u32 = 1 << 31;
+
+/// More entries than this stand for a multiplexed PDO (CiA 301, 7.5.2.36).
+const SLOTS: u8 = 64;
+
+/// What a PDO carries, when, and with which COB-ID.
+struct Mapped {
+    cob_id: u32,
+    entries: Vec<u32>,
+    transmission: Option<u8>,
+}
+
+/// A PDO of a node.
+struct Pdo {
+    node: NodeId,
+    communication: u16,
+    mapping: u16,
+}
+
+impl Pdo {
+    fn new(node: NodeId, direction: Direction, number: u16) -> Pdo {
+        let first = match direction {
+            Direction::Tpdo => 0x1800,
+            Direction::Rpdo => 0x1400,
+        };
+        let communication = first + number - 1;
+        Pdo { node, communication, mapping: communication + 0x0200 }
+    }
+
+    fn cob_id(&self, session: &mut Session) -> Result<u32, Failure> {
+        session.word(self.node, at(self.communication, 1))?.ok_or_else(|| {
+            Failure::Usage(format!("node {} has no such PDO ({:04X}h)", self.node.get(), self.communication))
+        })
+    }
+
+    fn write(&self, session: &mut Session, object: Multiplexer, bytes: &[u8]) -> Result<(), Failure> {
+        let written = session.client(self.node).download(object, bytes, |_| ());
+        written.map_err(|error| session.named(error))
+    }
+
+    /// What the PDO is now.
+    fn mapped(&self, session: &mut Session) -> Result<Mapped, Failure> {
+        let cob_id = self.cob_id(session)?;
+        let byte = |bytes: Option<Vec<u8>>| bytes.and_then(|bytes| bytes.first().copied());
+        let transmission = byte(session.optional(self.node, at(self.communication, 2))?);
+        let count = byte(session.optional(self.node, at(self.mapping, 0))?).unwrap_or(0);
+        let mut entries = Vec::new();
+        for sub in 1..=if count > SLOTS { 0 } else { count } {
+            entries.extend(session.word(self.node, at(self.mapping, sub))?);
+        }
+        Ok(Mapped { cob_id, entries, transmission })
+    }
+
+    /// Steps 2 to 5 of a PDO that is switched off: empty, objects, their number, on if it is to be on.
+    fn change(&self, session: &mut Session, to: &Mapped) -> Result<(), Failure> {
+        self.write(session, at(self.mapping, 0), &[0])?;
+        for (entry, sub) in to.entries.iter().zip(1..) {
+            self.write(session, at(self.mapping, sub), &entry.to_le_bytes())?;
+        }
+        if let Some(transmission) = to.transmission {
+            self.write(session, at(self.communication, 2), &[transmission])?;
+        }
+        let count = u8::try_from(to.entries.len()).unwrap_or(u8::MAX);
+        self.write(session, at(self.mapping, 0), &[count])?;
+        self.switch(session, to.cob_id)
+    }
+
+    fn switch(&self, session: &mut Session, cob_id: u32) -> Result<(), Failure> {
+        self.write(session, at(self.communication, 1), &cob_id.to_le_bytes())
+    }
+}
+
+impl Map {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let node = session.options.node.one()?;
+        let pdo = Pdo::new(node, self.direction, self.number);
+        // Everything is looked up before anything is changed.
+        let entries: Result<Vec<u32>, Failure> =
+            self.objects.iter().map(|query| self.entry(session, node, query)).collect();
+        let entries = entries?;
+        let bits: u32 = entries.iter().map(|entry| entry & 0xFF).sum();
+        if bits > 64 {
+            return Err(Failure::Usage(format!("these objects have {bits} bits; a PDO has 64")));
+        }
+        let before = pdo.mapped(session)?;
+        let cob_id = before.cob_id & !OFF;
+        pdo.switch(session, cob_id | OFF)?;
+        let wanted = Mapped { cob_id, entries, transmission: self.transmission.or(before.transmission) };
+        let entries = &wanted.entries;
+        if let Err(failure) = pdo.change(session, &wanted) {
+            // What the node refuses leaves the PDO as it was; that the node had.
+            let _ = pdo.change(session, &before);
+            return Err(failure);
+        }
+        let name = format!("{:?} {}", self.direction, self.number).to_uppercase();
+        session.print(&Done {
+            node: node.get(),
+            pdo: name,
+            cob_id: cob_id & 0x1FFF_FFFF,
+            objects: entries.len(),
+            bits,
+        })
+    }
+
+    /// The entry of a mapping: index, sub-index, bits.
+    fn entry(&self, session: &mut Session, node: NodeId, query: &str) -> Result<u32, Failure> {
+        let object = session.find(node, query)?;
+        let catalogue = session.catalogue(node)?;
+        let is_mappable = |entry: &eds::Entry| match self.direction {
+            Direction::Tpdo => entry.is_tpdo_mappable(),
+            Direction::Rpdo => entry.is_rpdo_mappable(),
+        };
+        if catalogue.entry(object).is_some_and(|entry| !is_mappable(entry)) {
+            let direction = format!("{:?}", self.direction).to_uppercase();
+            let message = format!("{query}: no {direction} can carry {}, says the data sheet", Place(object));
+            return Err(Failure::Usage(message));
+        }
+        let bits = catalogue.data_type(object).and_then(bits).ok_or_else(|| {
+            Failure::Usage(format!("{query}: no data sheet tells how many bits it has, or it is no number"))
+        })?;
+        Ok(u32::from(object.index) << 16 | u32::from(object.sub) << 8 | u32::from(bits))
+    }
+}
+
+fn bits(data_type: eds::DataType) -> Option<u8> {
+    match data_type.class() {
+        eds::Class::Signed(bits) | eds::Class::Unsigned(bits) | eds::Class::Real(bits) => Some(bits),
+        eds::Class::Text | eds::Class::Bytes => None,
+    }
+}
+
+impl Unmap {
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let node = session.options.node.one()?;
+        session.catalogue(node)?;
+        let pdo = Pdo::new(node, self.direction, self.number);
+        let cob_id = pdo.cob_id(session)?;
+        pdo.switch(session, cob_id | OFF)?;
+        pdo.write(session, at(pdo.mapping, 0), &[0])?;
+        let name = format!("{:?} {}", self.direction, self.number).to_uppercase();
+        session.print(&Done {
+            node: node.get(),
+            pdo: name,
+            cob_id: cob_id & 0x1FFF_FFFF,
+            objects: 0,
+            bits: 0,
+        })
+    }
+}
+
+impl fmt::Display for Done {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Done { node, pdo, cob_id, objects, bits } = self;
+        match objects {
+            0 => write!(f, "node {node}: {pdo} is off and empty"),
+            1 => write!(f, "node {node}: {pdo} ({cob_id:03X}h) has 1 object, {bits} bits"),
+            _ => write!(f, "node {node}: {pdo} ({cob_id:03X}h) has {objects} objects, {bits} bits"),
+        }
+    }
+}

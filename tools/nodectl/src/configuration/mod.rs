@@ -1,0 +1,148 @@
+//! The configuration of a device: the values of all parameters, from the device itself or from a file (CiA 306).
+
+mod plan;
+
+use std::collections::BTreeMap;
+
+use canopen::NodeId;
+use canopen::sdo::Multiplexer;
+use eds::{Class, Eds, Entry, Formula};
+
+use crate::object::at;
+use crate::sdo::Error;
+use crate::value::Value;
+
+pub use plan::{Write, plan};
+
+/// Values by index and sub-index.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Configuration {
+    /// The values.
+    pub values: BTreeMap<(u16, u8), Value>,
+}
+
+/// A parameter that has two values, or only one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The parameter.
+    pub at: Multiplexer,
+    /// Its value in the first configuration.
+    pub first: Option<Value>,
+    /// Its value in the second.
+    pub second: Option<Value>,
+}
+
+/// Objects that are written to make the device do something.
+fn is_command(index: u16) -> bool {
+    matches!(index, 0x1003 | 0x1010 | 0x1011 | 0x1F50..=0x1F5F)
+}
+
+/// Whether an entry is a parameter: it can be read and written, is no command, no domain, and no process value that an
+/// RPDO brings.
+#[must_use]
+pub fn is_parameter(entry: &Entry) -> bool {
+    let is_process_value = entry.mappable && entry.is_rpdo_mappable();
+    let has_value = !matches!(entry.data_type, eds::DataType::DOMAIN);
+    let is_open = entry.access.is_readable() && entry.access.is_writable();
+    is_open && has_value && !is_process_value && !is_command(entry.index)
+}
+
+impl Configuration {
+    /// What a data sheet or a configuration file says: the value, and where there is none the default.
+    #[must_use]
+    pub fn of_sheet(sheet: &Eds, node: NodeId) -> Configuration {
+        let value = |entry: &Entry| {
+            let formula = entry.value.as_ref().or(entry.default.as_ref())?;
+            Some(((entry.index, entry.sub), decode(formula, entry, node)?))
+        };
+        Configuration {
+            values: sheet.entries().filter(|entry| is_parameter(entry)).filter_map(value).collect(),
+        }
+    }
+
+    /// What a device has: `read` reads an object. `progress` is told how many parameters of all have been read.
+    ///
+    /// # Errors
+    /// Those of SDO, but for what the device does not have or does not tell.
+    pub fn of_node(
+        mut read: impl FnMut(Multiplexer) -> Result<Vec<u8>, Error>,
+        sheet: &Eds,
+        mut progress: impl FnMut(usize, usize),
+    ) -> Result<Configuration, Error> {
+        let parameters: Vec<&Entry> = sheet.entries().filter(|entry| is_parameter(entry)).collect();
+        let mut values = BTreeMap::new();
+        for (number, entry) in parameters.iter().enumerate() {
+            progress(number, parameters.len());
+            match read(at(entry.index, entry.sub)) {
+                Ok(bytes) => {
+                    values.insert((entry.index, entry.sub), Value::decode(&bytes, entry.data_type));
+                }
+                Err(error) if error.abort().is_some() => (),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Configuration { values })
+    }
+
+    /// Where this one differs from another.
+    #[must_use]
+    pub fn differences(&self, other: &Configuration) -> Vec<Difference> {
+        let mut keys: Vec<(u16, u8)> = self.values.keys().chain(other.values.keys()).copied().collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let difference = |key: (u16, u8)| {
+            let (first, second) = (self.values.get(&key).cloned(), other.values.get(&key).cloned());
+            (!same(first.as_ref(), second.as_ref())).then(|| Difference {
+                at: at(key.0, key.1),
+                first,
+                second,
+            })
+        };
+        keys.into_iter().filter_map(difference).collect()
+    }
+
+    /// A configuration file: the data sheet with the values that differ from its defaults, or with all of them.
+    #[must_use]
+    pub fn to_sheet(&self, sheet: &Eds, node: NodeId, all: bool) -> Eds {
+        let (mut file, defaults) = (sheet.clone(), Configuration::of_sheet(sheet, node));
+        for entry in file.objects.values_mut().flat_map(|object| object.entries.values_mut()) {
+            let key = (entry.index, entry.sub);
+            let value = self.values.get(&key);
+            let is_wanted = all || !same(value, defaults.values.get(&key));
+            entry.value = value.filter(|_| is_wanted).and_then(encode);
+        }
+        file
+    }
+}
+
+/// Whether two values are the same. A number that is none (NaN) is the same as another such.
+fn same(first: Option<&Value>, second: Option<&Value>) -> bool {
+    match (first, second) {
+        (Some(Value::Real32(a)), Some(Value::Real32(b))) => a.to_bits() == b.to_bits() || a == b,
+        (first, second) => first == second,
+    }
+}
+
+fn decode(formula: &Formula, entry: &Entry, node: NodeId) -> Option<Value> {
+    Some(match (formula.evaluate(node), entry.data_type.class()) {
+        (eds::Value::Integer(value), _) => Value::Integer(value),
+        #[allow(clippy::cast_possible_truncation)] // It was a REAL32 in the file.
+        (eds::Value::Real(value), Class::Real(32)) => Value::Real32(value as f32),
+        (eds::Value::Real(value), _) => Value::Real64(value),
+        (eds::Value::Text(text), Class::Text) => Value::Text(text),
+        (eds::Value::Text(text), _) => return Value::parse(&text, entry.data_type).ok(),
+    })
+}
+
+/// As a file has it; `None` for a text that breaks its line.
+fn encode(value: &Value) -> Option<Formula> {
+    let value = match value {
+        Value::Integer(value) | Value::Decimal(value, _) => eds::Value::Integer(*value),
+        Value::Real32(value) => eds::Value::Real(f64::from(*value)),
+        Value::Real64(value) => eds::Value::Real(*value),
+        Value::Text(text) if text.is_empty() || text.chars().any(char::is_control) => return None,
+        Value::Text(text) => eds::Value::Text(text.clone()),
+        Value::Bytes(_) => eds::Value::Text(value.to_string()),
+    };
+    Some(Formula::Constant(value))
+}

@@ -1,0 +1,135 @@
+//! The configuration of a node as a file: written, compared, applied.
+
+use node::Personality;
+
+use crate::commands::{failed, printed, run};
+use crate::pressure::Pressure;
+use crate::wire::Wire;
+
+const PERSONALITIES: [Personality; 4] =
+    [Personality::Pressure, Personality::Encoder, Personality::Combined, Personality::Lift];
+
+fn path(name: &str) -> String {
+    format!("{}/{name}", env!("CARGO_TARGET_TMPDIR"))
+}
+
+fn text(path: &str) -> String {
+    std::fs::read_to_string(path).expect("a file")
+}
+
+/// What somebody changes in the field: a heartbeat, supervision, an event timer, a PDO with another mapping, one that is
+/// switched off, and words of the user.
+fn configure(wire: &Wire<Pressure>, personality: Personality) {
+    let sheet = eds::DEVICES.iter().find(|device| device.personality == personality).expect("a sheet").eds();
+    let carried = sheet.entries().filter(|entry| entry.is_tpdo_mappable()).last().expect("a process value");
+    let object = format!("{:04X}:{}", carried.index, carried.sub);
+    let at_5 = |line: &[&'static str]| [line, &["-n", "5"]].concat();
+    let map = |pdo: &'static str| {
+        let line = ["map", "tpdo", pdo, &object, "--transmission", "10", "-n", "5"];
+        printed(wire, &line);
+    };
+    for line in [
+        &["write", "1017", "500"][..],
+        &["write", "1016:1", "0x000205DC"],
+        &["write", "1029:1", "1"],
+        &["write", "1015", "200"],
+    ] {
+        printed(wire, &at_5(line));
+    }
+    if personality == Personality::Lift {
+        // Its pre-defined PDOs have a fixed mapping.
+        printed(wire, &at_5(&["write", "1881:5", "250"]));
+        return;
+    }
+    map("3");
+    printed(wire, &at_5(&["write", "1801:5", "250"]));
+    printed(wire, &at_5(&["unmap", "tpdo", "2"]));
+}
+
+#[test]
+fn dump_apply_dump_is_the_same_for_every_personality() {
+    for personality in PERSONALITIES {
+        let (first, second) =
+            (path(&format!("{personality:?}-1.dcf")), path(&format!("{personality:?}-2.dcf")));
+        let wire = Wire::new(Pressure::of(personality, 5));
+        printed(&wire, &["dump", &second, "-n", "5"]);
+        let factory = text(&second);
+        configure(&wire, personality);
+        printed(&wire, &["dump", &first, "-n", "5"]);
+        assert_ne!(text(&first).replace("-1.dcf", ""), factory.replace("-2.dcf", ""));
+        let fresh = Wire::new(Pressure::of(personality, 5));
+        assert_eq!(failed(&fresh, &["diff", &first, "-n", "5"]).0, 8, "{personality:?}");
+        let plan = printed(&fresh, &["apply", &first, "-n", "5", "--dry-run"]);
+        assert!(plan.lines().count() > 5, "{plan}");
+        assert_eq!(failed(&fresh, &["diff", &first, "-n", "5"]).0, 8, "a dry run changes nothing");
+        let done = printed(&fresh, &["apply", &first, "-n", "5", "--save"]);
+        assert!(done.contains("writes, read back, saved"), "{done}");
+        assert_eq!(printed(&fresh, &["diff", &first, "-n", "5"]), "");
+        printed(&fresh, &["dump", &second, "-n", "5"]);
+        assert_eq!(
+            text(&first).replace("-1.dcf", ""),
+            text(&second).replace("-2.dcf", ""),
+            "{personality:?}"
+        );
+        // It survives a reset, and applying it again writes nothing.
+        printed(&fresh, &["nmt", "reset", "-n", "5"]);
+        assert_eq!(printed(&fresh, &["apply", &first, "-n", "5"]), "node 5: has it already\n");
+    }
+}
+
+#[test]
+fn files_are_compared_with_each_other() {
+    let (sheet, dump) = ("../../eds/pressure.eds", path("compared.dcf"));
+    let wire = Wire::new(Pressure::new(1));
+    printed(&wire, &["dump", &dump]);
+    assert_eq!(printed(&wire, &["diff", sheet, &dump]), "", "as it comes from the factory");
+    printed(&wire, &["write", "1017", "250"]);
+    printed(&wire, &["dump", &dump]);
+    let (lines, result) = run(&wire, &["diff", sheet, &dump]);
+    assert_eq!(lines, "1017h:0 Producer heartbeat time: 1000 -> 250\n");
+    assert_eq!(result.unwrap_err().to_string(), "1 parameters differ");
+}
+
+#[test]
+fn a_file_for_another_product_changes_nothing() {
+    let wire = Wire::new(Pressure::new(1));
+    let (code, text) = failed(&wire, &["apply", "../../eds/encoder.eds"]);
+    assert_eq!((code, text.contains("product 00000002h")), (7, true), "{text}");
+}
+
+#[test]
+fn a_mapping_is_made_in_one_command() {
+    let wire = Wire::new(Pressure::new(1));
+    let line = printed(
+        &wire,
+        &["map", "tpdo", "1", "7130:1", "7130:2", "AI status pressure", "--transmission", "1"],
+    );
+    assert_eq!(line, "node 1: TPDO 1 (181h) has 3 objects, 40 bits\n");
+    let lines = printed(&wire, &["read", "1A00:0", "1A00:1", "1A00:2", "1A00:3", "1800:1", "1800:2"]);
+    for expected in ["= 3\n", "(71300110h)", "(71300210h)", "(61500108h)", "(00000181h)", "= 1\n"] {
+        assert!(lines.contains(expected), "{expected}: {lines}");
+    }
+    assert_eq!(printed(&wire, &["unmap", "tpdo", "1"]), "node 1: TPDO 1 is off and empty\n");
+    // What cannot be mapped leaves the PDO on.
+    printed(&wire, &["map", "tpdo", "1", "6130:1"]);
+    assert_eq!(failed(&wire, &["map", "tpdo", "1", "1017"]).0, 2);
+    assert_eq!(failed(&wire, &["map", "tpdo", "1", "6130:1", "--transmission", "245"]).0, 1);
+    assert!(printed(&wire, &["read", "1800:1"]).contains("(00000181h)"));
+    assert_eq!(failed(&wire, &["map", "tpdo", "1", "6130:1", "6130:2", "6150:1"]).0, 2);
+    assert_eq!(failed(&wire, &["map", "tpdo", "99", "1001"]).0, 2);
+    assert_eq!(failed(&wire, &["map", "tpdo", "1", "1008"]).0, 2);
+}
+
+#[test]
+fn objects_are_listed_with_what_is_known_of_them() {
+    let wire = Wire::new(Pressure::new(1));
+    let lines = printed(&wire, &["list", "heartbeat"]);
+    assert!(lines.contains("1017h:0   rw    UNSIGNED16"), "{lines}");
+    assert!(lines.contains("Producer heartbeat time = 1000 ms"), "{lines}");
+    assert!(printed(&wire, &["list", "1019"]).contains("(0 to 240)"));
+    assert!(printed(&wire, &["list", "--no-values"]).lines().count() > 350);
+    assert_eq!(failed(&wire, &["list", "no such thing"]).0, 2);
+    let line = printed(&wire, &["--json", "list", "1017"]);
+    let value: serde_json::Value = serde_json::from_str(&line).expect("JSON");
+    assert_eq!((value["value"].as_u64(), value["access"].as_str()), (Some(1000), Some("rw")));
+}
