@@ -8,7 +8,7 @@
 //! | 4 | `transmit` | the mailboxes hold three frames; locking the queue delays no sample |
 //! | 3 | `process` | SYNC, RPDO, TPDO: never behind an SDO transfer |
 //! | 2 | `serve` | SDO, NMT, heartbeat, EMCY, errors of the bus |
-//! | 1 | `keep` | stores parameters: whatever it waits for, nobody waits for it |
+//! | 1 | `store` | stores parameters: whatever it waits for, nobody waits for it |
 //! | 0 | `idle` | sleeps |
 //!
 //! Log lines mask no interrupt, whatever the priority: see the features of defmt-rtt in the workspace.
@@ -18,13 +18,13 @@
 mod bit_rate;
 mod bus;
 mod configuration;
-mod keeper;
-mod latest;
+mod position_inputs;
+mod power_on;
 mod process;
-mod remembering;
 mod services;
-mod shaft;
 mod shared;
+mod snapshot_slot;
+mod storage_task;
 
 use bsp::pac::Interrupt;
 use canopen::Duration;
@@ -34,7 +34,7 @@ const PROCESS: Interrupt = Interrupt::TIM2;
 /// Pended by whoever has work for the services task.
 const SERVICES: Interrupt = Interrupt::CAN1_SCE;
 /// Pended by whoever has something to store. The interrupt is that of a peripheral which the board does not use.
-const KEEPER: Interrupt = Interrupt::SDIO;
+const STORAGE: Interrupt = Interrupt::SDIO;
 /// Pended by whoever misses samples.
 const SAMPLING: Interrupt = Interrupt::DMA2_STREAM0;
 /// Pended by whoever has put a frame into the transmit queue.
@@ -67,18 +67,18 @@ mod app {
 
     use crate::bit_rate::Rate;
     use crate::configuration::Loaded;
-    use crate::keeper::Keeper;
-    use crate::latest::Latest;
+    use crate::position_inputs::PositionReader;
     use crate::process::Process;
-    use crate::services::{Findings, Services};
-    use crate::shaft::Shaft;
-    use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, remembering};
+    use crate::services::{Services, StartUpFaults};
+    use crate::snapshot_slot::SnapshotSlot;
+    use crate::storage_task::StorageTask;
+    use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, power_on};
 
     #[shared]
     struct Shared {
         protocol: &'static mut Protocol,
         transmit: TransmitQueue,
-        snapshot: Latest,
+        snapshot: SnapshotSlot,
         /// New ones, until the sampling task has taken them.
         parameters: Option<Parameters>,
         watchdog: Watchdog,
@@ -89,14 +89,14 @@ mod app {
         receiver_process: Receiver,
         receiver_services: Receiver,
         front_end: FrontEnd,
-        shaft: Shaft,
+        position: PositionReader,
         buttons: Buttons,
         measurement: &'static mut Measurement,
         transmitter: Transmitter,
         time: TimeInterrupt,
         process: Process,
         services: Services,
-        keeper: Keeper,
+        storage: StorageTask,
         backup: BackupMemory,
     }
 
@@ -114,9 +114,9 @@ mod app {
         let board = Board::start(cx.device, lost);
         let Loaded { protocol, parameters, setup, store } =
             configuration::load(board.parameters, cx.local.protocol);
-        let keeper = Keeper::new(store, cx.local.job.write(StoreJob::new(setup.personality)));
+        let storage = StorageTask::new(store, cx.local.job.write(StoreJob::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
-        let findings = Findings { crashed, no_store: !keeper.is_working() };
+        let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working() };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = Surroundings { watchdog_reset, ..Surroundings::default() };
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);
@@ -127,7 +127,7 @@ mod app {
         let shared = Shared {
             protocol,
             transmit: TransmitQueue::new(),
-            snapshot: Latest::default(),
+            snapshot: SnapshotSlot::default(),
             parameters: Some(parameters),
             watchdog: board.watchdog.supervise(),
         };
@@ -135,9 +135,9 @@ mod app {
             receiver_process,
             receiver_services,
             front_end: board.front_end,
-            shaft: Shaft::new(board.ssi, surroundings),
+            position: PositionReader::new(board.ssi, surroundings),
             buttons: board.buttons,
-            measurement: remembering::make(
+            measurement: power_on::make(
                 cx.local.measurement_place,
                 setup.personality,
                 board.reset_cause,
@@ -153,9 +153,9 @@ mod app {
                 lost,
                 services_alarm,
                 board.led,
-                findings,
+                start_up_faults,
             ),
-            keeper,
+            storage,
             backup: board.backup,
         };
         local.front_end.start();
@@ -182,25 +182,25 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, shaft, buttons, measurement, backup,
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, position, buttons, measurement, backup,
                retained: [u32; RETAINED_WORDS] = [0; RETAINED_WORDS]],
            shared = [snapshot, parameters, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
-        let (measurement, shaft) = (&mut *cx.local.measurement, cx.local.shaft);
+        let (measurement, position) = (&mut *cx.local.measurement, cx.local.position);
         cx.shared.parameters.lock(|parameters| {
             if let Some(new) = parameters {
                 measurement.apply(new);
-                shaft.apply(new.position_inputs());
+                position.apply(new.position_inputs());
                 *parameters = None;
             }
         });
         let inputs = Inputs {
             analogue: configuration::raw_sample(&sums),
-            position: shaft.read(counted),
+            position: position.read(counted),
             digital: cx.local.buttons.sample(),
         };
-        cx.shared.snapshot.lock(|latest| measurement.update(&inputs, latest.renew()));
+        cx.shared.snapshot.lock(|slot| measurement.update(&inputs, slot.renew()));
         if measurement.retain(cx.local.retained) {
             cx.local.backup.write(cx.local.retained);
         }
@@ -234,9 +234,9 @@ mod app {
         cx.shared.watchdog.progress(Part::Services);
     }
 
-    #[task(binds = SDIO, priority = 1, local = [keeper], shared = [protocol, transmit, &watchdog])]
-    fn keep(cx: keep::Context) {
-        cx.local.keeper.run(&mut (cx.shared.protocol, cx.shared.transmit));
-        cx.shared.watchdog.progress(Part::Keeper);
+    #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, &watchdog])]
+    fn store(cx: store::Context) {
+        cx.local.storage.run(&mut (cx.shared.protocol, cx.shared.transmit));
+        cx.shared.watchdog.progress(Part::Storage);
     }
 }

@@ -16,7 +16,7 @@ use node::{Action, BusEvent, Next, NodeId, Parameters, Protocol};
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
 use crate::shared::Shared;
-use crate::{KEEPER, PROCESS};
+use crate::{PROCESS, STORAGE};
 
 /// The task runs at least this often: the watchdog wants a sign of life, and a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -41,12 +41,12 @@ pub(crate) struct Services {
     /// New ones, for the sampling task.
     parameters: Option<Parameters>,
     /// What the start-up has found, until the bus has been told.
-    findings: Findings,
+    start_up_faults: StartUpFaults,
 }
 
 /// Faults that are known before there is a bus to tell.
 #[derive(Clone, Copy)]
-pub(crate) struct Findings {
+pub(crate) struct StartUpFaults {
     /// The last run ended in a crash.
     pub(crate) crashed: bool,
     /// Nothing can be stored.
@@ -62,7 +62,7 @@ impl Services {
         lost: &'static Losses,
         alarm: Alarm,
         led: Led,
-        findings: Findings,
+        start_up_faults: StartUpFaults,
     ) -> Services {
         Services {
             can,
@@ -76,7 +76,7 @@ impl Services {
             back_off: BackOff::default(),
             has_joined: false,
             parameters: None,
-            findings,
+            start_up_faults,
         }
     }
 
@@ -102,7 +102,7 @@ impl Services {
         self.led.set(blink(now));
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
         // It tells the watchdog that it is there, whether there is something to store or not.
-        rtic::pend(KEEPER);
+        rtic::pend(STORAGE);
     }
 
     /// The parameters that have changed, once.
@@ -202,7 +202,7 @@ impl Services {
                 self.hand_over(node, true);
                 restart()
             }
-            Action::Store(_) => rtic::pend(KEEPER),
+            Action::Store(_) => rtic::pend(STORAGE),
         }
         self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out))
     }
@@ -213,7 +213,7 @@ impl Services {
             return self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out));
         }
         let next = self.call(node, |protocol, out| protocol.start(Clock::now(), out));
-        self.report_findings(node);
+        self.report_start_up_faults(node);
         rtic::pend(PROCESS);
         next
     }
@@ -240,9 +240,9 @@ impl Services {
         retained::hand_over(&Handover { node_id: node_id.map(NodeId::get), timing, stay });
     }
 
-    fn report_findings(&mut self, node: &mut impl Shared) {
-        let Findings { crashed, no_store } = self.findings;
-        self.findings.crashed = false;
+    fn report_start_up_faults(&mut self, node: &mut impl Shared) {
+        let StartUpFaults { crashed, no_store } = self.start_up_faults;
+        self.start_up_faults.crashed = false;
         for (fault, found) in [(UNEXPECTED_RESET, crashed), (PARAMETER_STORE, no_store)] {
             if found {
                 // The message goes out with the next poll.

@@ -13,10 +13,10 @@ pub enum Part {
     /// The services task.
     Services = 4,
     /// The task that stores parameters. It has the lowest priority, so a task that never ends starves this one as well.
-    Keeper = 8,
+    Storage = 8,
 }
 
-const ALL: u8 = Part::Sampling as u8 | Part::Process as u8 | Part::Services as u8 | Part::Keeper as u8;
+const ALL: u8 = Part::Sampling as u8 | Part::Process as u8 | Part::Services as u8 | Part::Storage as u8;
 
 /// Which parts have made progress since the watchdog was last fed.
 #[derive(Debug, Default)]
@@ -48,7 +48,7 @@ impl Supervision {
 mod tests {
     use super::*;
 
-    const PARTS: [Part; 4] = [Part::Sampling, Part::Process, Part::Services, Part::Keeper];
+    const PARTS: [Part; 4] = [Part::Sampling, Part::Process, Part::Services, Part::Storage];
 
     #[test]
     fn without_one_of_them_nobody_feeds() {

@@ -4,16 +4,18 @@ use canopen::dictionary::{Entry, Group};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, Part};
-use profiles::communication::PERSONALITY;
+use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY};
 use profiles::fault::Flags;
 use profiles::{AnyProfile, Snapshot};
 
 use crate::Setup;
 use crate::configured::Configured;
 use crate::fault::{CONDITIONS, flag_of};
-use crate::lost_events::LOST_EVENTS;
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
+
+/// How many kinds of lost events there are: sub-indexes 1 to this one of 2001h.
+pub const LOST_EVENTS: usize = LOST_EVENT_KINDS as usize;
 
 /// The application at work.
 #[derive(Debug)]
@@ -102,6 +104,10 @@ impl Application for NodeApplication {
 
     fn state(&mut self, state: State, image: &mut [u8]) {
         self.profile.state(state, image);
+    }
+
+    fn sends_events(&self, tpdo: u16) -> bool {
+        self.profile.sends_events(tpdo)
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {

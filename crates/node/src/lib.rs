@@ -20,11 +20,11 @@ mod stored;
 mod storing;
 mod transfer_buffer;
 
+pub use application::LOST_EVENTS;
 pub use canopen::lss::BitRate;
 pub use canopen::nmt::State;
 pub use canopen::{Action, BusEvent, Frame, Instant, Next, NodeId, QueueFull, Transmit};
 pub use fault::FAULTS;
-pub use lost_events::LOST_EVENTS;
 pub use profiles::fault::Fault;
 pub use profiles::{Measurement, Parameters, Personality, Snapshot};
 pub use protocol::Protocol;

@@ -3,10 +3,7 @@
 use profiles::communication;
 
 use crate::Protocol;
-use crate::application::NodeApplication;
-
-/// How many kinds of events there are: sub-indexes 1 to this one.
-pub const LOST_EVENTS: usize = communication::LOST_EVENT_KINDS as usize;
+use crate::application::{LOST_EVENTS, NodeApplication};
 
 impl Protocol {
     /// Shows how many events have been lost since the start, in the order of the sub-indexes of 2001h.

@@ -350,6 +350,15 @@ macro_rules! personalities {
                 }
             }
 
+            /// As [`Profile::sends_events`]($crate::profile::Profile::sends_events).
+            #[must_use]
+            pub fn sends_events(&self, tpdo: u16) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.sends_events(tpdo),)+
+                }
+            }
+
             /// As [`Profile::outputs`]($crate::profile::Profile::outputs).
             #[must_use]
             pub fn outputs(&self, image: &[u8]) -> $crate::board::Outputs {

@@ -102,6 +102,10 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         self.1.show_flags(flags, image);
     }
 
+    fn sends_events(&self, tpdo: u16) -> bool {
+        self.0.sends_events(tpdo) || self.1.sends_events(tpdo)
+    }
+
     /// A digital output is on when one of them wants it on.
     fn outputs(&self, image: &[u8]) -> Outputs {
         let (first, second) = (self.0.outputs(image).digital, self.1.outputs(image).digital);

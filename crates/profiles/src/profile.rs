@@ -82,6 +82,11 @@ pub trait Profile: Sized {
     /// Shows which faults of the device are active, in a profile that has objects for them.
     fn show_flags(&self, _flags: Flags, _image: &mut [u8]) {}
 
+    /// Whether this TPDO, by its number from 1, sends events: a frame of it that waits for the bus gives way to no newer one.
+    fn sends_events(&self, _tpdo: u16) -> bool {
+        false
+    }
+
     /// What the board has to show.
     fn outputs(&self, _image: &[u8]) -> Outputs {
         Outputs::default()

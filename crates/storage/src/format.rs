@@ -56,9 +56,10 @@ impl Format {
         self.padded(2 * WORD)
     }
 
-    /// Bytes that a value takes up: whole units.
+    /// Bytes that a value takes up: whole units. A unit is a power of two, so there is no division that could be by zero.
     pub(crate) fn padded(self, len: u32) -> u32 {
-        len.next_multiple_of(self.unit)
+        let most = self.unit.wrapping_sub(1);
+        len.wrapping_add(most) & !most
     }
 }
 

@@ -80,7 +80,7 @@ const TASKS: [Task; 6] = [
         reason: "a client waits for its answer",
     },
     Task {
-        name: "keep",
+        name: "store",
         priority: 1,
         irqs: &[49],
         period: 1_000_000.0,

@@ -148,6 +148,16 @@ fn a_late_abort_message_is_passed_over() {
     assert_eq!(upload(&mut late, once()).1, [1, 2]);
 }
 
+/// A server that does not know blocks may name the object of the transfer before.
+#[test]
+fn a_request_that_is_not_understood_is_refused_whatever_object_is_named() {
+    let mut simple = |_: [u8; 8]| {
+        let before = canopen::sdo::Multiplexer { index: 0x1F56, sub: 1 };
+        vec![Response::Abort(before, Abort::Command.code()).encode()]
+    };
+    assert_eq!(block_upload(&mut simple, once()).0, Err(Error::Abort(AbortCode(0x0504_0001))));
+}
+
 #[test]
 fn silence_costs_the_time_outs_and_tells_the_server() {
     let mut memory = [0; 8];

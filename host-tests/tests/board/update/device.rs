@@ -139,7 +139,8 @@ fn a_download_without_a_clear_is_refused_and_one_in_segments_is_taken() {
 fn a_block_upload_is_refused() {
     let mut bench = in_bootloader();
     let name = at(0x1008, 0);
-    assert!(matches!(Client::new(&mut bench).read_blocks(name, 127), Err(Failure::Refused(_))));
+    let refused = Client::new(&mut bench).read_blocks(name, 127);
+    assert!(matches!(refused, Err(Failure::Refused(_))), "{refused:X?}");
     bench.run(Time::from_millis(10));
     assert_eq!(bench.read(name).unwrap(), b"Bootloader");
 }

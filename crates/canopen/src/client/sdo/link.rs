@@ -2,7 +2,7 @@
 
 use super::{AbortCode, Error, Options};
 use crate::client::service::later;
-use crate::sdo::{Multiplexer, Request, Response};
+use crate::sdo::{Abort, Multiplexer, Request, Response};
 use crate::{Duration, Frame, Instant, NodeId};
 
 /// CAN-IDs of the default SDO channel without the node-ID (CiA 301, 7.3.5).
@@ -109,13 +109,14 @@ impl Link {
     }
 
     /// The code of an abort message that is about this transfer. One for another object comes late; a server that does not
-    /// understand a request at all may leave the object 0. Segments of a block have the same bits in their first byte, but
+    /// understand a request at all may leave the object 0, or that of the transfer before. Segments of a block have the same bits in their first byte, but
     /// no sequence number of 0.
     pub(super) fn refusal(&self, data: [u8; 8]) -> Option<AbortCode> {
         let Some(Response::Abort(of, code)) = Response::parse(data).filter(|_| data[0] == 0x80) else {
             return None;
         };
-        let is_ours = !self.is_first || of == self.at || of == Multiplexer::default();
+        let is_not_understood = code == Abort::Command.code() || of == Multiplexer::default();
+        let is_ours = !self.is_first || of == self.at || is_not_understood;
         is_ours.then_some(AbortCode(code))
     }
 

@@ -1,4 +1,4 @@
-//! The keeper of the parameter store: it does at the lowest priority what the protocol wants stored. The flash stops the
+//! The task of the parameter store: at the lowest priority it does what the protocol wants stored. The flash stops the
 //! core for 16 us with every word, so everything else runs between two words.
 
 use bsp::Clock;
@@ -11,15 +11,15 @@ use crate::SERVICES;
 use crate::shared::Shared;
 
 /// What the task owns.
-pub(crate) struct Keeper {
+pub(crate) struct StorageTask {
     /// `None` when the flash could not be prepared: then nothing can be stored.
     store: Option<Store<ParameterFlash>>,
     job: &'static mut StoreJob,
 }
 
-impl Keeper {
-    pub(crate) fn new(store: Option<Store<ParameterFlash>>, job: &'static mut StoreJob) -> Keeper {
-        Keeper { store, job }
+impl StorageTask {
+    pub(crate) fn new(store: Option<Store<ParameterFlash>>, job: &'static mut StoreJob) -> StorageTask {
+        StorageTask { store, job }
     }
 
     /// Whether it can store anything.

@@ -1,15 +1,15 @@
-//! The latest snapshot, on its way from the sampling task to that of the process data.
+//! The slot snapshot, on its way from the sampling task to that of the process data.
 
 use node::Snapshot;
 
 /// Written in its place and copied once: a thousand times a second, a copy of some hundred bytes counts.
 #[derive(Default)]
-pub struct Latest {
+pub struct SnapshotSlot {
     snapshot: Snapshot,
     is_new: bool,
 }
 
-impl Latest {
+impl SnapshotSlot {
     /// The place of the next one.
     pub(crate) fn renew(&mut self) -> &mut Snapshot {
         self.is_new = true;

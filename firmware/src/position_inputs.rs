@@ -1,18 +1,18 @@
-//! The inputs of the encoder, as the measurement takes them.
+//! The inputs of the position sensors, as the measurement takes them.
 
 use bsp::{Counted, Ssi};
 use profiles::board::{Board, PositionInputs, RawEncoder, SsiFrame};
 
 /// What the sampling task owns of them.
-pub(crate) struct Shaft {
+pub(crate) struct PositionReader {
     ssi: Ssi,
     settings: PositionInputs,
     board: Board,
 }
 
-impl Shaft {
-    pub(crate) fn new(ssi: Ssi, board: Board) -> Shaft {
-        Shaft { ssi, settings: PositionInputs::default(), board }
+impl PositionReader {
+    pub(crate) fn new(ssi: Ssi, board: Board) -> PositionReader {
+        PositionReader { ssi, settings: PositionInputs::default(), board }
     }
 
     /// Reads what the parameters ask for, from the next millisecond on.
