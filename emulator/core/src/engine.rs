@@ -334,6 +334,9 @@ fn merged<P: Peripherals>(core: &mut Core<P>, address: u32, size: usize, value: 
 /// What may be done with a page, when the library asks. Stores into a page from which code may run are several times dearer,
 /// because the library looks whether they change code: so a page of RAM has code only once code was fetched from it.
 fn on_page<P>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType) -> Option<TlbEntry> {
+    if !matches!(kind, MemType::FETCH) {
+        close_it_block(cpu);
+    }
     let memory = &mut cpu.get_data_mut().memory;
     let address = page as u32;
     let has_code = !memory.ram.range.contains(&address) || memory.code_in_ram.contains(&address);
@@ -343,6 +346,17 @@ fn on_page<P>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType) -> Option<Tl
     }
     let perms = if has_code || fetched { Prot::ALL } else { Prot::READ | Prot::WRITE };
     Some(TlbEntry { paddr: page, perms })
+}
+
+/// Before it asks for a page the library puts the IT state of the access into the CPU, where the code that is translated does
+/// not expect it: the next block would begin with it and skip instructions. What goes on after the access, or faults at it, has
+/// its IT state elsewhere.
+fn close_it_block<P>(cpu: &mut Unicorn<Core<P>>) {
+    const IT: u64 = 0x0600_FC00;
+    let xpsr = cpu.reg_read(RegisterARM::XPSR).unwrap_or(0);
+    if xpsr & IT != 0 {
+        let _ = cpu.reg_write(RegisterARM::XPSR_NZCVQG, xpsr & !IT);
+    }
 }
 
 /// RAM is data again, once another program has begun and runs from flash.

@@ -88,6 +88,11 @@ fn system_registers_are_as_the_architecture_says() {
 }
 
 #[test]
+fn an_it_block_that_touches_a_new_page_ends_where_it_ends() {
+    assert_eq!(Bench::new("it_miss").run(), Verdict::Passed);
+}
+
+#[test]
 fn hints_do_nothing() {
     assert_eq!(Bench::new("hints").run(), Verdict::Passed);
 }
