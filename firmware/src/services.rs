@@ -177,7 +177,7 @@ impl Services {
             defmt::warn!("lost events of kind {=u8}: {=u32}", kind, count);
         }
         let has_lost_frame = all.get(Event::Frame as usize) != told.get(Event::Frame as usize);
-        let _ = node.call(|protocol, _| protocol.show_lost_events(&all));
+        node.call(|protocol, _| protocol.show_lost_events(&all));
         if has_lost_frame {
             self.report(BusEvent::Overrun, Clock::now(), node);
         }
