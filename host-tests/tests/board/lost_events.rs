@@ -237,9 +237,12 @@ fn a_frame_that_makes_way_too_late_is_sent_once() {
     const MORE_URGENT: u16 = 0x001;
     const HEARTBEAT: u16 = 0x701;
     const EVENT_TIMER: (u16, u8) = (0x6200, 0);
+    const HEARTBEAT_TIME: (u16, u8) = (0x1017, 0);
     for (seed, noise) in [(1, 0.0), (1, 0.4), (2, 0.4), (3, 0.4), (4, 0.4)] {
         let (mut world, master) = start("");
         write(&mut world, &master, EVENT_TIMER, 2, 1700);
+        // The period begins with the write: two heartbeats become due on the full bus, and none in the half second after it.
+        write(&mut world, &master, HEARTBEAT_TIME, 2, 1000);
         master.send(&mut world, START_ALL.0, &START_ALL.1);
         wait(&mut world, 50);
         lose(&mut world, Loss::Abort, 1);

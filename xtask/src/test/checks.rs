@@ -5,7 +5,7 @@ use anyhow::{Result, ensure};
 use super::host;
 use super::report::Step;
 use crate::command::{cargo, root, run};
-use crate::setup::{self, Need, python};
+use crate::setup::{self, python};
 use crate::target::Toolchain;
 use crate::{bench, images, progress};
 
@@ -26,7 +26,7 @@ pub(super) fn lane_of_host() -> Vec<Step> {
 /// For the Cortex-M4.
 pub(super) fn lane_of_images() -> Vec<Step> {
     vec![
-        Step::new("embedded target", || setup::install(&[Need::Target, Need::TargetLints])),
+        Step::new("system packages", || setup::install(setup::TEST)),
         Step::new("production bootloader", || images::compile_production(&Toolchain::ensure()?)),
         Step::new("build images", || images::compile_all(&Toolchain::ensure()?)),
         Step::new("build bench images", || bench::build(&bench::Options::default()).map(|_| ())),

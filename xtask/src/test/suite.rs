@@ -10,7 +10,7 @@ use super::host::{self, TestProgram};
 use super::report::{Step, last_times};
 use crate::command::{root, run, target_dir};
 use crate::own_tool::Tools;
-use crate::setup::{self, Need, python};
+use crate::setup::python;
 use crate::{bench, callgraph, images};
 
 /// The tests that run on the emulated board are the longest: they begin first when nothing is known of a last run.
@@ -85,7 +85,6 @@ fn of_python(thorough: bool) -> Result<Vec<Step>> {
 }
 
 fn python(file: &Path, thorough: bool) -> Result<()> {
-    setup::install(&[Need::Tshark])?;
     let mut command = Command::new(python::clients()?);
     command.args(["-m", "pytest", "-q", "--durations=3"]).arg(file).current_dir(root());
     for (variable, tool) in [
