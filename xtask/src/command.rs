@@ -23,6 +23,11 @@ pub(crate) fn target_dir() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
 }
 
+/// A program of this machine that cargo has built with the profile `sim`.
+pub(crate) fn built(name: &str) -> PathBuf {
+    target_dir().join("sim").join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+}
+
 /// The cargo that runs xtask.
 pub(crate) fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));

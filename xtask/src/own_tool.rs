@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::command::{self, root, target_dir};
+use crate::command::{self, built, root};
 use crate::setup::emulator;
 
 /// Where the arguments of a tool go to.
@@ -22,9 +22,7 @@ impl Tools {
     /// The tool, ready for its arguments.
     pub(crate) fn get(self, name: &str) -> Result<Command> {
         if self == Tools::Built {
-            let mut tool = Command::new(
-                target_dir().join("sim").join(format!("{name}{}", std::env::consts::EXE_SUFFIX)),
-            );
+            let mut tool = Command::new(built(name));
             tool.current_dir(root());
             return Ok(tool);
         }

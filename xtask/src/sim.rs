@@ -1,27 +1,26 @@
 //! `cargo sim`: build both images and the simulator, then become the simulator.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::thread;
 
 use anyhow::{Context, Result, anyhow};
 
-use crate::command::target_dir;
+use crate::command::built;
 use crate::setup::{self, emulator};
 use crate::target::Toolchain;
 use crate::{images, progress};
 
-/// Builds the simulator and the tool that signs images. Returns the directory of both.
-fn build() -> Result<PathBuf> {
+/// Builds the simulator and the tool that signs images.
+fn build() -> Result<()> {
     let mut command = emulator::cargo_with_emulator()?;
     command.args(["build", "--profile", "sim", "-p", "sim", "-p", "sign"]);
-    progress::build("emulator 2/2", &mut command)?;
-    Ok(target_dir().join("sim"))
+    progress::build("emulator 2/2", &mut command)
 }
 
 /// Builds at the same time what the Cortex-M4 and what this machine runs: each of the two leaves a core idle when it links.
-fn build_all() -> Result<PathBuf> {
+fn build_all() -> Result<()> {
     thread::scope(|scope| {
         let images = scope.spawn(|| images::compile_node(&Toolchain::ensure()?));
         let programs = build();
@@ -34,14 +33,9 @@ fn build_all() -> Result<PathBuf> {
 /// simulator.
 pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     setup::check(setup::SIM)?;
-    let programs = build_all()?;
-    images::sign(Command::new(programs.join(program("sign"))))?;
-    become_program(with_images(&programs.join(program("sim"))).args(flags))
-}
-
-/// The name of an executable file.
-fn program(name: &str) -> String {
-    format!("{name}{}", std::env::consts::EXE_SUFFIX)
+    build_all()?;
+    images::sign(Command::new(built("sign")))?;
+    become_program(with_images(&built("sim")).args(flags))
 }
 
 #[cfg(unix)]

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 
 use super::host::{self, TestProgram};
 use super::report::{Step, last_times};
-use crate::command::{root, run, target_dir};
+use crate::command::{built, root, run};
 use crate::own_tool::Tools;
 use crate::setup::python;
 use crate::{bench, callgraph, images};
@@ -93,8 +93,7 @@ fn python(file: &Path, thorough: bool) -> Result<()> {
         ("SIGN_COMMAND", "sign"),
         ("IO_MODULE_COMMAND", "examples/io_module"),
     ] {
-        let name = format!("{tool}{}", std::env::consts::EXE_SUFFIX);
-        command.env(variable, target_dir().join("sim").join(name));
+        command.env(variable, built(tool));
     }
     run(with_images(&mut command, thorough))
 }
