@@ -4,8 +4,8 @@ use core::mem::MaybeUninit;
 
 use bsp::reset_cause::ResetCause;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory};
-use node::{BitRate, NodeId, Parameters, Personality, Protocol, Setup};
-use profiles::board::{ChipThermometer, RawSample};
+use node::{BitRate, LastingRecord, NodeId, Parameters, Personality, Protocol, Setup};
+use profiles::board::{ChipThermometer, LASTING_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 
 /// Where the store has nothing to say: node-ID 1, 250 kbit/s, pressure.
@@ -21,6 +21,8 @@ pub(crate) struct Loaded {
     pub(crate) setup: Setup,
     /// Ready to store; `None` where nothing can be stored.
     pub(crate) store: Option<Store<ParameterFlash>>,
+    /// What is stored of what the measurement retains.
+    pub(crate) lasting: Option<[u32; LASTING_WORDS]>,
 }
 
 /// Makes the protocol in its place, with what is stored of it. Without a store that works, the node runs with its defaults.
@@ -32,13 +34,14 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
             let setup = setup(None);
             let protocol = make(place, &setup);
             let parameters = protocol.load_defaults();
-            return Loaded { protocol, parameters, setup, store: None };
+            return Loaded { protocol, parameters, setup, store: None, lasting: None };
         }
     };
     let setup = setup(view.device().ok().flatten());
     let protocol = make(place, &setup);
     let parameters = protocol.load(&mut view);
-    Loaded { protocol, parameters, setup, store: prepare(view) }
+    let lasting = LastingRecord::read(&mut view);
+    Loaded { protocol, parameters, setup, store: prepare(view), lasting }
 }
 
 /// Not inlined: the stack on which the value is made is free again for what reads the flash.

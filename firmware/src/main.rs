@@ -62,7 +62,7 @@ mod app {
         BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TimeInterrupt,
         Transmitter, Watchdog,
     };
-    use node::{Measurement, Parameters, Protocol, StoreJob};
+    use node::{LastingRecord, Measurement, Parameters, Protocol, StoreJob};
     use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
     use crate::bit_rate::Rate;
@@ -71,7 +71,7 @@ mod app {
     use crate::process::Process;
     use crate::services::{Services, StartUpFaults};
     use crate::snapshot_slot::SnapshotSlot;
-    use crate::storage_task::StorageTask;
+    use crate::storage_task::{Retained, StorageTask};
     use crate::{FIRST_SAMPLE, PROCESS, SERVICES, configuration, power_on};
 
     #[shared]
@@ -82,6 +82,8 @@ mod app {
         /// New ones, until the sampling task has taken them.
         parameters: Option<Parameters>,
         watchdog: Watchdog,
+        /// What the last sample has retained.
+        retained: Retained,
     }
 
     #[local]
@@ -112,9 +114,10 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, store } =
+        let Loaded { protocol, parameters, setup, store, lasting } =
             configuration::load(board.parameters, cx.local.protocol);
-        let storage = StorageTask::new(store, cx.local.job.write(StoreJob::new(setup.personality)));
+        let job = cx.local.job.write(StoreJob::new(setup.personality));
+        let storage = StorageTask::new(store, job, LastingRecord::new(lasting));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working() };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
@@ -130,6 +133,7 @@ mod app {
             snapshot: SnapshotSlot::default(),
             parameters: Some(parameters),
             watchdog: board.watchdog.supervise(),
+            retained: None,
         };
         let mut local = Local {
             receiver_process,
@@ -142,6 +146,7 @@ mod app {
                 setup.personality,
                 board.reset_cause,
                 &board.found,
+                lasting,
             ),
             transmitter: board.transmitter,
             time: board.time,
@@ -182,9 +187,8 @@ mod app {
     }
 
     /// Once a millisecond, when the DMA controller has filled a half of its buffer.
-    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, position, buttons, measurement, backup,
-               retained: [u32; RETAINED_WORDS] = [0; RETAINED_WORDS]],
-           shared = [snapshot, parameters, &watchdog])]
+    #[task(binds = DMA2_STREAM0, priority = 5, local = [front_end, position, buttons, measurement, backup],
+           shared = [snapshot, parameters, retained, &watchdog])]
     fn sample(mut cx: sample::Context) {
         let Some(Reading { sums, counted }) = cx.local.front_end.take() else { return };
         let (measurement, position) = (&mut *cx.local.measurement, cx.local.position);
@@ -201,9 +205,10 @@ mod app {
             digital: cx.local.buttons.sample(),
         };
         cx.shared.snapshot.lock(|slot| measurement.update(&inputs, slot.renew()));
-        if measurement.retain(cx.local.retained) {
-            cx.local.backup.write(cx.local.retained);
-        }
+        cx.shared.retained.lock(|retained| {
+            let words = retained.get_or_insert([0; RETAINED_WORDS]);
+            if measurement.retain(words) { cx.local.backup.write(words) } else { *retained = None }
+        });
         cx.shared.watchdog.progress(Part::Sampling);
         rtic::pend(PROCESS);
     }
@@ -234,9 +239,11 @@ mod app {
         cx.shared.watchdog.progress(Part::Services);
     }
 
-    #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, &watchdog])]
-    fn store(cx: store::Context) {
+    #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, retained, &watchdog])]
+    fn store(mut cx: store::Context) {
         cx.local.storage.run(&mut (cx.shared.protocol, cx.shared.transmit));
+        let retained = cx.shared.retained.lock(|retained| *retained);
+        cx.local.storage.keep(&retained);
         cx.shared.watchdog.progress(Part::Storage);
     }
 }

@@ -26,9 +26,9 @@ impl PositionReader {
         if !self.settings.are_used {
             return RawEncoder::default();
         }
-        let Counted { counter, index } = counted;
+        let Counted { counter, index, has_gap } = counted;
         let ssi = self.ssi.read(self.settings.ssi_bits);
         let ssi = ssi.map(|word| SsiFrame { bits: word.bits, clocks: word.clocks });
-        RawEncoder { counter, index, ssi, board: self.board }
+        RawEncoder { counter, index, ssi, has_gap, board: self.board }
     }
 }

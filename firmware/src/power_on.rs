@@ -6,7 +6,7 @@ use bsp::battery::Battery;
 use bsp::kept::Found;
 use bsp::reset_cause::ResetCause;
 use node::{Measurement, Personality};
-use profiles::board::{PowerOn, Retained};
+use profiles::board::{LASTING_WORDS, PowerOn, Retained};
 
 use crate::configuration;
 
@@ -17,8 +17,9 @@ pub(crate) fn make(
     personality: Personality,
     cause: ResetCause,
     found: &Found,
+    stored: Option<[u32; LASTING_WORDS]>,
 ) -> &'static mut Measurement {
-    place.write(Measurement::new(personality, &power_on(cause, found)))
+    place.write(Measurement::new(personality, &power_on(cause, found, stored)))
 }
 
 /// Whether the battery has failed; what the start tells of the battery is in the log as well.
@@ -37,8 +38,8 @@ fn battery_failed(cause: ResetCause, found: &Found) -> bool {
 /// What the board knows when the power comes.
 ///
 /// Memory without a trace of a copy is that of a new board, and after a loss of power that of one without a battery, or with
-/// an empty one: the two cannot be told apart, and the encoder begins anew.
-fn power_on(cause: ResetCause, found: &Found) -> PowerOn {
+/// an empty one. The parameter store tells the two apart: a new board has no record of the positions.
+fn power_on(cause: ResetCause, found: &Found, stored: Option<[u32; LASTING_WORDS]>) -> PowerOn {
     let retained = match found {
         Found::Nothing => Retained::Nothing,
         Found::Kept(words) => Retained::Words(*words),
@@ -48,5 +49,5 @@ fn power_on(cause: ResetCause, found: &Found) -> PowerOn {
         }
     };
     let battery_failed = battery_failed(cause, found);
-    PowerOn { thermometer: configuration::thermometer(), retained, battery_failed }
+    PowerOn { thermometer: configuration::thermometer(), retained, stored, battery_failed }
 }

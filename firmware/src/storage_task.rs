@@ -4,7 +4,8 @@
 use bsp::Clock;
 use bsp::ParameterFlash;
 use canopen::sdo::Abort;
-use node::StoreJob;
+use node::{LastingRecord, StoreJob};
+use profiles::board::RETAINED_WORDS;
 use storage::Store;
 
 use crate::SERVICES;
@@ -15,16 +16,35 @@ pub(crate) struct StorageTask {
     /// `None` when the flash could not be prepared: then nothing can be stored.
     store: Option<Store<ParameterFlash>>,
     job: &'static mut StoreJob,
+    lasting: LastingRecord,
 }
 
+/// What a profile retains, as the last sample has left it; `None` where it retains nothing.
+pub(crate) type Retained = Option<[u32; RETAINED_WORDS]>;
+
 impl StorageTask {
-    pub(crate) fn new(store: Option<Store<ParameterFlash>>, job: &'static mut StoreJob) -> StorageTask {
-        StorageTask { store, job }
+    pub(crate) fn new(
+        store: Option<Store<ParameterFlash>>,
+        job: &'static mut StoreJob,
+        lasting: LastingRecord,
+    ) -> StorageTask {
+        StorageTask { store, job, lasting }
     }
 
     /// Whether it can store anything.
     pub(crate) fn is_working(&self) -> bool {
         self.store.is_some()
+    }
+
+    /// Keeps what a start without a battery has to know of the positions.
+    pub(crate) fn keep(&mut self, retained: &Retained) {
+        if let (Some(store), Some(words)) = (&mut self.store, retained) {
+            match self.lasting.keep(words, store) {
+                Ok(true) => defmt::info!("the record of the positions is stored"),
+                Ok(false) => {}
+                Err(_) => defmt::error!("the record of the positions is not stored"),
+            }
+        }
     }
 
     /// Does the job that waits, if one does.

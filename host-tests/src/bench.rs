@@ -119,7 +119,14 @@ pub fn empty_store() -> Flash {
 /// Stores at once what the node asks to be stored.
 pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
     let mut job = StoreJob::new(Personality::default());
-    if protocol.take_job(&mut job) {
+    // As in the firmware, a job may wait for the values of new parameters.
+    if (0..4).any(|_| {
+        let is_taken = protocol.take_job(&mut job);
+        if !is_taken {
+            let _ = protocol.publish(now, out);
+        }
+        is_taken
+    }) {
         let result = job.run(store);
         let _ = protocol.finish(&job, result, now, out);
     }

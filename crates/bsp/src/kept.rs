@@ -6,13 +6,13 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 /// Words that a copy holds.
-pub const CAPACITY: usize = 18;
+pub const CAPACITY: usize = 10;
 
 /// The words of a copy.
 pub type Content = [u32; CAPACITY];
 
-/// Tells a damaged copy from memory that never held one.
-const MARK: u32 = 0x4B45_5054;
+/// Tells a damaged copy from memory that never held one, or one of another layout.
+const MARK: u32 = 0x4B45_5032;
 
 /// The place of a copy in memory.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! The application of the CANopen device: what the node adds to CiA 301, and its profile.
 
-use canopen::dictionary::{Entry, Group};
+use canopen::dictionary::{Entry, Group, Groups};
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, Part};
@@ -108,6 +108,11 @@ impl Application for NodeApplication {
 
     fn sends_events(&self, tpdo: u16) -> bool {
         self.profile.sends_events(tpdo)
+    }
+
+    fn stores(&self, entry: &Entry) -> Option<Groups> {
+        let stores = self.profile.stores(entry.index(), entry.sub());
+        stores.then_some(Groups::one(Group::Application))
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {

@@ -9,6 +9,9 @@ use crate::application::NodeApplication;
 use crate::faults::Shown;
 use crate::{Next, Setup};
 
+/// The sample of this millisecond may have been taken, and the next one may have begun, before there were new parameters.
+const OLDER_SAMPLES: u8 = 3;
+
 /// The CANopen device of one node. The process-data task and the services task share it; each locks it for one call. Every
 /// call returns what follows from it: see [`Next`].
 #[derive(Debug)]
@@ -18,6 +21,8 @@ pub struct Protocol {
     pub(crate) shown: Shown,
     /// What `Action::Store` is about.
     pub(crate) job: Option<Job>,
+    /// Samples that may still come from before the parameters that hold now.
+    pub(crate) older_samples: u8,
 }
 
 impl Protocol {
@@ -27,7 +32,7 @@ impl Protocol {
         let dictionary = setup.personality.dictionary();
         let device =
             Device::new(dictionary, setup.node_id, NodeApplication::new(setup)).with_bit_rate(setup.bit_rate);
-        Protocol { device, shown: Shown::default(), job: None }
+        Protocol { device, shown: Shown::default(), job: None, older_samples: 0 }
     }
 
     /// Initialises what the pending reset covers, then boots up. To be called once the bus is ready,
@@ -37,8 +42,11 @@ impl Protocol {
         self.note(next)
     }
 
-    /// Keeps the job that is to be done, for `take_job`.
+    /// Keeps the job that is to be done, for `take_job`, and takes note of new parameters.
     pub(crate) fn note(&mut self, next: Next) -> Next {
+        if next.parameters {
+            self.older_samples = OLDER_SAMPLES;
+        }
         if let Some(Action::Store(job)) = next.action {
             self.job = Some(job);
         }
@@ -59,7 +67,8 @@ impl Protocol {
 
     /// A frame of FIFO 0: NMT, SYNC, RPDO, or a remote request for a TPDO.
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        self.device.on_process_frame(frame, now, out)
+        let next = self.device.on_process_frame(frame, now, out);
+        self.note(next)
     }
 
     /// A frame of FIFO 1: everything else.
@@ -81,6 +90,7 @@ impl Protocol {
         if matches!(snapshot, Snapshot::Nothing) {
             return self.device.poll_process(now, out);
         }
+        self.older_samples = self.older_samples.saturating_sub(1);
         let shown = Shown::of(snapshot);
         if self.shown != shown {
             self.follow_faults(shown, now);

@@ -4,7 +4,7 @@ use canopen::dictionary::Group;
 use canopen::sdo::Abort;
 use canopen::{Instant, Job, Transmit};
 use embedded_storage::nor_flash::ReadNorFlash;
-use profiles::Parameters;
+use profiles::{Parameters, Snapshot};
 use storage::View;
 
 use crate::stored::layout;
@@ -28,8 +28,16 @@ impl Protocol {
 
     /// Takes the job that `Action::Store` announced, with the values of this moment. `false` when there is none. The
     /// values are only copied: to pack them takes half a millisecond, in which nobody should have to wait for the protocol.
+    ///
+    /// Values that the measurement finds, such as the offset of a preset, are stored as well. While they may be from before the
+    /// parameters, the job waits: ask again a few milliseconds later.
     pub fn take_job(&mut self, taken: &mut StoreJob) -> bool {
         let application = self.device.application();
+        let is_measured = !matches!(application.snapshot, Snapshot::Nothing);
+        if is_measured && self.older_samples > 0 && matches!(self.job, Some(Job::Store(_))) {
+            taken.job = None;
+            return false;
+        }
         taken.job = self.job.take();
         taken.personality = application.setup.personality;
         taken.node_id = self.device.node_id();

@@ -5,8 +5,10 @@
 pub const DIGITAL_INPUTS: usize = 2;
 /// Digital outputs of the board: its lamps.
 pub const DIGITAL_OUTPUTS: usize = 2;
-/// Words that outlive a loss of power.
-pub const RETAINED_WORDS: usize = 18;
+/// Words that a battery keeps through a loss of power.
+pub const RETAINED_WORDS: usize = 10;
+/// Words that the parameter store holds of them.
+pub const LASTING_WORDS: usize = 2;
 
 /// Everything that was read in one millisecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,6 +87,8 @@ pub struct RawEncoder {
     pub index: Option<u16>,
     /// SSI frame, `None` when none was read.
     pub ssi: Option<SsiFrame>,
+    /// More than a millisecond may have passed since the last sample, or an index have come that nobody saw.
+    pub has_gap: bool,
     /// The board around the sensors.
     pub board: Board,
 }
@@ -129,6 +133,8 @@ pub struct PowerOn {
     pub thermometer: ChipThermometer,
     /// What has outlived the loss of power.
     pub retained: Retained,
+    /// What the parameter store holds of what is retained; `None` on a board that has never been started.
+    pub stored: Option<[u32; LASTING_WORDS]>,
     /// The main supply was gone, and the battery has not kept the memory: the battery is empty or missing, or the board is new.
     /// `false` also where the main supply was never gone, so that nothing can be said of the battery.
     pub battery_failed: bool,
@@ -137,7 +143,12 @@ pub struct PowerOn {
 impl Default for PowerOn {
     /// A new board, whose chip has no calibration.
     fn default() -> PowerOn {
-        PowerOn { thermometer: ChipThermometer::UNKNOWN, retained: Retained::Nothing, battery_failed: false }
+        PowerOn {
+            thermometer: ChipThermometer::UNKNOWN,
+            retained: Retained::Nothing,
+            stored: None,
+            battery_failed: false,
+        }
     }
 }
 

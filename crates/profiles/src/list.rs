@@ -350,6 +350,15 @@ macro_rules! personalities {
                 }
             }
 
+            /// As [`Profile::stores`]($crate::profile::Profile::stores).
+            #[must_use]
+            pub fn stores(&self, index: u16, sub: u8) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.stores(index, sub),)+
+                }
+            }
+
             /// As [`Profile::sends_events`]($crate::profile::Profile::sends_events).
             #[must_use]
             pub fn sends_events(&self, tpdo: u16) -> bool {

@@ -102,6 +102,10 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         self.1.show_flags(flags, image);
     }
 
+    fn stores(&self, index: u16, sub: u8) -> bool {
+        self.0.stores(index, sub) || self.1.stores(index, sub)
+    }
+
     fn sends_events(&self, tpdo: u16) -> bool {
         self.0.sends_events(tpdo) || self.1.sends_events(tpdo)
     }

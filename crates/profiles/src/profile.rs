@@ -82,6 +82,11 @@ pub trait Profile: Sized {
     /// Shows which faults of the device are active, in a profile that has objects for them.
     fn show_flags(&self, _flags: Flags, _image: &mut [u8]) {}
 
+    /// Whether a client's write to this object stores the application parameters, as 1010h:3 would.
+    fn stores(&self, _index: u16, _sub: u8) -> bool {
+        false
+    }
+
     /// Whether this TPDO, by its number from 1, sends events: a frame of it that waits for the bus gives way to no newer one.
     fn sends_events(&self, _tpdo: u16) -> bool {
         false

@@ -11,11 +11,14 @@ pub enum Group {
     Application,
     /// Calibration of the measuring channels: set in production, not touched by 1011h.
     Calibration,
+    /// What a start without a battery has to know of the positions: kept by the node itself, not touched by 1011h.
+    Position,
 }
 
 impl Group {
     /// Every group, in the order in which a transaction holds them.
-    pub const ALL: [Group; 4] = [Group::Device, Group::Communication, Group::Application, Group::Calibration];
+    pub const ALL: [Group; 5] =
+        [Group::Device, Group::Communication, Group::Application, Group::Calibration, Group::Position];
 
     /// The number that stands for the group in flash. Numbers are never used again for another purpose.
     pub(crate) const fn id(self) -> u8 {
@@ -24,6 +27,7 @@ impl Group {
             Group::Communication => 2,
             Group::Application => 3,
             Group::Calibration => 4,
+            Group::Position => 5,
         }
     }
 
@@ -82,7 +86,7 @@ pub struct Loaded {
 
 /// One `T` for each group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct PerGroup<T>([T; 4]);
+pub(crate) struct PerGroup<T>([T; 5]);
 
 impl<T> PerGroup<T> {
     pub(crate) fn from_fn(mut make: impl FnMut(Group) -> T) -> PerGroup<T> {
@@ -90,22 +94,24 @@ impl<T> PerGroup<T> {
     }
 
     pub(crate) fn get(&self, group: Group) -> &T {
-        let [device, communication, application, calibration] = &self.0;
+        let [device, communication, application, calibration, position] = &self.0;
         match group {
             Group::Device => device,
             Group::Communication => communication,
             Group::Application => application,
             Group::Calibration => calibration,
+            Group::Position => position,
         }
     }
 
     pub(crate) fn get_mut(&mut self, group: Group) -> &mut T {
-        let [device, communication, application, calibration] = &mut self.0;
+        let [device, communication, application, calibration, position] = &mut self.0;
         match group {
             Group::Device => device,
             Group::Communication => communication,
             Group::Application => application,
             Group::Calibration => calibration,
+            Group::Position => position,
         }
     }
 

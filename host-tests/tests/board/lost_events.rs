@@ -284,7 +284,9 @@ fn a_lost_write_to_the_backup_memory_is_made_good() {
     let (mut world, master) = start("--shaft rpm:600");
     lose(&mut world, Loss::BackupStore, 100);
     assert!(counted(&mut world, &master, BACKUP_WRITES) >= 2);
-    stimulate(&mut world, "shaft", "const:10");
+    let now = world.now();
+    let here = world.machine(0).peripherals().plant().revolutions(now);
+    stimulate(&mut world, "shaft", &format!("const:{here}"));
     wait(&mut world, 10);
     let expected = read(&mut world, &master, POSITION);
     assert_silent(&mut world);

@@ -41,6 +41,8 @@ pub struct Counted {
     pub counter: u16,
     /// The same at the last index; `None` when none came since the last call.
     pub index: Option<u16>,
+    /// Time has passed since the reading before that nobody has seen, or an index may have.
+    pub has_gap: bool,
 }
 
 /// The input.
@@ -104,20 +106,20 @@ impl Encoder {
         scans.dier().modify(|_, w| w.ude().set_bit());
     }
 
-    /// The count at the last index; `None` when none came since the last call.
-    pub(super) fn index(&mut self) -> Option<u16> {
+    /// The count at the last index; `None` when none came since the last call. And whether one may have been lost.
+    pub(super) fn index(&mut self) -> (Option<u16>, bool) {
         if !self.at_index.is_enabled() {
             self.losses.count(Event::Index);
             stream::stop(&mut self.at_index);
             copy_at_index(&mut self.at_index, &self.timer);
-            return None;
+            return (None, true);
         }
         if !self.at_index.is_transfer_complete() {
-            return None;
+            return (None, false);
         }
         // In this order, one that comes in between is seen now and once more: that does no harm.
         self.at_index.clear_flags(DmaFlag::TransferComplete);
-        Some(AT_INDEX.load(Ordering::Relaxed))
+        (Some(AT_INDEX.load(Ordering::Relaxed)), false)
     }
 }
 

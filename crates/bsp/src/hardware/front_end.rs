@@ -18,6 +18,8 @@ pub struct FrontEnd {
     losses: &'static Losses,
     /// Somebody has asked for a millisecond that was not there, and none has come since.
     is_missed: bool,
+    /// The sampling was started anew since the last reading.
+    has_gap: bool,
 }
 
 /// One millisecond of both.
@@ -38,7 +40,7 @@ impl FrontEnd {
     ) -> FrontEnd {
         let sampling = Sampling::new(analogue, losses, rcc);
         let encoder = Encoder::new(encoder, sampling.scans(), losses, rcc);
-        FrontEnd { sampling, encoder, losses, is_missed: false }
+        FrontEnd { sampling, encoder, losses, is_missed: false, has_gap: false }
     }
 
     /// Begins to sample. The first interrupt comes a millisecond later, and it must not find interrupts masked: this is
@@ -59,7 +61,7 @@ impl FrontEnd {
             return None;
         };
         self.is_missed = false;
-        let index = self.encoder.index();
+        let (index, is_index_lost) = self.encoder.index();
         let counter = if self.is_in_step() {
             self.encoder.at_last_scan(sums.half)
         } else {
@@ -67,7 +69,8 @@ impl FrontEnd {
             self.restart();
             self.encoder.now()
         };
-        Some(Reading { sums, counted: Counted { counter, index } })
+        let has_gap = core::mem::take(&mut self.has_gap) | sums.is_second | is_index_lost;
+        Some(Reading { sums, counted: Counted { counter, index, has_gap } })
     }
 
     /// A copy that comes while the three places are read decides nothing.
@@ -81,6 +84,7 @@ impl FrontEnd {
 
     fn restart(&mut self) {
         self.losses.count(Event::Sampling);
+        self.has_gap = true;
         self.encoder.stop_copies(self.sampling.scans());
         self.sampling.set_up_again();
         self.encoder.start_copies(self.sampling.scans());

@@ -75,6 +75,8 @@ pub struct Sums {
     pub channels: [u32; CHANNELS],
     /// Which half of the buffers they come from.
     pub(super) half: usize,
+    /// The millisecond before it was given up.
+    pub(super) is_second: bool,
 }
 
 impl Sums {
@@ -142,14 +144,14 @@ impl Sampling {
     pub(super) fn take(&mut self) -> Option<Sums> {
         let flags = self.dma.lisr().read();
         forget_flags(&self.dma);
-        let half = match (flags.htif0().bit(), flags.tcif0().bit()) {
+        let (half, is_second) = match (flags.htif0().bit(), flags.tcif0().bit()) {
             (false, false) => return None,
-            (true, false) => 0,
-            (false, true) => 1,
-            (true, true) => self.latest_of_two(),
+            (true, false) => (0, false),
+            (false, true) => (1, false),
+            (true, true) => (self.latest_of_two(), true),
         };
         let words = BUFFER.as_chunks().0.get(half)?;
-        Some(Sums { channels: sums(words), half })
+        Some(Sums { channels: sums(words), half, is_second })
     }
 
     /// Both halves are complete: the older one is being overwritten, so it is given up.

@@ -1,7 +1,7 @@
 //! What a device does beyond CANopen, as the device sees it.
 
 use super::Stored;
-use crate::dictionary::{Entry, Group};
+use crate::dictionary::{Entry, Group, Groups};
 use crate::emcy::{Condition, Fault};
 use crate::nmt::State;
 use crate::sdo::{Abort, Multiplexer};
@@ -57,6 +57,11 @@ pub trait Application {
     /// the number of the TPDO, 1 to 512. Asked whenever the communication parameters or the mapping of the TPDO change.
     fn sends_events(&self, _tpdo: u16) -> bool {
         false
+    }
+
+    /// The groups that an SDO client's write to this entry stores, as 1010h would: the response waits for it.
+    fn stores(&self, _entry: &Entry) -> Option<Groups> {
+        None
     }
 
     /// What is stored of a group, for every reset that covers it.

@@ -59,7 +59,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             self.pending.parameters_changed();
         }
         self.application.written(entry, &mut self.image);
-        Ok(())
+        match self.application.stores(entry) {
+            Some(groups) if !A::SERVICES_ONLY => self.begin_deferred(Job::Store(groups)),
+            _ => Ok(()),
+        }
     }
 
     fn take_deferred(&mut self) -> bool {

@@ -66,7 +66,9 @@ const fn check_row(row: &Object) {
     let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
     assert!(!mappable || fits, "a mapped object has no place in a PDO");
     assert!(!mappable || row.stored_size() > 0, "a mapped object has no place in the image");
-    assert!(row.group.is_none() || matches!(row.access, Access::ReadWrite), "only a parameter can be stored");
+    // What a device finds itself can be stored as well, such as the offset that follows from a preset.
+    let lasts = matches!(row.access, Access::ReadWrite | Access::ReadOnly);
+    assert!(row.group.is_none() || lasts, "only a parameter or what the device has found can be stored");
     assert!(!row.mapping.allows_tpdo() || row.access.is_readable(), "a TPDO sends what can be read");
     assert!(!row.mapping.allows_rpdo() || row.access.is_writable(), "an RPDO writes what can be written");
     let takes_values = matches!(row.rule, Rule::Plain | Rule::Application);

@@ -1,6 +1,6 @@
 //! Work area supervision: objects 6400h, 6401h, 6402h and 650Ah.
 
-/// The area state register (6400h): outside of the manufacturer's limits.
+/// The area state register (6400h): at one of the manufacturer's limits or beyond.
 pub const OUT_OF_RANGE: u8 = 1 << 0;
 /// The area state register (6400h): above the work area.
 pub const OVERFLOW: u8 = 1 << 1;
@@ -36,15 +36,16 @@ impl Default for Module {
 
 /// The area state register at a position value and a position in native steps.
 ///
-/// Limits belong to the area; only what is beyond them is reported, or a sensor that uses its whole range would be out
-/// of range at both ends ("is reached" in CiA 406). The limits are signed and 6004h is not: both are compared in 64
-/// bits. The ends of INTEGER32 are no limits to the sensor.
+/// The limits of the work area belong to it: lower and higher positions are reported (CiA 406, 7.4.1). A limit of the
+/// manufacturer is reported when it is reached. The limits are signed and 6004h is not: both are compared in 64 bits. The
+/// ends of INTEGER32 are no limits to the sensor.
 #[must_use]
 pub fn area_state(area: &Area, module: &Module, position: u32, native: i64) -> u8 {
     let position = i64::from(position);
-    let native = native.clamp(i32::MIN.into(), i32::MAX.into());
+    let is_low = module.low > i32::MIN && native <= module.low.into();
+    let is_high = module.high < i32::MAX && native >= module.high.into();
     let bit = |set: bool, mask: u8| if set { mask } else { 0 };
-    bit(native < module.low.into() || native > module.high.into(), OUT_OF_RANGE)
+    bit(is_low || is_high, OUT_OF_RANGE)
         | bit(position > area.high.into(), OVERFLOW)
         | bit(position < area.low.into(), UNDERFLOW)
 }
@@ -56,17 +57,17 @@ mod tests {
     const AREA: Area = Area { low: 100, high: 200 };
 
     #[test]
-    fn only_what_is_beyond_a_limit_is_reported() {
+    fn a_limit_of_the_sensor_is_reported_when_it_is_reached_and_one_of_the_area_beyond_it() {
         let module = Module { offset: 0, low: -50, high: 50 };
         for (position, native, state) in [
             (99, 0, UNDERFLOW),
             (100, 0, 0),
             (200, 0, 0),
             (201, 0, OVERFLOW),
-            (150, -50, 0),
-            (150, -51, OUT_OF_RANGE),
-            (150, 50, 0),
-            (150, 51, OUT_OF_RANGE),
+            (150, -49, 0),
+            (150, -50, OUT_OF_RANGE),
+            (150, 49, 0),
+            (150, 50, OUT_OF_RANGE),
             (150, i64::MIN, OUT_OF_RANGE),
             (u32::MAX, i64::MAX, OUT_OF_RANGE | OVERFLOW),
         ] {

@@ -1,7 +1,7 @@
 //! The encoder: two channels and what is common to them.
 
 use super::channel::{Channel, Pending};
-use super::supervision::{Conditions, Supervision};
+use super::supervision::{Conditions, Supervision, supported_warnings};
 use super::{ChannelParameters, ChannelValues, Kept, KeptChannel, Limits, Parameters, Start};
 use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
@@ -21,6 +21,8 @@ pub struct Snapshot {
     pub alarms: u16,
     /// Warnings (6505h).
     pub warnings: u16,
+    /// Supported warnings (6506h).
+    pub supported_warnings: u16,
     /// Operating time (6508h) in 0.1 h.
     pub operating_time: u32,
     /// What is reported as an emergency.
@@ -33,8 +35,8 @@ pub struct Encoder {
     channels: [Option<Channel>; 2],
     /// The operating time, and what the channels have not taken back yet.
     kept: Kept,
-    /// What was to be kept is damaged, and nobody has said yet which sensors there are.
-    is_damaged: bool,
+    /// Nobody has said yet which sensors there are.
+    is_new: bool,
     supervision: Supervision,
     limits: Limits,
     acknowledge: Pending,
@@ -55,9 +57,9 @@ impl Encoder {
     pub fn new(start: Start) -> Encoder {
         Encoder {
             channels: [None, None],
-            kept: if let Start::Kept(kept) = start { kept } else { Kept::default() },
-            is_damaged: start == Start::Damaged,
-            supervision: Supervision::default(),
+            kept: start.kept(),
+            is_new: true,
+            supervision: Supervision::new(matches!(start, Start::Damaged(_))),
             limits: Limits::default(),
             acknowledge: Pending::default(),
             fixed: Snapshot::default(),
@@ -86,6 +88,7 @@ impl Encoder {
         let (channels, limits, time) = (&snapshot.channels, &self.limits, self.kept.operating_time);
         snapshot.alarms = self.supervision.alarms(channels);
         snapshot.warnings = self.supervision.warnings(channels, &raw.board, limits, time);
+        snapshot.supported_warnings = supported_warnings(&raw.board);
         snapshot.conditions = self.supervision.conditions(channels, &raw.board, limits);
         snapshot.operating_time = time.tenths();
     }
@@ -109,17 +112,15 @@ impl Chain for Encoder {
     type Snapshot = Snapshot;
 
     fn new(power_on: &PowerOn) -> Encoder {
-        Encoder::new(Start::from(power_on.retained))
+        Encoder::new(Start::of(power_on.retained, power_on.stored))
     }
 
     fn apply(&mut self, parameters: &Parameters) {
-        if core::mem::take(&mut self.is_damaged) {
-            self.supervision.set_damaged(parameters.sensors().any(|sensor| sensor.kind.is_kept()));
-        }
-        // What was kept is for the first parameters: a channel that is switched off and on again starts afresh.
+        // What was kept and stored is for the first parameters: a channel that is switched off and on again starts afresh.
         let kept = core::mem::take(&mut self.kept.channels);
+        let is_new = core::mem::take(&mut self.is_new);
         for ((channel, own), kept) in self.channels.iter_mut().zip(&parameters.channels).zip(&kept) {
-            apply(channel, parameters, own, kept);
+            apply(channel, parameters, own, kept, if is_new { own.offset } else { 0 });
         }
         self.acknowledge.set(parameters.acknowledge);
         self.limits = parameters.limits;
@@ -140,10 +141,16 @@ impl Chain for Encoder {
     }
 }
 
-fn apply(channel: &mut Option<Channel>, all: &Parameters, own: &ChannelParameters, kept: &KeptChannel) {
+fn apply(
+    channel: &mut Option<Channel>,
+    all: &Parameters,
+    own: &ChannelParameters,
+    kept: &KeptChannel,
+    offset: i32,
+) {
     match (all.sensor(own), channel) {
         (Some(sensor), Some(channel)) if channel.is_of(&sensor) => channel.apply(all, own, sensor),
-        (Some(sensor), channel) => *channel = Some(Channel::new(all, own, sensor, kept)),
+        (Some(sensor), channel) => *channel = Some(Channel::new(all, own, sensor, kept, offset)),
         (None, channel) => *channel = None,
     }
 }

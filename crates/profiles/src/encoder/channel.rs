@@ -29,6 +29,9 @@ pub struct ChannelValues {
     pub commissioning: Progress,
     /// [`Command::count`] of the last preset that this position knows of.
     pub presets: u8,
+    /// Where the readings of the sensor would be as a position: [`position`](ChannelValues::position), but for readings that
+    /// are not believed.
+    pub reading: u32,
 }
 
 /// The commands that were carried out, and the one that waits.
@@ -70,20 +73,20 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    /// A channel that has not measured yet, with what it kept.
+    /// A channel that has not measured yet, with what it kept. The offset belongs to the scale of the parameters.
     #[inline(never)]
     pub(super) fn new(
         all: &Parameters,
         own: &ChannelParameters,
         sensor: Sensor,
         kept: &KeptChannel,
+        offset: i32,
     ) -> Channel {
         let scale = all.scale(&sensor);
         let resolution = sensor.resolution();
-        let offset = kept.offset(sensor.kind, resolution, &scale).unwrap_or(0);
-        let left = kept.left(sensor.kind, resolution);
+        let found = kept.found(sensor.kind, resolution);
         let mut channel = Channel {
-            input: Input::new(sensor, all.module.offset, left),
+            input: Input::new(sensor, &scale, all.module.offset, found),
             resolution,
             position: Position::new(scale, offset),
             speedometer: Speedometer::new(0),
@@ -126,6 +129,10 @@ impl Channel {
     /// Processes one sample.
     #[inline(never)]
     pub(super) fn sample(&mut self, raw: &RawEncoder) -> ChannelValues {
+        let preset = self.preset.take();
+        if preset.is_some() {
+            self.input.refer();
+        }
         let seen = self.input.read(raw, self.position.scale());
         self.commissioning.observe(self.input.sensor(), &seen);
         let fixed = ChannelValues {
@@ -136,7 +143,7 @@ impl Channel {
             ..ChannelValues::default()
         };
         let Some(tracker) = self.input.tracker() else { return fixed };
-        if let Some(preset) = self.preset.take() {
+        if let Some(preset) = preset {
             self.position.preset(preset, tracker.shaft());
         }
         let position = self.position.value(tracker.shaft());
@@ -147,14 +154,21 @@ impl Channel {
             cams: self.cams.update(position),
             area: area_state(&self.area, &self.module, position, self.input.native()),
             offset: self.position.offset(),
+            reading: self.reading(position),
             ..fixed
         }
+    }
+
+    /// Where the readings would be as a position.
+    fn reading(&self, position: u32) -> u32 {
+        let there = self.input.doubtful();
+        there.map_or(position, |there| self.position.scale().value(there.shaft(), self.position.offset()))
     }
 
     /// What outlives a loss of power.
     pub(super) fn kept(&self) -> KeptChannel {
         let kind = self.input.sensor().kind;
-        let kept = |left| KeptChannel::new(kind, self.resolution, left, &self.position);
-        self.input.left().map(kept).unwrap_or_default()
+        let kept = |left| KeptChannel::new(kind, self.resolution, left);
+        self.input.left().map_or_else(|| KeptChannel::unread(self.input.unread()), kept)
     }
 }

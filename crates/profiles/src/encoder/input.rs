@@ -1,8 +1,10 @@
 //! From what the hardware has read to the movement of one sensor.
 
 use crate::board::RawEncoder;
-use core::num::NonZeroU32;
+use core::num::{NonZeroU32, NonZeroU64};
 
+use super::reference::{Marks, Reference, Trust};
+use super::stray::Stray;
 use super::{Fault, Scale, Sensor, Tracker};
 
 /// Sensor state: the encoder does not answer.
@@ -11,11 +13,11 @@ pub const SENSOR_NO_SIGNAL: u8 = 1 << 0;
 pub const SENSOR_PARITY: u8 = 1 << 1;
 /// Sensor state: the encoder sends its alarm bit.
 pub const SENSOR_ALARM: u8 = 1 << 2;
-/// Sensor state: the position is further away than the sensor can have moved.
+/// Sensor state: the readings are further away than the sensor can have moved. The position is the last one before that.
 pub const SENSOR_IMPLAUSIBLE: u8 = 1 << 3;
-/// Sensor state: the index came where it should not: steps were lost or are too many.
+/// Sensor state: the index did not come, or not where it should: steps were lost or are too many.
 pub const SENSOR_INDEX: u8 = 1 << 4;
-/// Sensor state: the index has not been seen yet.
+/// Sensor state: the index has not been seen yet; with a position error, the turns are not known.
 pub const SENSOR_UNREFERENCED: u8 = 1 << 5;
 /// Sensor state: more steps in a millisecond than the sensor can follow.
 pub const SENSOR_TOO_FAST: u8 = 1 << 6;
@@ -29,9 +31,13 @@ pub const SENSOR_HELD: u8 = SENSOR_NO_SIGNAL | SENSOR_PARITY | SENSOR_IMPLAUSIBL
 /// one millisecond old.
 const TOLERATED_MISSES: u32 = 2;
 
-/// Steps by which the index may come too early or too late: it is one quarter period wide and is seen at one edge
-/// forwards and at the other backwards; the capture may fall on either side of the step that causes it.
-const INDEX_TOLERANCE: u64 = 2;
+/// Milliseconds that a gap between two samples has at most: within that time the sampling is started anew.
+const GAP_MILLIS: u32 = 10;
+/// Samples that show a gap: a word of SSI is that of the sample before.
+const GAP_SAMPLES: u8 = 2;
+
+/// The part of all that a code tells apart, at both its ends, from which a sensor may leave the code in the dark.
+const EDGE: i64 = 512;
 
 /// What one sample says about the movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,8 +55,19 @@ pub(super) struct Observation {
 pub(super) struct Left {
     /// Steps from the origin.
     pub(super) total: i64,
-    /// The index had been seen.
-    pub(super) referenced: bool,
+    /// How far it can be trusted.
+    pub(super) trust: Trust,
+    /// See [`Input::needs_memory`].
+    pub(super) needs_memory: bool,
+}
+
+/// What a start knows of a sensor.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    /// Where it was left.
+    pub(super) left: Option<Left>,
+    /// Its position was to be kept, and was lost.
+    pub(super) lost: bool,
 }
 
 /// The sensor at work.
@@ -60,18 +77,41 @@ pub(super) struct Input {
     /// From the sensor's own zero to that of the encoder (650Ah:1).
     offset: i32,
     left: Option<Left>,
-    referenced: bool,
+    reference: Reference,
+    /// The code comes round before the position does, so that it matters how often.
+    comes_round: bool,
+    /// The code has come to one of its ends: without a memory of it nobody knows how often it has come round.
+    needs_memory: bool,
     /// `None` until the first good reading.
     tracker: Option<Tracker>,
     /// Milliseconds since the last good reading.
     missed: u32,
+    /// Steps in the last millisecond with a good reading.
+    step: i32,
+    /// Readings that are not believed.
+    stray: Option<Stray>,
+    /// Samples for which the sensor may have moved further than in a millisecond.
+    gap: u8,
 }
 
 impl Input {
     /// A sensor that has not been read yet.
-    pub(super) fn new(sensor: Sensor, offset: i32, left: Option<Left>) -> Input {
-        let referenced = left.is_some_and(|left| left.referenced);
-        Input { sensor, offset, left, referenced, tracker: None, missed: 0 }
+    pub(super) fn new(sensor: Sensor, scale: &Scale, offset: i32, found: Found) -> Input {
+        let Found { left, lost } = found;
+        let trust = left.map_or(Trust { lost, ..Trust::default() }, |left| left.trust);
+        Input {
+            sensor,
+            offset,
+            left,
+            reference: Reference::new(marks(&sensor, scale), trust),
+            comes_round: comes_round(&sensor, scale),
+            needs_memory: left.is_some_and(|left| left.needs_memory),
+            tracker: None,
+            missed: 0,
+            step: 0,
+            stray: None,
+            gap: 0,
+        }
     }
 
     /// The sensor.
@@ -82,12 +122,34 @@ impl Input {
     /// Takes another description of the same sensor, moves the zero, and counts in the turns of this scale.
     pub(super) fn apply(&mut self, sensor: Sensor, scale: &Scale, offset: i32) {
         self.sensor = sensor;
+        self.reference.apply(marks(&sensor, scale));
+        self.comes_round = comes_round(&sensor, scale);
+        self.needs_memory &= self.comes_round;
         let moved = i64::from(offset) - i64::from(self.offset);
         self.offset = offset;
         if let Some(tracker) = &mut self.tracker {
             tracker.set_turn(scale.turn());
             tracker.correct(moved);
         }
+    }
+
+    /// The position is known from here on, as a preset says: what the sensor reads is believed, and the count put right.
+    pub(super) fn refer(&mut self) {
+        let correction = self.reference.preset();
+        if let Some(tracker) = &mut self.tracker {
+            if let Some(stray) = self.stray.take() {
+                tracker.follow(stray.word());
+            }
+            tracker.correct(correction);
+        }
+    }
+
+    /// Where the shaft is by readings that are not believed; `None` while they are.
+    pub(super) fn doubtful(&self) -> Option<Tracker> {
+        let stray = self.stray?;
+        let mut tracker = self.tracker?;
+        tracker.follow(stray.word());
+        Some(tracker)
     }
 
     /// Where the shaft is; `None` until the first good reading.
@@ -104,14 +166,26 @@ impl Input {
         i64::from(tracker.word()) + i64::from(self.offset)
     }
 
-    /// Where it would go on after a loss of power.
+    /// Where it would go on after a loss of power. Readings that are not believed now are not believed then.
     pub(super) fn left(&self) -> Option<Left> {
-        let at = |tracker: &Tracker| Left { total: tracker.total(), referenced: self.referenced };
+        let trust = self.reference.trust();
+        let trust = Trust { lost: trust.lost || self.stray.is_some(), ..trust };
+        let at = |tracker: &Tracker| Left { total: tracker.total(), trust, needs_memory: self.needs_memory };
         self.tracker.as_ref().map(at).or(self.left)
+    }
+
+    /// What to know of a sensor that was never read.
+    pub(super) fn unread(&self) -> (bool, bool) {
+        (self.reference.trust().lost, self.needs_memory)
     }
 
     /// Takes a sample.
     pub(super) fn read(&mut self, raw: &RawEncoder, scale: &Scale) -> Observation {
+        self.gap = self.gap.saturating_sub(1);
+        if raw.has_gap {
+            self.gap = GAP_SAMPLES;
+            self.reference.forgive();
+        }
         if self.sensor.kind.is_absolute() { self.read_frame(raw, scale) } else { self.count(raw, scale) }
     }
 
@@ -122,30 +196,91 @@ impl Input {
             Some(Ok(reading)) => reading,
         };
         let word = reading.position & (u32::MAX >> (32 - self.sensor.bits().clamp(1, 32)));
-        // The longer nothing was read, the further it may have moved.
-        let most = self.sensor.fastest.saturating_mul(self.missed.saturating_add(1));
-        let distance = self.tracker.as_ref().map_or(0, |tracker| tracker.distance(word));
-        if self.sensor.fastest > 0 && distance.unsigned_abs() > most {
-            return self.miss(SENSOR_IMPLAUSIBLE);
+        if !self.is_plausible(word) {
+            return self.stay();
+        }
+        if self.missed > 0 {
+            self.come_back();
+        }
+        self.step = self.follow(word, scale);
+        self.note_edge();
+        let alarm = if reading.alarm { SENSOR_ALARM | SENSOR_POSITION_ERROR } else { 0 };
+        Observation { state: alarm | self.reference.state(), moved: self.step, code: reading.code }
+    }
+
+    /// Whether the sensor can be there.
+    fn is_plausible(&mut self, word: u32) -> bool {
+        let fastest = self.sensor.fastest;
+        let Some(tracker) = &self.tracker else { return true };
+        let is_back = match &mut self.stray {
+            _ if fastest == 0 => true,
+            Some(stray) => stray.is_back(word, fastest),
+            // The longer nothing was read, the further it may have moved.
+            None if self.missed == 0 && self.gap == 0 => tracker.distance(word).unsigned_abs() <= fastest,
+            None => {
+                let gap = if self.gap > 0 { GAP_MILLIS } else { 0 };
+                let millis = self.missed.saturating_add(1).saturating_add(gap);
+                tracker.distance(word).unsigned_abs() <= fastest.saturating_mul(millis)
+            }
+        };
+        if is_back {
+            self.stray = None;
+        } else if self.stray.is_none() {
+            self.stray = Some(Stray::new(self.sensor.bits(), tracker.word(), self.step, word, fastest));
+        }
+        is_back
+    }
+
+    /// The position stays where it was before the readings went away.
+    fn stay(&self) -> Observation {
+        let lasts = self.stray.is_some_and(|stray| stray.readings() > TOLERATED_MISSES);
+        let error = if lasts { SENSOR_POSITION_ERROR } else { 0 };
+        Observation { state: SENSOR_IMPLAUSIBLE | error | self.reference.state(), ..Observation::default() }
+    }
+
+    /// There is a reading again. Where the code may have come round in the meantime, nobody knows how often.
+    #[inline(never)]
+    fn come_back(&mut self) {
+        let most = u64::from(self.sensor.fastest) * (u64::from(self.missed) + 1);
+        let is_outage = self.missed > TOLERATED_MISSES && self.tracker.is_some();
+        if self.comes_round && is_outage && most >= 1 << (self.sensor.bits() - 1) {
+            self.reference.lose();
         }
         self.missed = 0;
-        let state = if reading.alarm { SENSOR_ALARM | SENSOR_POSITION_ERROR } else { 0 };
-        Observation { state, moved: self.follow(word, scale), code: reading.code }
+    }
+
+    fn note_edge(&mut self) {
+        if self.comes_round && !self.needs_memory {
+            let code = 1_i64 << self.sensor.bits();
+            let total = self.tracker.as_ref().map_or(0, Tracker::total).wrapping_sub(self.offset.into());
+            self.needs_memory = total < code / EDGE || total >= code - code / EDGE;
+        }
     }
 
     fn miss(&mut self, state: u8) -> Observation {
+        if let Some(stray) = &mut self.stray {
+            stray.skip();
+        }
         self.missed = self.missed.saturating_add(1);
         let error = if self.missed > TOLERATED_MISSES { SENSOR_POSITION_ERROR } else { 0 };
-        Observation { state: state | error, ..Observation::default() }
+        Observation { state: state | error | self.reference.state(), ..Observation::default() }
     }
 
     fn count(&mut self, raw: &RawEncoder, scale: &Scale) -> Observation {
         let moved = self.follow(raw.counter.into(), scale);
-        let is_fast = self.sensor.fastest > 0 && moved.unsigned_abs() > self.sensor.fastest;
-        let index = raw.index.filter(|_| self.sensor.index);
-        let lost = index.map_or(0, |index| self.reference(index));
-        let unreferenced = if self.sensor.index && !self.referenced { SENSOR_UNREFERENCED } else { 0 };
-        let state = lost | unreferenced | if is_fast { SENSOR_TOO_FAST } else { 0 };
+        let fastest = self.sensor.fastest;
+        let is_fast = moved.unsigned_abs() > fastest && fastest > 0 && self.gap == 0;
+        if is_fast {
+            self.reference.doubt();
+        }
+        if self.sensor.index {
+            self.reference.moved(moved);
+            if let Some(captured) = raw.index {
+                self.take_index(captured);
+            }
+        }
+        let too_fast = if is_fast { SENSOR_TOO_FAST | SENSOR_POSITION_ERROR } else { 0 };
+        let state = self.reference.state() | too_fast;
         Observation { state, moved, code: raw.counter.into() }
     }
 
@@ -169,25 +304,38 @@ impl Input {
         0
     }
 
-    /// The index is the zero of a rod, and of every turn of a shaft. The first one puts the position right; from then on
-    /// one that comes elsewhere means that the count was wrong, and puts it right again.
-    fn reference(&mut self, captured: u16) -> u8 {
-        let Some(tracker) = &mut self.tracker else { return 0 };
-        let since = i64::from(tracker.distance(captured.into()));
+    /// The index is the zero of a rod, and of every turn of a shaft.
+    fn take_index(&mut self, captured: u16) {
+        let Some(tracker) = &mut self.tracker else { return };
+        let ahead = tracker.distance(captured.into());
         let mut index = *tracker;
-        index.correct(since - i64::from(self.offset));
+        index.correct(i64::from(ahead) - i64::from(self.offset));
         let error = if self.sensor.kind.is_linear() {
             index.total()
         } else {
             nearest(&index, self.sensor.resolution)
         };
-        let is_first = !core::mem::replace(&mut self.referenced, true);
-        let is_wrong = error.unsigned_abs() > INDEX_TOLERANCE;
-        if is_first || is_wrong {
-            tracker.correct(error.wrapping_neg());
-        }
-        if is_wrong && !is_first { SENSOR_INDEX | SENSOR_POSITION_ERROR } else { 0 }
+        tracker.correct(self.reference.index(error, ahead.wrapping_neg()));
     }
+}
+
+/// How the index of a sensor comes.
+fn marks(sensor: &Sensor, scale: &Scale) -> Marks {
+    let is_used = sensor.index && !sensor.kind.is_absolute();
+    let is_linear = sensor.kind.is_linear();
+    Marks {
+        is_used,
+        turn: (!is_linear).then_some(sensor.resolution),
+        suffice: is_used && (is_linear || u64::from(scale.units()) % scale.range() == 0),
+    }
+}
+
+/// Whether the code of an absolute sensor comes round before the position does: it has not a whole number of ranges.
+fn comes_round(sensor: &Sensor, scale: &Scale) -> bool {
+    let units = (1 << sensor.bits().min(32)) * u64::from(scale.units());
+    // A turn and a range have at most 2^32 steps each.
+    let range = NonZeroU64::from(scale.turn()).saturating_mul(scale.range());
+    sensor.kind.is_absolute() && units % range != 0
 }
 
 /// Steps to the nearest zero of a revolution.

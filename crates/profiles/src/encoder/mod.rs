@@ -45,11 +45,13 @@ mod input;
 mod kept;
 mod parameters;
 mod position;
+mod reference;
 mod scale;
 mod sensor;
 mod shaft;
 mod speed;
 mod ssi;
+mod stray;
 mod supervision;
 
 pub mod objects;
@@ -63,10 +65,11 @@ pub use input::{
     SENSOR_ALARM, SENSOR_HELD, SENSOR_IMPLAUSIBLE, SENSOR_INDEX, SENSOR_NO_SIGNAL, SENSOR_PARITY,
     SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED,
 };
-pub use kept::{Kept, KeptChannel, OperatingTime, Start};
+pub use kept::{Kept, KeptChannel, Lasting, OperatingTime, Start};
 pub use objects::{FAULTS, Objects, ROWS, fields, handles};
 pub use parameters::{
-    CODE_SEQUENCE, COMMISSIONING, ChannelParameters, Command, DIRECTION, Parameters, SCALING,
+    AUTOMATIC, CODE_SEQUENCE, COMMISSIONING, ChannelParameters, Command, DIRECTION, HIGHEST_RATE,
+    HIGHEST_SPEED, Parameters, SCALING,
 };
 pub use position::Position;
 pub use scale::{Native, Scale, Settings};

@@ -15,6 +15,13 @@ pub const SCALING: u16 = 1 << 2;
 /// Operating parameter (6000h): the measuring direction is reverse. Linear encoders only.
 pub const DIRECTION: u16 = 1 << 3;
 
+/// The fastest movement (2104h) is that of [`HIGHEST_SPEED`] for a shaft, and of [`HIGHEST_RATE`] for a rod.
+pub const AUTOMATIC: u32 = u32::MAX;
+/// Revolutions a minute that no encoder is built for.
+pub const HIGHEST_SPEED: u32 = 12_000;
+/// The way of a rod in nm in a millisecond, or in um a second, that no encoder is built for: 20 m/s.
+pub const HIGHEST_RATE: u32 = 20_000_000;
+
 /// A command: it is carried out once, when `count` has changed to anything but 0, which means that there was none yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Command {
@@ -33,8 +40,10 @@ pub struct ChannelParameters {
     pub resolution: NonZeroU32,
     /// See [`Sensor::counted`].
     pub counted: NonZeroU16,
-    /// See [`Sensor::fastest`].
+    /// See [`Sensor::fastest`]; [`AUTOMATIC`] for what follows from the resolution.
     pub fastest: u32,
+    /// The offset that was stored (650Ch), for the start alone: it belongs to the scale that was stored with it.
+    pub offset: i32,
     /// Preset (6003h, 6010h).
     pub preset: Command,
     /// Cams (6301h to 6337h).
@@ -80,7 +89,8 @@ impl Default for ChannelParameters {
             kind: None,
             resolution: const { NonZeroU32::new(4096).unwrap() },
             counted: const { NonZeroU16::new(4096).unwrap() },
-            fastest: 10_000,
+            fastest: AUTOMATIC,
+            offset: 0,
             preset: Command::default(),
             cams: Cams::default(),
             area: Area { low: 0, high: i32::MAX },
@@ -126,7 +136,8 @@ impl Parameters {
     pub fn sensor(&self, channel: &ChannelParameters) -> Option<Sensor> {
         let ChannelParameters { resolution, counted, fastest, .. } = *channel;
         let (format, index) = (self.format, self.index);
-        channel.kind.map(|kind| Sensor { kind, resolution, counted, format, index, fastest })
+        let sensor = |kind| Sensor { kind, resolution, counted, format, index, fastest };
+        channel.kind.map(|kind| with_limit(sensor(kind)))
     }
 
     /// All sensors.
@@ -139,18 +150,6 @@ impl Parameters {
     pub fn inputs(&self) -> PositionInputs {
         let is_absolute = self.sensors().any(|sensor| sensor.kind.is_absolute());
         PositionInputs { are_used: true, ssi_bits: is_absolute.then(|| self.format.length()) }
-    }
-
-    /// Whether every sensor can give so many units per revolution (6001h).
-    #[must_use]
-    pub fn allow_per_revolution(&self, units: u32) -> bool {
-        self.natives().all(|native| native.gives_per_revolution(units))
-    }
-
-    /// Whether every sensor can give this range (6002h).
-    #[must_use]
-    pub fn allow_range(&self, range: u32) -> bool {
-        self.natives().all(|native| native.gives_range(range))
     }
 
     /// Whether every sensor can give this measuring step (6005h:1).
@@ -227,6 +226,21 @@ impl Parameters {
     fn is_reversed(&self, sensor: &Sensor) -> bool {
         self.operating & direction_bit(sensor) != 0
     }
+}
+
+/// Where the fastest movement follows from the resolution: with that.
+fn with_limit(sensor: Sensor) -> Sensor {
+    if sensor.fastest != AUTOMATIC {
+        return sensor;
+    }
+    let resolution = sensor.resolution();
+    // Half a turn in a millisecond could be a turn either way, and a speed is well below that.
+    let limit = if sensor.kind.is_linear() {
+        HIGHEST_RATE / resolution.max(1)
+    } else {
+        resolution / (60_000 / HIGHEST_SPEED)
+    };
+    Sensor { fastest: limit.max(1), ..sensor }
 }
 
 fn direction_bit(sensor: &Sensor) -> u16 {

@@ -9,6 +9,8 @@ use super::{Scale, Shaft};
 pub struct Position {
     scale: Scale,
     offset: i32,
+    /// The scale of the last preset, and its offset.
+    home: (Scale, i32),
     /// Units in a turn, modulo the range.
     per_turn: u32,
     turns: i64,
@@ -19,7 +21,14 @@ impl Position {
     /// A position with an offset of which [`Scale::offset_for`] once said that it belongs to this scale.
     #[must_use]
     pub fn new(scale: Scale, offset: i32) -> Position {
-        Position { scale, offset, per_turn: scale.start(1, 0), turns: 0, start: scale.start(0, offset) }
+        Position {
+            scale,
+            offset,
+            home: (scale, offset),
+            per_turn: scale.start(1, 0),
+            turns: 0,
+            start: scale.start(0, offset),
+        }
     }
 
     /// The scale.
@@ -55,16 +64,21 @@ impl Position {
         }
     }
 
-    /// Takes another scale. In other units the offset has lost its meaning and is 0 again; the same units counted the
-    /// other way leave the value as it is. CiA 406 is silent about both.
+    /// Takes another scale. The same units counted the other way leave the value as it is. In other units the offset has
+    /// lost its meaning and is 0, until the units are again those of the last preset. CiA 406 is silent about all of it.
     #[inline(never)]
     pub fn rescale(&mut self, scale: Scale, shaft: Shaft) {
         if scale == self.scale {
             return;
         }
-        let kept = scale.is_like(&self.scale).then(|| self.scale.value(shaft, self.offset));
-        let offset = kept.and_then(|value| scale.offset_for(value, shaft)).unwrap_or(0);
-        *self = Position::new(scale, offset);
+        let (home, offset) = self.home;
+        if scale.is_like(&self.scale) {
+            let value = self.scale.value(shaft, self.offset);
+            *self = Position::new(scale, scale.offset_for(value, shaft).unwrap_or(0));
+        } else {
+            *self = Position::new(scale, if scale == home { offset } else { 0 });
+            self.home = (home, offset);
+        }
     }
 }
 

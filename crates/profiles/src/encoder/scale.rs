@@ -41,15 +41,6 @@ impl Native {
         }
     }
 
-    /// Whether it can give so many units per revolution (6001h): not finer than the sensor. Means nothing to a rod.
-    #[must_use]
-    pub fn gives_per_revolution(&self, units: u32) -> bool {
-        match *self {
-            Native::Rotary { per_revolution, .. } => (1..=per_revolution.get()).contains(&units),
-            Native::Linear { .. } => units > 0,
-        }
-    }
-
     /// Whether it can give this measuring step (6005h:1) in nm: not finer than the sensor. Means nothing to a shaft.
     #[must_use]
     pub fn gives_step(&self, nanometres: u32) -> bool {
@@ -57,12 +48,6 @@ impl Native {
             Native::Rotary { .. } => nanometres > 0,
             Native::Linear { step, .. } => nanometres >= step.get(),
         }
-    }
-
-    /// Whether it can give this range (6002h): no longer than what the sensor can tell apart.
-    #[must_use]
-    pub fn gives_range(&self, range: u32) -> bool {
-        range > 0 && u64::from(range) <= self.steps().get()
     }
 }
 
@@ -101,9 +86,7 @@ impl Scale {
         if !settings.scaling {
             return Some(Scale::unscaled(native, settings.reversed));
         }
-        let gives = native.gives_per_revolution(settings.per_revolution)
-            && native.gives_step(settings.step)
-            && native.gives_range(settings.range);
+        let gives = settings.per_revolution > 0 && native.gives_step(settings.step);
         let range = NonZeroU64::new(settings.range.into()).filter(|_| gives)?;
         let (units, turn) = match *native {
             Native::Rotary { per_revolution, .. } => (settings.per_revolution, per_revolution),

@@ -75,6 +75,12 @@ impl SensorType {
         )
     }
 
+    /// Counts turns or steps that its readings do not tell: nothing but a memory knows its position after a loss of power.
+    #[must_use]
+    pub fn is_counted(self) -> bool {
+        self.is_kept() && self != SensorType::MultiTurn
+    }
+
     /// Goes on after a loss of power where it was. A multi-turn encoder does too: the range (6002h) need not be a part
     /// of what it can tell apart, so how often that has wrapped matters.
     #[must_use]

@@ -21,9 +21,15 @@ pub const WARNING_OPERATING_TIME: u16 = 1 << 3;
 pub const WARNING_BATTERY: u16 = 1 << 4;
 /// Warning bit 5: reference point not reached.
 pub const WARNING_REFERENCE: u16 = 1 << 5;
-/// Supported warnings (6506h): all but the light reserve, bit 1, which neither kind of input tells.
+/// Supported warnings (6506h): all but the light reserve, bit 1, which neither kind of input tells, and the battery,
+/// bit 4, which is supported on a board that measures it.
 pub const SUPPORTED_WARNINGS: u16 =
-    WARNING_FREQUENCY | WARNING_WATCHDOG | WARNING_OPERATING_TIME | WARNING_BATTERY | WARNING_REFERENCE;
+    WARNING_FREQUENCY | WARNING_WATCHDOG | WARNING_OPERATING_TIME | WARNING_REFERENCE;
+
+/// Supported warnings (6506h) on this board.
+pub(super) fn supported_warnings(board: &Board) -> u16 {
+    SUPPORTED_WARNINGS | flag(board.battery.is_some(), WARNING_BATTERY)
+}
 
 /// Milliseconds for which a supply must be out of its limits, or back, before that is believed.
 const DEBOUNCE: u8 = 10;
@@ -69,6 +75,8 @@ pub struct Conditions {
     pub memory: bool,
     /// A sensor does not answer.
     pub sensor_break: bool,
+    /// A sensor answers, and its position is not right.
+    pub position: bool,
 }
 
 /// A condition that must last before it counts.
@@ -91,6 +99,22 @@ impl Lasting {
     }
 }
 
+/// Milliseconds for which a position error is told, at least: whoever takes a sample now and then must not miss it.
+const SHOWN: u8 = 100;
+
+/// A condition that is told for a while.
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    left: u8,
+}
+
+impl Held {
+    fn update(&mut self, now: bool) -> bool {
+        self.left = if now { SHOWN } else { self.left.saturating_sub(1) };
+        self.left > 0
+    }
+}
+
 /// Everything that lasts longer than a sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Supervision {
@@ -98,6 +122,7 @@ pub(super) struct Supervision {
     current: Lasting,
     voltage: Lasting,
     battery: Lasting,
+    position: Held,
     is_damaged: bool,
     /// The operating time has reached its limit since power-on, and has not been below it after that.
     is_old: bool,
@@ -105,10 +130,9 @@ pub(super) struct Supervision {
 }
 
 impl Supervision {
-    /// What was to be kept is damaged.
-    pub(super) fn set_damaged(&mut self, positions_are_lost: bool) {
-        self.is_damaged = true;
-        self.alarms |= if positions_are_lost { ALARM_POSITION } else { 0 };
+    /// What was to be kept may be damaged.
+    pub(super) fn new(is_damaged: bool) -> Supervision {
+        Supervision { is_damaged, ..Supervision::default() }
     }
 
     /// Clears alarms, until the next sample finds them again.
@@ -151,11 +175,13 @@ impl Supervision {
         let current = board.current.is_some_and(|current| current > limits.highest_current);
         let voltage = board.supply.is_some_and(|supply| !supplies.contains(&supply));
         let broken = SENSOR_NO_SIGNAL | SENSOR_POSITION_ERROR;
+        let is_wrong = |channel: &ChannelValues| channel.sensor_state & broken == SENSOR_POSITION_ERROR;
         Conditions {
             current: self.current.update(current),
             voltage: self.voltage.update(voltage),
             memory: self.is_damaged || board.memory_error,
             sensor_break: channels.iter().any(|channel| channel.sensor_state & broken == broken),
+            position: self.position.update(channels.iter().any(is_wrong)),
         }
     }
 

@@ -50,7 +50,7 @@ impl Chain for Lift {
 
     fn new(power_on: &PowerOn) -> Lift {
         Lift {
-            position: position::PositionUnits::new(Start::from(power_on.retained)),
+            position: position::PositionUnits::new(Start::of(power_on.retained, power_on.stored)),
             load: load::LoadUnit::new(power_on.thermometer, &load::Parameters::default()),
             buttons: panel::Buttons::default(),
         }

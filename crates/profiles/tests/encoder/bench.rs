@@ -18,7 +18,16 @@ pub(crate) struct Bench {
     pub(crate) raw: RawEncoder,
 }
 
+/// The bench moves in leaps that no encoder is built for, and says so in 2104h.
 pub(crate) fn one(kind: SensorType) -> Parameters {
+    let mut parameters = Parameters::default();
+    parameters.channels.iter_mut().for_each(|channel| channel.fastest = 10_000);
+    parameters.channels[0].kind = Some(kind);
+    parameters
+}
+
+/// With the parameters as delivered.
+pub(crate) fn delivered(kind: SensorType) -> Parameters {
     let mut parameters = Parameters::default();
     parameters.channels[0].kind = Some(kind);
     parameters

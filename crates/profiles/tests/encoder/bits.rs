@@ -17,7 +17,7 @@ fn those_of_cia_406() {
     let warnings =
         [WARNING_FREQUENCY, WARNING_WATCHDOG, WARNING_OPERATING_TIME, WARNING_BATTERY, WARNING_REFERENCE];
     assert_eq!(warnings, [0x01, 0x04, 0x08, 0x10, 0x20], "6505h");
-    assert_eq!(SUPPORTED_WARNINGS, 0b11_1101, "6506h");
+    assert_eq!(SUPPORTED_WARNINGS, 0b10_1101, "6506h: no light and no battery is measured");
 }
 
 /// 210Bh.

@@ -101,7 +101,7 @@ fn the_first_index_is_the_zero_of_the_turn() {
 }
 
 #[test]
-fn lost_steps_are_noticed_at_the_index_and_put_right() {
+fn lost_steps_are_noticed_at_the_index_and_put_right_at_the_next() {
     for lost in [3, -3, 1000, -1000] {
         let mut bench = Bench::new(one(SensorType::IncrementalCounted));
         bench.stay();
@@ -111,10 +111,14 @@ fn lost_steps_are_noticed_at_the_index_and_put_right() {
         bench.lost += lost;
         bench.stay();
         bench.go(8000);
-        let snapshot = bench.go(9000);
-        assert_eq!(snapshot.channels[0].sensor_state, SENSOR_INDEX | SENSOR_POSITION_ERROR, "{lost}");
-        assert_eq!((snapshot.channels[0].position, snapshot.alarms), (9000, 1));
-        let snapshot = bench.stay();
+        for _ in 0..100 {
+            let snapshot = bench.go(9000);
+            assert_eq!(snapshot.channels[0].sensor_state, SENSOR_INDEX | SENSOR_POSITION_ERROR, "{lost}");
+            assert_eq!((i64::from(snapshot.channels[0].position), snapshot.alarms), (9000 - lost, 1));
+            assert!(snapshot.conditions.position);
+        }
+        let snapshot = bench.go(13_000);
+        assert_eq!(snapshot.channels[0].position, 13_000, "a second index says the same");
         assert_eq!((snapshot.channels[0].sensor_state, snapshot.alarms), (0, 1), "nobody acknowledged");
     }
 }
@@ -142,4 +146,24 @@ fn the_zero_of_a_rod_is_at_its_reference_mark() {
     assert_eq!(bench.stay().channels[0].position, 30);
     bench.total = 250;
     assert_eq!(bench.first().position, 130);
+}
+
+/// Seen once, and then no more: by whatever way a turn and a quarter is made.
+#[test]
+fn an_index_that_is_lost_is_noticed_every_time() {
+    let mut bench = Bench::new(one(SensorType::IncrementalCounted));
+    bench.stay();
+    for round in 0..3 {
+        bench.go(4000);
+        assert_eq!(bench.go(5000).channels[0].sensor_state, 0, "round {round}");
+        let without_index = |bench: &mut Bench, by: i64| {
+            bench.total += by;
+            bench.stay()
+        };
+        (0..5).for_each(|_| assert_eq!(without_index(&mut bench, 800).channels[0].sensor_state, 0));
+        let snapshot = (0..10).map(|_| without_index(&mut bench, 800)).last().unwrap();
+        assert_eq!(snapshot.channels[0].sensor_state, SENSOR_INDEX | SENSOR_POSITION_ERROR);
+        assert!(snapshot.alarms == 1 && snapshot.conditions.position);
+        (0..15).for_each(|_| _ = without_index(&mut bench, -800));
+    }
 }

@@ -23,16 +23,18 @@ fn the_encoder_type_is_that_of_the_sensor_or_of_two() {
 #[test]
 fn every_sensor_must_be_able_to_give_what_is_asked_for() {
     // 4096 steps a revolution and 4096 revolutions; 8192 steps, once; steps of 4096 nm.
-    let (fine, coarse, rod) = (one(SHAFT), two(SHAFT, SensorType::SingleTurn), two(SHAFT, ROD));
-    assert!(fine.allow_per_revolution(4096) && !fine.allow_per_revolution(4097));
-    assert!(coarse.allow_per_revolution(4096) && !coarse.allow_per_revolution(4097));
-    assert!(fine.allow_range(4096 * 4096) && !fine.allow_range(4096 * 4096 + 1));
-    assert!(coarse.allow_range(8192) && !coarse.allow_range(8193));
+    let (fine, coarse) = (one(SHAFT), two(SHAFT, SensorType::SingleTurn));
+    let rod = Parameters { step: 10_000, ..two(SHAFT, ROD) };
     assert!(fine.allow_step(1) && rod.allow_step(4096) && !rod.allow_step(4095));
     for parameters in [fine, coarse, rod] {
+        assert!(!parameters.allow_step(0));
+        let scaled =
+            |per_revolution, range| Parameters { operating: SCALING, per_revolution, range, ..parameters };
         assert!(
-            !parameters.allow_per_revolution(0) && !parameters.allow_range(0) && !parameters.allow_step(0)
+            scaled(u32::MAX, u32::MAX).is_consistent(),
+            "the whole of UNSIGNED32 (CiA 406, 7.2.2 and 7.2.3)"
         );
+        assert!(!scaled(0, 1).is_consistent() && !scaled(1, 0).is_consistent());
     }
 }
 

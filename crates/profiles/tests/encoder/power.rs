@@ -1,7 +1,9 @@
 //! What outlives a loss of power.
 
+use profiles::board::Retained;
 use profiles::encoder::{
-    ALARM_POSITION, CODE_SEQUENCE, Encoder, Kept, SENSOR_UNREFERENCED, SensorType, Start,
+    ALARM_POSITION, CODE_SEQUENCE, Encoder, Kept, Lasting, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED,
+    SensorType, Start,
 };
 use profiles::profile::Chain;
 
@@ -11,6 +13,18 @@ use crate::bench::{Bench, one, two};
 fn after_power_loss(bench: &Bench, total: i64) -> Bench {
     let kept = Kept::from_words(&bench.encoder.kept().to_words());
     Bench::started(bench.parameters, Start::Kept(kept), total)
+}
+
+/// The same without a battery: the parameter store has what a start must know.
+fn after_loss_of_memory(bench: &Bench, total: i64) -> Bench {
+    let stored = Lasting::of(&bench.encoder.kept().to_words()).to_words();
+    Bench::started(bench.parameters, Start::of(Retained::Nothing, Some(stored)), total)
+}
+
+/// What a preset stores.
+fn store_offsets(bench: &mut Bench) {
+    let offsets = bench.stay().channels.map(|channel| channel.offset);
+    bench.parameters.channels.iter_mut().zip(offsets).for_each(|(own, offset)| own.offset = offset);
 }
 
 #[test]
@@ -54,23 +68,104 @@ fn an_incremental_sensor_notices_at_the_index_that_it_was_turned_in_the_dark() {
     let mut back = after_power_loss(&bench, 5300);
     assert_eq!(back.first().position, 5000);
     let snapshot = back.go(8200);
-    assert_eq!((snapshot.channels[0].position, snapshot.alarms), (8200, ALARM_POSITION));
+    assert_eq!(
+        (snapshot.channels[0].position, snapshot.alarms),
+        (7900, ALARM_POSITION),
+        "it is not believed"
+    );
+    let snapshot = back.go(12_300);
+    assert_eq!(
+        (snapshot.channels[0].position, snapshot.channels[0].sensor_state),
+        (12_300, 0),
+        "but two are"
+    );
 }
 
 #[test]
-fn the_offset_is_kept_with_its_units() {
+fn the_offset_is_stored_with_the_parameters() {
     let mut bench = Bench::new(two(SensorType::IncrementalCounted, SensorType::MultiTurn));
     bench.stay();
     bench.go(1000);
     bench.preset(0, 10);
     bench.preset(1, 20);
     bench.stay();
+    store_offsets(&mut bench);
     let positions = |bench: &mut Bench| bench.stay().channels.map(|channel| channel.position);
     assert_eq!(positions(&mut after_power_loss(&bench, 1000)), [10, 20]);
-    // Parameters that were changed and not saved are the old ones again: the offset does not belong to them.
-    bench.parameters.operating = CODE_SEQUENCE;
-    let all = 1 << 25;
-    assert_eq!(positions(&mut after_power_loss(&bench, 1000)), [(1 << 24) - 1001, all - 1001]);
+    // Parameters that were changed and not saved are the old ones again, and so is the offset that belongs to them.
+    let saved = bench.parameters;
+    bench.change(|parameters| parameters.operating = CODE_SEQUENCE);
+    bench.stay();
+    bench.preset(0, 5);
+    bench.stay();
+    bench.parameters = saved;
+    assert_eq!(positions(&mut after_power_loss(&bench, 1000)), [10, 20]);
+}
+
+/// An absolute position is where it was; one that only a memory knows is never shown as known before it is referenced.
+#[test]
+fn without_a_battery_a_position_is_right_or_says_that_it_is_lost() {
+    let lost = SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR;
+    for (kind, state) in [
+        (SensorType::MultiTurn, 0),
+        (SensorType::SingleTurn, 0),
+        (SensorType::LinearAbsolute, 0),
+        (SensorType::SingleTurnCounted, lost),
+        (SensorType::LinearCyclic, lost),
+        (SensorType::IncrementalCounted, lost),
+        (SensorType::LinearIncrementalCounted, lost),
+    ] {
+        let mut bench = Bench::new(one(kind));
+        (0..=20).for_each(|turns| _ = bench.go(turns * 4300));
+        bench.preset(0, 500);
+        store_offsets(&mut bench);
+        let mut back = after_loss_of_memory(&bench, 86_100);
+        let snapshot = back.stay();
+        let values = snapshot.channels[0];
+        assert_eq!(values.sensor_state, state, "{kind:?}");
+        assert!(values.position == 600 || state != 0, "{kind:?} at {}", values.position);
+        assert_eq!((snapshot.alarms, snapshot.conditions.position), (u16::from(state != 0), state != 0));
+        if state == 0 {
+            continue;
+        }
+        // A reset does not make it known.
+        assert_eq!(after_power_loss(&back, 86_100).first().sensor_state & SENSOR_POSITION_ERROR, 1 << 7);
+        back.preset(0, 600);
+        let values = back.first();
+        assert_eq!((values.position, values.sensor_state & SENSOR_POSITION_ERROR), (600, 0), "{kind:?}");
+        let again = after_power_loss(&back, 86_100).first();
+        assert_eq!(again.sensor_state & SENSOR_POSITION_ERROR, 0, "and stays known with a battery");
+    }
+}
+
+/// 360 units a turn and 1000 in all: 4096 turns are no whole number of ranges, so it matters how often the code came round.
+#[test]
+fn a_scaled_position_is_known_without_a_battery_until_the_code_has_come_round() {
+    let mut parameters = one(SensorType::MultiTurn);
+    parameters.operating = profiles::encoder::SCALING;
+    (parameters.per_revolution, parameters.range) = (360, 1000);
+    for (total, is_known) in [(8192 * 2000_i64, true), (8192 * 4095, false), (100, false)] {
+        let mut bench = Bench::started(parameters, Start::First, total);
+        bench.stay();
+        bench.preset(0, 500);
+        store_offsets(&mut bench);
+        let values = after_loss_of_memory(&bench, total).first();
+        assert_eq!(values.sensor_state & SENSOR_POSITION_ERROR == 0, is_known, "at {total}");
+        assert!(!is_known || values.position == 500);
+    }
+}
+
+/// With an index in every turn and a range of a turn, the index alone says where the sensor is.
+#[test]
+fn an_index_is_reference_enough_where_every_turn_is_alike() {
+    let mut parameters = one(SensorType::IncrementalCounted);
+    parameters.channels[0].counted = 1.try_into().unwrap();
+    let mut bench = Bench::new(parameters);
+    bench.stay();
+    let mut back = after_loss_of_memory(&bench, 3000);
+    assert_eq!(back.first().sensor_state, SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR);
+    let values = back.go(4196).channels[0];
+    assert_eq!((values.position, values.sensor_state), (100, 0));
 }
 
 #[test]
@@ -97,7 +192,8 @@ fn what_was_kept_is_still_there_before_the_first_sample() {
 #[test]
 fn damage_is_a_memory_error_and_an_alarm_where_a_position_is_lost() {
     for (kind, alarms) in [(SensorType::IncrementalCounted, ALARM_POSITION), (SensorType::SingleTurn, 0)] {
-        let mut bench = Bench::started(one(kind), Start::Damaged, 0);
+        let lasting = Lasting::from_words([0, 0]);
+        let mut bench = Bench::started(one(kind), Start::Damaged(lasting), 0);
         let snapshot = bench.stay();
         assert_eq!((snapshot.alarms, snapshot.conditions.memory), (alarms, true));
     }

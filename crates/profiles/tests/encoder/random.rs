@@ -5,8 +5,8 @@ use profiles::profile::Chain;
 use std::num::{NonZeroU16, NonZeroU32};
 
 use profiles::encoder::{
-    Area, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Kept, Limits, Module, Parameters,
-    Parity, SensorType, Start,
+    Area, Cam, Cams, ChannelParameters, Coding, Command, Encoder, Format, Kept, Lasting, Limits, Module,
+    Parameters, Parity, SensorType, Start,
 };
 use proptest::prelude::*;
 
@@ -24,6 +24,7 @@ fn any_channel() -> impl Strategy<Value = ChannelParameters> {
                 preset: Command { value, count },
                 cams: Cams { cams, enable, polarity },
                 area: Area { low, high },
+                offset: low,
             }
         },
     )
@@ -80,6 +81,7 @@ fn any_raw() -> impl Strategy<Value = RawEncoder> {
     (any::<(u16, Option<u16>)>(), prop::option::of(frame), any::<[Option<u16>; 3]>(), any::<(bool, bool)>())
         .prop_map(|((counter, index), ssi, [supply, current, battery], (watchdog_reset, memory_error))| {
             RawEncoder {
+                has_gap: watchdog_reset,
                 counter,
                 index,
                 ssi,
@@ -90,7 +92,9 @@ fn any_raw() -> impl Strategy<Value = RawEncoder> {
 
 fn any_start() -> impl Strategy<Value = Start> {
     let kept = any::<[u32; Kept::WORDS]>().prop_map(|words| Start::Kept(Kept::from_words(&words)));
-    prop_oneof![Just(Start::First), Just(Start::Damaged), kept]
+    let lost = any::<[u32; 2]>().prop_map(|words| Start::Lost(Lasting::from_words(words)));
+    let damaged = any::<[u32; 2]>().prop_map(|words| Start::Damaged(Lasting::from_words(words)));
+    prop_oneof![Just(Start::First), lost, damaged, kept]
 }
 
 proptest! {

@@ -3,11 +3,11 @@
 use profiles::board::{Board, SsiFrame};
 use profiles::encoder::{
     ALARM_POSITION, Coding, Conditions, Format, Parity, SENSOR_IMPLAUSIBLE, SENSOR_NO_SIGNAL, SENSOR_PARITY,
-    SENSOR_POSITION_ERROR, SUPPORTED_WARNINGS, SensorType, Snapshot, WARNING_BATTERY, WARNING_FREQUENCY,
-    WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
+    SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SUPPORTED_WARNINGS, SensorType, Snapshot, WARNING_BATTERY,
+    WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
 };
 
-use crate::bench::{Bench, frame, one, two};
+use crate::bench::{Bench, delivered, frame, one, two};
 
 #[test]
 fn two_bad_frames_are_tolerated_and_the_third_is_a_position_error() {
@@ -28,6 +28,7 @@ fn two_bad_frames_are_tolerated_and_the_third_is_a_position_error() {
         assert_eq!(snapshot.channels[0].sensor_state, state | SENSOR_POSITION_ERROR);
         assert_eq!(snapshot.alarms, ALARM_POSITION);
         assert_eq!(snapshot.conditions.sensor_break, state == SENSOR_NO_SIGNAL);
+        assert_eq!(snapshot.conditions.position, state == SENSOR_IMPLAUSIBLE);
         assert_eq!(bench.go(1300).channels[0].position, 1300, "back");
     }
 }
@@ -61,14 +62,82 @@ fn the_encoder_s_own_alarm_is_one() {
     assert_eq!(bench.receive(frame(3 << 1 | 1)).alarms, ALARM_POSITION);
 }
 
-/// After an outage the sensor may be further away: as far as it can have moved.
+/// After an outage the sensor may be further away: as far as it can have moved, and no step further.
 #[test]
 fn a_sensor_comes_back_from_where_it_can_have_moved() {
-    let mut bench = Bench::new(one(SensorType::MultiTurn));
+    for (moved, is_believed) in [(510_000, true), (510_001, false)] {
+        let mut bench = Bench::new(one(SensorType::MultiTurn));
+        bench.stay();
+        (0..50).for_each(|_| _ = bench.receive(None));
+        let position = if is_believed { 510_000 } else { 0 };
+        for _ in 0..1000 {
+            assert_eq!(bench.go(moved).channels[0].position, position, "51 ms at 10 000 steps");
+        }
+    }
+}
+
+/// However long the readings stay where the shaft cannot be, they are not taken over; a preset is a new reference.
+#[test]
+fn a_jump_is_not_taken_over_until_it_is_back_or_the_position_is_preset() {
+    for step in [0, 3, -700] {
+        let mut bench = Bench::new(delivered(SensorType::MultiTurn));
+        let mut total = 100_000;
+        (0..50).for_each(|_| {
+            total += step;
+            bench.go(total);
+        });
+        let held = bench.first().position;
+        for n in 1..=5000 {
+            total += step;
+            let snapshot = bench.go(total + 4096);
+            assert_eq!(snapshot.channels[0].position, held, "{n} ms at {step}");
+            let error = if n > 2 { SENSOR_POSITION_ERROR } else { 0 };
+            assert_eq!(snapshot.channels[0].sensor_state, SENSOR_IMPLAUSIBLE | error);
+            assert_eq!((snapshot.alarms, snapshot.conditions.position), (u16::from(n > 2), n > 2));
+        }
+        total += step;
+        let back = bench.go(total).channels[0];
+        let there = (total.rem_euclid(1 << 25), 0);
+        assert_eq!((i64::from(back.position), back.sensor_state), there, "it jumps back");
+        bench.go(total + 4096);
+        bench.preset(0, 77);
+        let there = bench.go(total + 4096).channels[0];
+        assert_eq!((there.position, there.sensor_state), (77, 0), "a preset says where it is");
+    }
+}
+
+/// Half a turn in a millisecond, of whatever sensor, with the parameters as delivered.
+#[test]
+fn the_fastest_movement_follows_from_the_resolution() {
+    for (steps, fastest) in [(13, 1638), (10, 204), (17, 26_214), (2, 1)] {
+        let mut parameters = delivered(SensorType::MultiTurn);
+        parameters.format = Format::new(8, steps, Coding::Gray, false, Parity::None).unwrap();
+        let sensor = parameters.sensors().next().unwrap();
+        assert_eq!(sensor.fastest, fastest, "12,000 rpm of {steps} bits");
+        let mut bench = Bench::new(parameters);
+        bench.stay();
+        assert_eq!(bench.go(1 << (steps - 1)).channels[0].sensor_state, SENSOR_IMPLAUSIBLE);
+    }
+    let rod = delivered(SensorType::LinearAbsolute).sensors().next().unwrap();
+    assert_eq!(rod.fastest, 20_000_000 / 4096, "20 m/s");
+}
+
+/// Too fast for the sensor is an error until something confirms the count.
+#[test]
+fn a_count_that_was_too_fast_is_in_doubt_until_the_index_confirms_it() {
+    let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
-    (0..50).for_each(|_| _ = bench.receive(None));
-    assert_eq!(bench.go(510_001).channels[0].position, 0, "51 ms at 10 000 steps");
-    assert_eq!(bench.go(510_001).channels[0].position, 510_001, "52 ms");
+    bench.go(4000);
+    bench.go(5000);
+    bench.change(|parameters| parameters.channels[0].fastest = 1000);
+    let snapshot = bench.go(6001);
+    assert_eq!(snapshot.channels[0].sensor_state, SENSOR_TOO_FAST | SENSOR_POSITION_ERROR);
+    assert!(snapshot.alarms == ALARM_POSITION && snapshot.conditions.position);
+    (0..1000).for_each(|_| assert_eq!(bench.first().sensor_state, SENSOR_POSITION_ERROR));
+    (0..2).for_each(|_| assert_eq!(bench.step(1000).channels[0].sensor_state, SENSOR_POSITION_ERROR));
+    assert_eq!(bench.step(1000).channels[0].sensor_state, 0, "the index is where it should be");
+    (0..98).for_each(|_| assert!(bench.stay().conditions.position, "told for a tenth of a second"));
+    assert!(!bench.stay().conditions.position);
 }
 
 #[test]
@@ -85,12 +154,20 @@ fn conditions_must_last_to_count_and_to_go() {
     for (bad, conditions, warnings) in cases {
         let mut bench = Bench::new(one(SensorType::MultiTurn));
         let seen = |snapshot: Snapshot| (snapshot.conditions, snapshot.warnings);
+        assert_eq!(
+            bench.stay().supported_warnings & WARNING_BATTERY,
+            0,
+            "support is claimed for what is measured"
+        );
         bench.raw.board = bad;
+        let has_battery = bad.battery.is_some();
         (0..9).for_each(|_| assert_eq!(seen(bench.stay()), (Conditions::default(), 0)));
         assert_eq!(seen(bench.stay()), (conditions, warnings));
         bench.raw.board = fine;
         (0..9).for_each(|_| assert_eq!(seen(bench.stay()), (conditions, warnings)));
         assert_eq!(seen(bench.stay()), (Conditions::default(), 0));
+        bench.raw.board = bad;
+        assert_eq!(bench.stay().supported_warnings & WARNING_BATTERY != 0, has_battery);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Faults of the position sensors: CiA 406, 5.3, and a sensor that does not answer.
+//! Faults of the position sensors: CiA 406, 5.3, and a sensor that does not answer, or not with the right position.
 
 use canopen::emcy::Condition;
 
@@ -10,6 +10,12 @@ const ENCODER_BREAK: Fault = Fault {
     name: "EncoderBreak",
     condition: Condition { detail: [1, 0, 0, 0, 0], ..Condition::new(0x5006) },
     flags: Flags::sensor(8),
+};
+/// An encoder answers, and its position is not right: 2 in the detail.
+const ENCODER_POSITION: Fault = Fault {
+    name: "EncoderPosition",
+    condition: Condition { detail: [2, 0, 0, 0, 0], ..Condition::new(0x5006) },
+    flags: Flags::sensor(11),
 };
 /// The encoders take too much current; bit 1 of the error register.
 const INPUT_CURRENT: Fault = Fault {
@@ -29,12 +35,14 @@ const HARDWARE_MEMORY: Fault =
     Fault { name: "HardwareMemory", condition: Condition::new(0x5100), flags: Flags::system(8) };
 
 /// All of them.
-pub const FAULTS: &[Fault] = &[ENCODER_BREAK, INPUT_CURRENT, INPUT_VOLTAGE, HARDWARE_MEMORY];
+pub const FAULTS: &[Fault] =
+    &[ENCODER_BREAK, ENCODER_POSITION, INPUT_CURRENT, INPUT_VOLTAGE, HARDWARE_MEMORY];
 
 impl Conditions {
     /// Calls `each` with every fault, and whether it is there.
     pub(crate) fn faults(self, each: &mut impl FnMut(&'static Fault, bool)) {
         each(&ENCODER_BREAK, self.sensor_break);
+        each(&ENCODER_POSITION, self.position);
         each(&INPUT_CURRENT, self.current);
         each(&INPUT_VOLTAGE, self.voltage);
         each(&HARDWARE_MEMORY, self.memory);

@@ -1,5 +1,6 @@
 //! Manufacturer-specific objects of the encoder, 2100h to 210Ch: which sensors there are, and what CiA 406 leaves open.
 
+use crate::encoder::AUTOMATIC;
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
 const fn parameter(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
@@ -25,7 +26,7 @@ const fn counted(sub: u8, name: &'static str) -> Object {
 }
 
 const fn fastest(sub: u8, name: &'static str) -> Object {
-    parameter(0x2104, sub, name, Type::Unsigned32).value(10_000).unit("steps/ms")
+    parameter(0x2104, sub, name, Type::Unsigned32).value(AUTOMATIC as i64).unit("steps/ms")
 }
 
 const fn module(sub: u8, name: &'static str, default: i64) -> Object {
@@ -61,7 +62,7 @@ pub(crate) const SENSORS: &[Object] = &[
     sensor(0x2103, 4, "Alarm bits", Type::Unsigned8).limits(0, 1),
     // 0 none, 1 even, 2 odd.
     sensor(0x2103, 5, "Parity", Type::Unsigned8).limits(0, 2),
-    // 0: no limit. Beyond it an SSI reading is implausible, and a counted one a warning.
+    // 0: no limit; FFFF FFFFh: from the resolution. Beyond it an SSI reading is not believed, and a count is in doubt.
     Object::highest(0x2104, 2, "Fastest movement"),
     fastest(1, "Fastest movement channel 1"),
     fastest(2, "Fastest movement channel 2"),

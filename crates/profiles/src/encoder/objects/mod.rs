@@ -89,6 +89,11 @@ impl Profile for Objects {
         self.fields.write(entry, bytes, image)
     }
 
+    /// A preset is "calculated and stored in the encoder" (CiA 406, 7.2.4).
+    fn stores(&self, index: u16, sub: u8) -> bool {
+        matches!((index, sub), (0x6003, 0) | (0x6010, 1..))
+    }
+
     fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {
         snapshot.conditions.faults(each);
     }

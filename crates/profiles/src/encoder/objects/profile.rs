@@ -2,7 +2,6 @@
 
 use crate::encoder::{SUPPORTED_ALARMS, SUPPORTED_WARNINGS};
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
-use product::REVISION;
 
 /// CiA 406 v3.0.
 const PROFILE_VERSION: u16 = 0x0300;
@@ -23,6 +22,11 @@ const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object
     fixed(index, sub, name, kind).mappable(Mapping::Tpdo)
 }
 
+/// A preset finds it, and it is stored with the parameters.
+const fn stored_offset(sub: u8, name: &'static str) -> Object {
+    fixed(0x650C, sub, name, Type::Integer32).unit("units").stored(Group::Application)
+}
+
 /// Both channels of something that is measured: the names of the object and of its channels.
 const fn values(index: u16, names: [&'static str; 3], kind: Type) -> [Object; 3] {
     let [name, one, two] = names;
@@ -39,9 +43,9 @@ const fn settings(index: u16, names: [&'static str; 3], kind: Type, default: i64
     ]
 }
 
-/// A parameter that a TPDO can send.
-const fn shown([highest, one, two]: [Object; 3]) -> [Object; 3] {
-    [highest, one.mappable(Mapping::Tpdo), two.mappable(Mapping::Tpdo)]
+/// A parameter that PDOs carry both ways.
+const fn mapped([highest, one, two]: [Object; 3]) -> [Object; 3] {
+    [highest, one.mappable(Mapping::Both), two.mappable(Mapping::Both)]
 }
 
 const PARAMETERS: &[Object] = &[
@@ -76,13 +80,13 @@ const TIMER: &[Object] = &[Object::new(0x6200, 0, "Cyclic timer", Type::Unsigned
 
 const CAM_STATE: [Object; 3] =
     values(0x6300, ["Cam states", "Cam states channel 1", "Cam states channel 2"], Type::Unsigned8);
-const CAM_ENABLE: [Object; 3] = shown(settings(
+const CAM_ENABLE: [Object; 3] = mapped(settings(
     0x6301,
     ["Cam enables", "Cam enables channel 1", "Cam enables channel 2"],
     Type::Unsigned8,
     0,
 ));
-const CAM_POLARITY: [Object; 3] = shown(settings(
+const CAM_POLARITY: [Object; 3] = mapped(settings(
     0x6302,
     ["Cam polarities", "Cam polarities channel 1", "Cam polarities channel 2"],
     Type::Unsigned8,
@@ -146,15 +150,25 @@ const DIAGNOSTICS: &[Object] = &[
     fixed(0x650A, 3, "Manufacturer's highest position", Type::Integer32).value(0x7FFF_FFFF).unit("steps"),
     fixed(0x650B, 0, "Serial number", Type::Unsigned32),
     Object::highest(0x650C, 2, "Offset values by channel"),
-    fixed(0x650C, 1, "Offset value channel 1", Type::Integer32).unit("units"),
-    fixed(0x650C, 2, "Offset value channel 2", Type::Integer32).unit("units"),
+    stored_offset(1, "Offset value channel 1"),
+    stored_offset(2, "Offset value channel 2"),
 ];
 
-/// 6507h: the profile in the low word, the software in the high word. Each is a revision number and an index, of which the
-/// software's are the low bytes of what 1018h:3 has.
+/// 6507h: the profile in the low word, the software in the high word, each with a digit in four bits: version 1.40 is
+/// 0140h, and so is 1.4.0. The software is that of 100Ah.
 const fn versions() -> i64 {
-    let [index, _, revision, _] = REVISION.to_le_bytes();
-    (u16::from_le_bytes([index, revision]) as i64) << 16 | PROFILE_VERSION as i64
+    let major = digit(env!("CARGO_PKG_VERSION_MAJOR"));
+    let minor = digit(env!("CARGO_PKG_VERSION_MINOR"));
+    let patch = digit(env!("CARGO_PKG_VERSION_PATCH"));
+    (major << 8 | minor << 4 | patch) << 16 | PROFILE_VERSION as i64
+}
+
+/// A number of one digit; a larger one does not compile.
+const fn digit(text: &str) -> i64 {
+    match text.as_bytes() {
+        [digit @ b'0'..=b'9'] => (*digit - b'0') as i64,
+        _ => panic!("6507h has one digit for each number of the version"),
+    }
 }
 
 /// All of them, in the order of the table.

@@ -1,7 +1,9 @@
 //! What a write to an object of the encoder means beyond storing a value.
 
 use super::values::Fields;
-use crate::encoder::{COMMISSIONING, ChannelParameters, Parameters, SCALING, SENSOR_HELD};
+use crate::encoder::{
+    COMMISSIONING, ChannelParameters, Parameters, SCALING, SENSOR_NO_SIGNAL, SENSOR_PARITY,
+};
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
 
@@ -10,9 +12,7 @@ use canopen::sdo::Abort;
 pub(super) enum Rule {
     /// 6000h: bits that no sensor has are refused.
     Operating,
-    /// 6001h: not finer than every sensor.
-    PerRevolution,
-    /// 6002h: no longer than what every sensor tells apart.
+    /// 6001h and 6002h: the whole of UNSIGNED32 (CiA 406, 7.2.2 and 7.2.3) but 0, which is no turn and no range.
     Range,
     /// 6003h and 6010h: the position becomes the preset.
     Preset,
@@ -34,8 +34,7 @@ impl Rule {
             (0x2107, 1..) => Rule::Factory,
             (0x2109, 0) => Rule::Acknowledge,
             (0x6000, 0) => Rule::Operating,
-            (0x6001, 0) => Rule::PerRevolution,
-            (0x6002, 0) => Rule::Range,
+            (0x6001 | 0x6002, 0) => Rule::Range,
             (0x6003, 0) | (0x6010, 1..) => Rule::Preset,
             (0x6005, 1) => Rule::Step,
             _ => return None,
@@ -55,8 +54,7 @@ impl Fields {
         let value = u32::from_le_bytes(word);
         match rule {
             Rule::Operating => allow(is_operating(&self.parameters(image), value)),
-            Rule::PerRevolution => allow(self.parameters(image).allow_per_revolution(value)),
-            Rule::Range => allow(self.parameters(image).allow_range(value)),
+            Rule::Range => allow(value > 0),
             Rule::Step => allow(self.parameters(image).allow_step(value)),
             Rule::Preset => self.preset(entry, value, image),
             Rule::Sensor => self.describe_sensor(entry, bytes, image),
@@ -96,10 +94,10 @@ impl Fields {
     }
 }
 
-/// There is no preset to a position that is not known, and none outside of the range.
+/// There is no preset without a reading, and none outside of the range. A reading that is not believed is believed with it.
 fn check_preset(all: &Parameters, own: &ChannelParameters, state: u8, value: u32) -> Result<(), Abort> {
     match all.sensor(own) {
-        Some(sensor) if state & SENSOR_HELD == 0 => {
+        Some(sensor) if state & (SENSOR_NO_SIGNAL | SENSOR_PARITY) == 0 => {
             allow(u64::from(value) < all.scale(&sensor).range().get())
         }
         _ => Err(Abort::DeviceState),

@@ -46,7 +46,7 @@ pub struct Fields {
     resolution: Field,
     revolutions: Field,
     alarms: Field,
-    warnings: Field,
+    warnings: [Field; 2],
     operating_time: Field,
     /// 1018h:4 and 650Bh.
     serial_number: [Field; 2],
@@ -141,6 +141,7 @@ impl Channel {
                 polarity: self.cam_polarity.u8(image),
             },
             area: Area { low, high },
+            offset: i32::from_le_bytes(self.offset.load(image)),
             ..sensor
         }
     }
@@ -171,7 +172,7 @@ impl Fields {
             resolution: d.field(0x6501, 0),
             revolutions: d.field(0x6502, 0),
             alarms: d.field(0x6503, 0),
-            warnings: d.field(0x6505, 0),
+            warnings: [d.field(0x6505, 0), d.field(0x6506, 0)],
             operating_time: d.field(0x6508, 0),
             serial_number: [d.field(0x1018, 4), d.field(0x650B, 0)],
         }
@@ -210,7 +211,9 @@ impl Fields {
         self.resolution.store(image, snapshot.resolution.to_le_bytes());
         self.revolutions.store(image, snapshot.revolutions.to_le_bytes());
         self.alarms.store(image, snapshot.alarms.to_le_bytes());
-        self.warnings.store(image, snapshot.warnings.to_le_bytes());
+        for (shown, warnings) in self.warnings.iter().zip([snapshot.warnings, snapshot.supported_warnings]) {
+            shown.store(image, warnings.to_le_bytes());
+        }
         self.operating_time.store(image, snapshot.operating_time.to_le_bytes());
         for (shown, source) in self.identification.iter().zip(&self.module) {
             shown.store(image, source.load::<4>(image));

@@ -1,0 +1,283 @@
+//! Whether a count can be trusted: what its index says, and what a loss of power has left of it.
+//!
+//! The first index puts the position right. From then on:
+//!
+//! * an index within two steps of its place confirms the count;
+//! * one that comes elsewhere is not believed: the position goes on as it was counted, and is an error. When the next one
+//!   agrees with it to whole turns, the count was wrong, and is put right. When the next one is in its place, the odd one
+//!   was a disturbance;
+//! * a turn and a quarter without an index means that the index is missing.
+//!
+//! Movement faster than the sensor can follow puts the count in doubt, until an index confirms it. Turns that were lost
+//! with the memory that kept them come back with no index, unless the position repeats with every turn. A preset is
+//! a new reference and ends all of it.
+
+use core::num::NonZeroU32;
+
+use super::input::{SENSOR_INDEX, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED};
+
+/// Steps by which the index may come too early or too late: it is one quarter period wide and is seen at one edge
+/// forwards and at the other backwards; the capture may fall on either side of the step that causes it.
+const TOLERANCE: u64 = 2;
+/// Steps between two marks of a rod, at least: less is the same mark again.
+const ROD_APART: u32 = 64;
+
+/// What the last index has said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Index {
+    /// It was in its place, or there was none yet.
+    Right,
+    /// It did not come.
+    Missing,
+    /// It came so many steps from its place.
+    Elsewhere(i64),
+}
+
+/// What a start knows of the position.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Trust {
+    /// The index had been seen.
+    pub(super) referenced: bool,
+    /// Turns were lost.
+    pub(super) lost: bool,
+    /// Steps may have been lost.
+    pub(super) doubted: bool,
+}
+
+/// How the index comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Marks {
+    /// There is an index at all.
+    pub(super) is_used: bool,
+    /// Steps from one to the next; `None` for a rod, which has one.
+    pub(super) turn: Option<NonZeroU32>,
+    /// The position repeats from one to the next, so that the index alone says where the sensor is.
+    pub(super) suffice: bool,
+}
+
+/// The reference of one sensor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reference {
+    marks: Marks,
+    trust: Trust,
+    index: Index,
+    /// Steps since the last index.
+    since: i32,
+    /// Steps without an index that are too many.
+    too_many: u32,
+    /// Bits of the sensor state that follow.
+    state: u8,
+}
+
+impl Reference {
+    pub(super) fn new(marks: Marks, trust: Trust) -> Reference {
+        let mut new = Reference { marks, trust, index: Index::Right, since: 0, too_many: u32::MAX, state: 0 };
+        new.settle();
+        new
+    }
+
+    /// Takes other parameters of the same sensor.
+    pub(super) fn apply(&mut self, marks: Marks) {
+        if marks != self.marks {
+            if !marks.is_used {
+                self.index = Index::Right;
+            }
+            (self.marks, self.since) = (marks, 0);
+            self.settle();
+        }
+    }
+
+    /// Bits of the sensor state.
+    pub(super) fn state(&self) -> u8 {
+        self.state
+    }
+
+    /// What to know of it at the next start.
+    pub(super) fn trust(&self) -> Trust {
+        Trust { doubted: self.trust.doubted || self.index != Index::Right, ..self.trust }
+    }
+
+    /// The sensor has moved.
+    pub(super) fn moved(&mut self, steps: i32) {
+        self.since = self.since.saturating_add(steps);
+        if self.since.unsigned_abs() > self.too_many {
+            self.index = Index::Missing;
+            self.settle();
+        }
+    }
+
+    /// An index may have come that nobody saw.
+    pub(super) fn forgive(&mut self) {
+        self.since = 0;
+    }
+
+    /// Steps may have been lost.
+    pub(super) fn doubt(&mut self) {
+        self.trust.doubted = true;
+        self.settle();
+    }
+
+    /// Turns may have been lost.
+    pub(super) fn lose(&mut self) {
+        self.trust.lost = true;
+        self.settle();
+    }
+
+    /// An index has come so many steps from its place, and the sensor has moved `since` then. The steps by which the count is to be
+    /// put right.
+    #[inline(never)]
+    pub(super) fn index(&mut self, error: i64, since: i32) -> i64 {
+        let apart = self.since.wrapping_sub(since).unsigned_abs();
+        self.since = since;
+        let is_first = !core::mem::replace(&mut self.trust.referenced, true);
+        let is_right = error.unsigned_abs() <= TOLERANCE;
+        let is_believed = is_first || is_right || self.agrees(error, apart);
+        if is_believed {
+            self.index = Index::Right;
+            self.trust.doubted = false;
+            self.trust.lost &= !self.marks.suffice;
+        } else if self.is_another(apart) || !matches!(self.index, Index::Elsewhere(_)) {
+            self.index = Index::Elsewhere(error);
+        }
+        self.settle();
+        if is_first || (is_believed && !is_right) { error.wrapping_neg() } else { 0 }
+    }
+
+    /// The position is known from here on, whatever was wrong. The steps by which the count is to be put right.
+    pub(super) fn preset(&mut self) -> i64 {
+        let correction = if let Index::Elsewhere(error) = self.index { error.wrapping_neg() } else { 0 };
+        if self.index == Index::Missing {
+            self.since = 0;
+        }
+        self.index = Index::Right;
+        (self.trust.lost, self.trust.doubted) = (false, false);
+        self.settle();
+        correction
+    }
+
+    /// Whether the index before was as far from its place, whole turns away.
+    fn agrees(&self, error: i64, apart: u32) -> bool {
+        let Index::Elsewhere(before) = self.index else { return false };
+        let difference = error.abs_diff(before);
+        let is_turn = self.marks.turn.is_some_and(|turn| difference.abs_diff(turn.get().into()) <= TOLERANCE);
+        self.is_another(apart) && (difference <= TOLERANCE || is_turn)
+    }
+
+    /// Whether an index so many steps from the one before is another one, and not the same again.
+    fn is_another(&self, apart: u32) -> bool {
+        apart > self.marks.turn.map_or(ROD_APART, |turn| turn.get() / 2)
+    }
+
+    #[inline(never)]
+    fn settle(&mut self) {
+        let Trust { referenced, lost, doubted } = self.trust;
+        let is_missed = self.marks.is_used && !referenced;
+        let is_wrong = self.index != Index::Right;
+        let bit = |set: bool, bits: u8| if set { bits } else { 0 };
+        self.state = bit(is_missed, SENSOR_UNREFERENCED)
+            | bit(lost, SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR)
+            | bit(doubted, SENSOR_POSITION_ERROR)
+            | bit(is_wrong, SENSOR_INDEX | SENSOR_POSITION_ERROR);
+        // Once it is missing, it is missing until it comes.
+        let is_due = self.marks.is_used && referenced && self.index != Index::Missing;
+        let turn = self.marks.turn.filter(|_| is_due).map_or(u32::MAX, NonZeroU32::get);
+        self.too_many = turn.saturating_add(turn / 4).saturating_add(4);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TURN: i32 = 4096;
+    const BAD: u8 = SENSOR_INDEX | SENSOR_POSITION_ERROR;
+
+    fn marks() -> Marks {
+        Marks { is_used: true, turn: NonZeroU32::new(4096), suffice: false }
+    }
+
+    /// One that has seen its index.
+    fn seen() -> Reference {
+        Reference::new(marks(), Trust { referenced: true, ..Trust::default() })
+    }
+
+    #[test]
+    fn a_turn_and_a_quarter_without_an_index_is_a_missing_one() {
+        for sign in [1, -1] {
+            let mut reference = seen();
+            reference.moved(sign * (TURN + TURN / 4 + 4));
+            assert_eq!(reference.state(), 0);
+            reference.moved(sign);
+            assert_eq!(reference.state(), BAD);
+            reference.moved(sign * i32::MAX);
+            assert_eq!((reference.index(1, 0), reference.state()), (0, 0), "back in its place");
+            reference.moved(sign * 2 * TURN);
+            assert_eq!(reference.state(), BAD, "and missed again");
+            assert_eq!((reference.preset(), reference.state()), (0, 0));
+            reference.moved(sign * 2 * TURN);
+            assert_eq!(reference.state(), BAD, "a preset does not bring it back");
+        }
+    }
+
+    #[test]
+    fn one_index_elsewhere_is_not_believed_and_two_that_agree_are() {
+        let mut reference = seen();
+        reference.moved(TURN);
+        assert_eq!((reference.index(96, 0), reference.state()), (0, BAD));
+        for _ in 0..10 {
+            reference.moved(-3);
+            assert_eq!((reference.index(96, 0), reference.state()), (0, BAD), "the same one again");
+        }
+        reference.moved(TURN);
+        assert_eq!((reference.index(97, 0), reference.state()), (-97, 0));
+    }
+
+    #[test]
+    fn an_index_that_moves_on_is_never_believed() {
+        let mut reference = seen();
+        for n in 1..20 {
+            reference.moved(4000);
+            assert_eq!((reference.index(96 * n, 0), reference.state()), (0, BAD));
+        }
+    }
+
+    #[test]
+    fn a_disturbance_between_two_indexes_ends_at_the_next() {
+        let mut reference = seen();
+        reference.moved(1000);
+        assert_eq!((reference.index(1000, 0), reference.state()), (0, BAD));
+        reference.moved(3096);
+        assert_eq!((reference.index(0, 0), reference.state()), (0, 0));
+    }
+
+    #[test]
+    fn half_a_turn_is_as_far_one_way_as_the_other() {
+        let mut reference = seen();
+        reference.moved(TURN);
+        reference.index(2048, 0);
+        reference.moved(TURN);
+        assert_eq!((reference.index(-2047, 0), reference.state()), (2047, 0));
+    }
+
+    #[test]
+    fn doubt_ends_with_an_index_and_lost_turns_end_with_a_preset() {
+        let mut reference = seen();
+        reference.doubt();
+        assert_eq!(reference.state(), SENSOR_POSITION_ERROR);
+        reference.index(0, 0);
+        assert_eq!(reference.state(), 0);
+        reference.lose();
+        reference.index(0, 0);
+        assert_eq!(reference.state(), SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR);
+        assert!(reference.trust().lost);
+        reference.preset();
+        assert_eq!(reference.state(), 0);
+        let mut reference = Reference::new(Marks { suffice: true, ..marks() }, Trust::default());
+        reference.lose();
+        assert_eq!(
+            (reference.index(500, 0), reference.state()),
+            (-500, 0),
+            "the position repeats every turn"
+        );
+    }
+}
