@@ -127,7 +127,7 @@ fn a_broken_sensor_is_found_within_a_second_and_signalled_everywhere() {
     assert_eq!(emergencies(&mut bench), [(0x5006, 1)]);
     assert_eq!(bench.read(0x6150, 1), Ok(vec![1 | 4]));
     assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 5, 0, 0, 0]));
-    assert_eq!(bench.read(0x1002, 0), Ok(vec![1, 0, 0, 0]));
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![5, 0, 0, 0]));
     assert_eq!(bench.read(0x1001, 0), Ok(vec![1]));
     assert_eq!(bench.read(0x1003, 1), Ok(vec![0x06, 0x50, 0, 0]));
     assert_eq!(bench.protocol.state(), State::PreOperational);

@@ -167,7 +167,11 @@ impl Page {
     }
 
     /// Whether the transaction whose records end there was written to its end.
-    pub(crate) fn is_closed<F: ReadNorFlash>(self, flash: &mut F, records_end: u32) -> Result<bool, F::Error> {
+    pub(crate) fn is_closed<F: ReadNorFlash>(
+        self,
+        flash: &mut F,
+        records_end: u32,
+    ) -> Result<bool, F::Error> {
         Ok(self.word(flash, records_end + self.format.unit)? == MARK)
     }
 
@@ -191,9 +195,8 @@ impl Page {
             return Ok(None);
         }
         let contents = Contents::of(self.word(flash, at + self.format.unit)?);
-        let whole = contents.map(|Contents { words, groups }| {
-            (groups, at + self.format.head() + u32::from(words) * WORD)
-        });
+        let whole = contents
+            .map(|Contents { words, groups }| (groups, at + self.format.head() + u32::from(words) * WORD));
         Ok(whole.filter(|(_, records_end)| self.is_end_of_records(*records_end)))
     }
 

@@ -3,9 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::error::Error;
-use crate::format::{
-    Check, Contents, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, in_words,
-};
+use crate::format::{Check, Contents, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, in_words};
 use crate::group::{Change, Group, GroupSet, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};

@@ -16,7 +16,6 @@ fn replay(saves: &mut dyn Iterator<Item = &Changes>) -> Model {
     saves.fold(EMPTY, |model, changes| after(&model, changes))
 }
 
-
 /// A device with a history of saves.
 struct Device {
     flash: Flash,
@@ -83,7 +82,8 @@ impl Device {
     fn check_read(&self, flash: &mut Flash, honest: bool) -> (Model, [Health; 4]) {
         let (model, health) = read(flash, PAGES);
         for (value, group) in model.iter().zip(Group::ALL) {
-            let was_saved = self.saves.iter().flatten().any(|(saved, state)| *saved == group && state == value);
+            let was_saved =
+                self.saves.iter().flatten().any(|(saved, state)| *saved == group && state == value);
             assert!(value.is_none() || was_saved, "{value:?} was never saved");
         }
         for ((value, newest), health) in model.iter().zip(&self.newest()).zip(health) {
@@ -164,7 +164,11 @@ fn only_the_group_whose_record_is_damaged_is_affected() {
                     assert_eq!(health, only(group, expected), "{group:?}, byte {byte}, bit {bit}");
                     for (other, (value, newest)) in Group::ALL.into_iter().zip(model.iter().zip(&newest)) {
                         let is_newest = other != group || expected == Health::Good;
-                        assert_eq!(value == newest, is_newest, "{group:?}: {other:?}, byte {byte}, bit {bit}");
+                        assert_eq!(
+                            value == newest,
+                            is_newest,
+                            "{group:?}: {other:?}, byte {byte}, bit {bit}"
+                        );
                     }
                 }
             }
