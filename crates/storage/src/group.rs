@@ -39,9 +39,9 @@ pub enum Health {
     /// What was last saved is what is read; a save that a power cut kept from completing counts as not made.
     #[default]
     Good,
-    /// What was saved last of this group is damaged: the state before it is read.
+    /// What was saved last of this group is damaged: the value before it is read.
     FellBack,
-    /// What was saved of this group is damaged, and no older state of it is left: nothing is read, the defaults hold.
+    /// What was saved of this group is damaged, and there is no older value: nothing is read, the defaults hold.
     Lost,
 }
 

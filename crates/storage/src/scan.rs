@@ -39,8 +39,8 @@ impl Entry {
     pub(crate) fn health(&self) -> Health {
         match (self.suspect, self.content) {
             (false, _) => Health::Good,
-            (true, Content::Unnamed) => Health::Lost,
-            (true, _) => Health::FellBack,
+            (true, Content::Value(_)) => Health::FellBack,
+            (true, _) => Health::Lost,
         }
     }
 }

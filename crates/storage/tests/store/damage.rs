@@ -267,7 +267,10 @@ fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
         let mut flash = device.flash.clone();
         flash.disturb(at, |byte| byte ^ 0x81);
         flash.disturb(copying + 8, |byte| byte ^ 0x81);
-        assert_eq!(read(&mut flash, PAGES), (before.clone(), [Health::FellBack; 4]));
+        assert_eq!(
+            read(&mut flash, PAGES),
+            (before.clone(), [Health::FellBack, Health::Lost, Health::Lost, Health::Lost])
+        );
     }
 }
 
