@@ -75,27 +75,33 @@ impl TransmitQueue {
 
     /// Moves frames into the mailboxes until they take no more.
     pub fn pump(&mut self, mailboxes: &mut impl Mailboxes) {
-        self.boot_up = match self.boot_up {
-            BootUp::Waits(frame) if mailboxes.is_idle() && mailboxes.offer(&frame) == Offer::Taken => {
-                BootUp::InMailbox
+        while let Some(frame) = self.next(mailboxes) {
+            let offer = mailboxes.offer(&frame);
+            if offer == Offer::Refused {
+                return;
             }
-            BootUp::InMailbox if mailboxes.is_idle() => BootUp::Sent,
-            other => other,
-        };
-        if !matches!(self.boot_up, BootUp::Sent) {
-            return;
-        }
-        while let Some(Waiting { frame, .. }) = self.waiting.last() {
-            match mailboxes.offer(frame) {
-                Offer::Refused => return,
-                Offer::Taken => drop(self.waiting.pop()),
-                Offer::Replaced(other) => {
-                    self.waiting.pop();
-                    // The frame that left made room for this one.
-                    let _ = self.push_first(other);
-                }
+            if matches!(self.boot_up, BootUp::Waits(_)) {
+                self.boot_up = BootUp::InMailbox;
+            } else {
+                self.waiting.pop();
+            }
+            if let Offer::Replaced(other) = offer {
+                // The frame that left made room for this one.
+                let _ = self.push_first(other);
             }
         }
+    }
+
+    /// The frame that is to go into a mailbox next. The boot-up message has all mailboxes for itself.
+    fn next(&mut self, mailboxes: &impl Mailboxes) -> Option<Frame> {
+        if !matches!(self.boot_up, BootUp::Sent) && !mailboxes.is_idle() {
+            return None;
+        }
+        if let BootUp::Waits(frame) = self.boot_up {
+            return Some(frame);
+        }
+        self.boot_up = BootUp::Sent;
+        self.waiting.last().map(|waiting| waiting.frame)
     }
 
     /// Whether nothing waits.

@@ -16,7 +16,16 @@ pub struct Recovery {
 impl Recovery {
     /// Takes note of a sample before the filter takes it, and says whether the values are still those of a fault. The filter
     /// begins anew with the first sample that counts.
+    #[inline]
     pub fn next(&mut self, is_faulty: bool, filter: &mut Filter) -> bool {
+        let is_well = !is_faulty && self.missing == 0;
+        !is_well && self.hold(is_faulty, filter)
+    }
+
+    // Most samples are good ones, and their time is short.
+    #[cold]
+    #[inline(never)]
+    fn hold(&mut self, is_faulty: bool, filter: &mut Filter) -> bool {
         let length = filter.length();
         if is_faulty {
             self.missing = length + SETTLING - 1;
