@@ -114,12 +114,12 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, store, lasting } =
+        let Loaded { protocol, parameters, setup, boot_data, store, lasting } =
             configuration::load(board.parameters, cx.local.protocol);
         let job = cx.local.job.write(StoreJob::new(setup.personality));
         let storage = StorageTask::new(store, job, LastingRecord::new(lasting));
         let crashed = configuration::report_start(&setup, board.reset_cause);
-        let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working() };
+        let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working(), boot_data };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = Surroundings { watchdog_reset, ..Surroundings::default() };
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);
@@ -241,9 +241,10 @@ mod app {
 
     #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, retained, &watchdog])]
     fn store(mut cx: store::Context) {
-        cx.local.storage.run(&mut (cx.shared.protocol, cx.shared.transmit));
+        let mut node = (cx.shared.protocol, cx.shared.transmit);
+        cx.local.storage.run(&mut node);
         let retained = cx.shared.retained.lock(|retained| *retained);
-        cx.local.storage.keep(&retained);
+        cx.local.storage.keep(&retained, &mut node);
         cx.shared.watchdog.progress(Part::Storage);
     }
 }

@@ -37,9 +37,10 @@ impl StorageTask {
     }
 
     /// Keeps what a start without a battery has to know of the positions.
-    pub(crate) fn keep(&mut self, retained: &Retained) {
+    pub(crate) fn keep(&mut self, retained: &Retained, node: &mut impl Shared) {
         if let (Some(store), Some(words)) = (&mut self.store, retained) {
-            match self.lasting.keep(words, store) {
+            let device = node.call(|protocol, _| protocol.device_record());
+            match self.lasting.keep(words, &device, store) {
                 Ok(true) => defmt::info!("the record of the positions is stored"),
                 Ok(false) => {}
                 Err(_) => defmt::error!("the record of the positions is not stored"),

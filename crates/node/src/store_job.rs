@@ -8,6 +8,7 @@ use heapless::Vec;
 use profiles::{IMAGE_SIZE, Personality};
 use storage::{Change, DeviceRecord, Error, Store};
 
+use crate::lasting;
 use crate::packed::{PackedGroups, record_of};
 use crate::stored::{layout, layout_of};
 
@@ -46,16 +47,15 @@ impl StoreJob {
     /// node is restarted.
     pub fn run<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
         self.pack();
+        if let Some(Job::Configure(_) | Job::Setting(_)) = self.job {
+            return lasting::replace_device(&self.device, store).map_err(abort_of);
+        }
         let changes = match self.job {
-            None => Vec::new(),
-            Some(Job::Configure(_) | Job::Setting(_)) => self.device_record(),
+            None | Some(Job::Configure(_) | Job::Setting(_)) => Vec::new(),
             Some(Job::Store(groups)) => each(groups, |group| self.stored(group)),
             Some(Job::Restore(groups)) => each(groups, |group| Change::Restore(record_of(group))),
         };
-        store.save(&changes).map_err(|error| match error {
-            Error::RestartNeeded => Abort::DeviceState,
-            _ => Abort::Hardware,
-        })
+        store.save(&changes).map_err(abort_of)
     }
 
     /// Packs what is stored; of what is restored there is nothing to pack.
@@ -72,14 +72,12 @@ impl StoreJob {
         let version = layout_of(group, layout(self.personality));
         Change::Set { group: record_of(group), version, value: self.packed.get(group) }
     }
+}
 
-    fn device_record(&self) -> Changes<'_> {
-        let change = Change::Set {
-            group: storage::Group::Device,
-            version: DeviceRecord::VERSION,
-            value: &self.device,
-        };
-        Vec::from_array([change])
+fn abort_of<E>(error: Error<E>) -> Abort {
+    match error {
+        Error::RestartNeeded => Abort::DeviceState,
+        _ => Abort::Hardware,
     }
 }
 

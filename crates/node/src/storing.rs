@@ -26,6 +26,12 @@ impl Protocol {
         self.parameters()
     }
 
+    /// The device record as it is stored, or would be: what [`LastingRecord`](crate::LastingRecord) writes along.
+    #[must_use]
+    pub fn device_record(&self) -> [u8; storage::DeviceRecord::LEN] {
+        self.device.application().configured.encode()
+    }
+
     /// Takes the job that `Action::Store` announced, with the values of this moment. `false` when there is none. The
     /// values are only copied: to pack them takes half a millisecond, in which nobody should have to wait for the protocol.
     ///

@@ -13,6 +13,8 @@ impl DeviceRecord {
     pub const VERSION: u16 = 1;
     /// Length of the stored record in bytes.
     pub const LEN: usize = 4;
+    /// Bytes that the value has at most: behind the record may be what else a device keeps of its own life.
+    pub const ROOM: usize = 16;
     /// The node-ID of a device that has none yet (CiA 305: LSS must assign one).
     pub const UNCONFIGURED: u8 = 255;
     /// The bit rate that asks for automatic detection.
@@ -55,10 +57,10 @@ impl DeviceRecord {
         [self.node_id, self.personality, low, high]
     }
 
-    /// The record in `bytes` of layout `version`; `None` for another version, length or a value out of range.
+    /// The record that begins `bytes` of layout `version`; `None` for another version, too few bytes or a value out of range.
     #[must_use]
     pub fn decode(version: u16, bytes: &[u8]) -> Option<DeviceRecord> {
-        let (Self::VERSION, &[node_id, personality, low, high]) = (version, bytes) else {
+        let (Self::VERSION, &[node_id, personality, low, high, ..]) = (version, bytes) else {
             return None;
         };
         DeviceRecord::new(node_id, u16::from_le_bytes([low, high]), personality)

@@ -11,14 +11,11 @@ pub enum Group {
     Application,
     /// Calibration of the measuring channels: set in production, not touched by 1011h.
     Calibration,
-    /// What a start without a battery has to know of the positions: kept by the node itself, not touched by 1011h.
-    Position,
 }
 
 impl Group {
     /// Every group, in the order in which a transaction holds them.
-    pub const ALL: [Group; 5] =
-        [Group::Device, Group::Communication, Group::Application, Group::Calibration, Group::Position];
+    pub const ALL: [Group; 4] = [Group::Device, Group::Communication, Group::Application, Group::Calibration];
 
     /// The number that stands for the group in flash. Numbers are never used again for another purpose.
     pub(crate) const fn id(self) -> u8 {
@@ -27,7 +24,6 @@ impl Group {
             Group::Communication => 2,
             Group::Application => 3,
             Group::Calibration => 4,
-            Group::Position => 5,
         }
     }
 
@@ -43,9 +39,9 @@ pub enum Health {
     /// What was last saved is what is read; a save that a power cut kept from completing counts as not made.
     #[default]
     Good,
-    /// A save is damaged and may have held this group: the state before it is read.
+    /// What was saved last of this group is damaged: the value before it is read.
     FellBack,
-    /// A save is damaged and no older state of this group is left: nothing is read, the defaults hold.
+    /// What was saved of this group is damaged, and there is no older value: nothing is read, the defaults hold.
     Lost,
 }
 
@@ -84,9 +80,35 @@ pub struct Loaded {
     pub len: usize,
 }
 
+/// A set of groups: bit 0 for the group with the number 1, and so on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct GroupSet(pub(crate) u8);
+
+impl GroupSet {
+    pub(crate) const NONE: GroupSet = GroupSet(0);
+    pub(crate) const ALL: GroupSet = GroupSet(0xF);
+
+    pub(crate) fn contains(self, group: Group) -> bool {
+        self.0 & GroupSet::bit(group) != 0
+    }
+
+    pub(crate) fn insert(&mut self, group: Group) {
+        self.0 |= GroupSet::bit(group);
+    }
+
+    /// The groups of this set that are not in the other.
+    pub(crate) fn without(self, other: GroupSet) -> GroupSet {
+        GroupSet(self.0 & !other.0)
+    }
+
+    fn bit(group: Group) -> u8 {
+        1 << (group.id() - 1)
+    }
+}
+
 /// One `T` for each group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct PerGroup<T>([T; 5]);
+pub(crate) struct PerGroup<T>([T; 4]);
 
 impl<T> PerGroup<T> {
     pub(crate) fn from_fn(mut make: impl FnMut(Group) -> T) -> PerGroup<T> {
@@ -94,24 +116,22 @@ impl<T> PerGroup<T> {
     }
 
     pub(crate) fn get(&self, group: Group) -> &T {
-        let [device, communication, application, calibration, position] = &self.0;
+        let [device, communication, application, calibration] = &self.0;
         match group {
             Group::Device => device,
             Group::Communication => communication,
             Group::Application => application,
             Group::Calibration => calibration,
-            Group::Position => position,
         }
     }
 
     pub(crate) fn get_mut(&mut self, group: Group) -> &mut T {
-        let [device, communication, application, calibration, position] = &mut self.0;
+        let [device, communication, application, calibration] = &mut self.0;
         match group {
             Group::Device => device,
             Group::Communication => communication,
             Group::Application => application,
             Group::Calibration => calibration,
-            Group::Position => position,
         }
     }
 
@@ -119,7 +139,7 @@ impl<T> PerGroup<T> {
         Group::ALL.into_iter().zip(&self.0)
     }
 
-    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
-        self.0.iter_mut()
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (Group, &mut T)> {
+        Group::ALL.into_iter().zip(&mut self.0)
     }
 }

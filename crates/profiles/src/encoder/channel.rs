@@ -70,6 +70,7 @@ pub(super) struct Channel {
     module: Module,
     commissioning: Commissioning,
     preset: Pending,
+    references: u8,
 }
 
 impl Channel {
@@ -96,6 +97,7 @@ impl Channel {
             module: all.module,
             commissioning: Commissioning::default(),
             preset: Pending { count: own.preset.count, value: None },
+            references: own.references,
         };
         channel.configure(all, own, &scale);
         channel
@@ -114,6 +116,10 @@ impl Channel {
         self.position.rescale(scale, shaft);
         self.input.apply(sensor, &scale, all.module.offset);
         self.preset.set(own.preset);
+        let references = core::mem::replace(&mut self.references, own.references);
+        if ![0, references].contains(&own.references) {
+            self.input.refer();
+        }
         self.configure(all, own, &scale);
     }
 

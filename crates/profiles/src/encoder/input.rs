@@ -144,11 +144,17 @@ impl Input {
         }
     }
 
-    /// Where the shaft is by readings that are not believed; `None` while they are.
+    /// Where the shaft is by readings or an index that are not believed; `None` while they are.
     pub(super) fn doubtful(&self) -> Option<Tracker> {
-        let stray = self.stray?;
+        let correction = self.reference.correction();
+        if self.stray.is_none() && correction == 0 {
+            return None;
+        }
         let mut tracker = self.tracker?;
-        tracker.follow(stray.word());
+        if let Some(stray) = self.stray {
+            tracker.follow(stray.word());
+        }
+        tracker.correct(correction);
         Some(tracker)
     }
 

@@ -46,6 +46,8 @@ pub struct ChannelParameters {
     pub offset: i32,
     /// Preset (6003h, 6010h).
     pub preset: Command,
+    /// Counts how often somebody else has found an offset, and has said with that where the sensor is; 0 for never.
+    pub references: u8,
     /// Cams (6301h to 6337h).
     pub cams: Cams,
     /// Work area (6401h, 6402h).
@@ -92,6 +94,7 @@ impl Default for ChannelParameters {
             fastest: AUTOMATIC,
             offset: 0,
             preset: Command::default(),
+            references: 0,
             cams: Cams::default(),
             area: Area { low: 0, high: i32::MAX },
         }

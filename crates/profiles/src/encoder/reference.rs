@@ -145,7 +145,7 @@ impl Reference {
 
     /// The position is known from here on, whatever was wrong. The steps by which the count is to be put right.
     pub(super) fn preset(&mut self) -> i64 {
-        let correction = if let Index::Elsewhere(error) = self.index { error.wrapping_neg() } else { 0 };
+        let correction = self.correction();
         if self.index == Index::Missing {
             self.since = 0;
         }
@@ -153,6 +153,12 @@ impl Reference {
         (self.trust.lost, self.trust.doubted) = (false, false);
         self.settle();
         correction
+    }
+
+    /// The steps by which the count would be right if the last index were.
+    #[inline]
+    pub(super) fn correction(&self) -> i64 {
+        if let Index::Elsewhere(error) = self.index { error.wrapping_neg() } else { 0 }
     }
 
     /// Whether the index before was as far from its place, whole turns away.

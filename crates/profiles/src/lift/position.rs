@@ -14,8 +14,8 @@ use crate::profile::Chain;
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::encoder::{
-    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Kept, Module, SENSOR_HELD, Sensor,
-    Start, area_state,
+    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Kept, Module, SENSOR_HELD,
+    SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_POSITION_ERROR, Sensor, Start, area_state,
 };
 
 /// Position units that a device can be.
@@ -26,6 +26,10 @@ pub const INVERTED: u16 = 1 << 3;
 
 /// State of a position unit: the sensor does not give a position.
 pub const UNKNOWN: u8 = 1 << 3;
+
+/// State of a position unit: not referenced. The position is not to be trusted before a preset, or an index that says where the
+/// sensor is.
+pub const NOT_REFERENCED: u8 = 1 << 4;
 
 /// Which channel of the encoder a position unit measures with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +51,7 @@ impl Source {
         }
     }
 
-    fn of<T>(self, [first, second]: &[T; 2]) -> &T {
+    pub(super) fn of<T>(self, [first, second]: &[T; 2]) -> &T {
         match self {
             Source::First => first,
             Source::Second => second,
@@ -147,6 +151,7 @@ impl Parameters {
             resolution: own.resolution,
             counted: own.counted,
             fastest: own.fastest,
+            references: own.references,
             ..ChannelParameters::default()
         };
         encoder::Parameters {
@@ -171,7 +176,9 @@ pub struct UnitValues {
     pub offset: i32,
     /// Speed (6390h) in speed measuring steps.
     pub speed: i16,
-    /// [`UNKNOWN`], and whether the position is beyond a limit: bits of the area state of CiA 406.
+    /// Where the readings of the sensor are: the position, but for readings that are not believed.
+    pub reading: u32,
+    /// [`UNKNOWN`], [`NOT_REFERENCED`], and whether the position is beyond a limit: bits of the area state of CiA 406.
     pub state: u8,
     /// Operating status (63C0h).
     pub operating_status: u16,
@@ -222,11 +229,15 @@ impl Unit {
     #[inline(never)]
     fn values(&self, channels: &[ChannelValues; 2], warnings: u16) -> UnitValues {
         let channel = self.source.of(channels);
-        let way = i64::from(channel.position);
-        let counted = if self.is_inverted { -way } else { way };
-        let position = wrapped(counted + i64::from(self.offset), self.range);
+        let at = |way: u32| {
+            let way = i64::from(way);
+            let counted = if self.is_inverted { -way } else { way };
+            wrapped(counted + i64::from(self.offset), self.range)
+        };
+        let position = at(channel.position);
         UnitValues {
             position,
+            reading: if channel.reading == channel.position { position } else { at(channel.reading) },
             speed: if self.is_inverted { channel.speed.saturating_neg() } else { channel.speed },
             state: area_state(&self.limits, &Module::default(), position, 0) | known(channel),
             warnings,
@@ -236,7 +247,10 @@ impl Unit {
 }
 
 fn known(channel: &ChannelValues) -> u8 {
-    if channel.sensor_state & SENSOR_HELD == 0 { 0 } else { UNKNOWN }
+    let unknown = if channel.sensor_state & SENSOR_HELD == 0 { 0 } else { UNKNOWN };
+    let is_read = channel.sensor_state & (SENSOR_NO_SIGNAL | SENSOR_PARITY) == 0;
+    let is_wrong = is_read && channel.sensor_state & SENSOR_POSITION_ERROR != 0;
+    unknown | if is_wrong { NOT_REFERENCED } else { 0 }
 }
 
 /// 63C0h: scaling (bit 2) is always on. What is public shows the direction in bit 0, 6380h has it in bit 3: both.

@@ -25,6 +25,7 @@ fn any_channel() -> impl Strategy<Value = ChannelParameters> {
                 cams: Cams { cams, enable, polarity },
                 area: Area { low, high },
                 offset: low,
+                references: count,
             }
         },
     )

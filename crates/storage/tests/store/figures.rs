@@ -56,7 +56,7 @@ fn saves_until_a_restart_and_until_worn_out() {
             &[(Group::Communication, 1193), (Group::Application, 212)],
             22,
         ),
-        ("all five groups at their most, 10240 B", &largest, 2),
+        ("all four groups at their most, 8192 B", &largest, 2),
     ];
     for (name, sizes, expected) in sets {
         let saves = saves_without_restart(sizes);

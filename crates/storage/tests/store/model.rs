@@ -7,13 +7,13 @@ use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};
 pub(crate) type Value = Option<(u16, Vec<u8>)>;
 
 /// What should be stored, in the order of [`Group::ALL`].
-pub(crate) type Model = [Value; 5];
+pub(crate) type Model = [Value; 4];
 
 /// What a save changes.
 pub(crate) type Changes = Vec<(Group, Value)>;
 
 /// Nothing stored.
-pub(crate) const EMPTY: Model = [None, None, None, None, None];
+pub(crate) const EMPTY: Model = [None, None, None, None];
 
 /// One thing that a device does.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ fn as_change((group, value): &(Group, Value)) -> Change<'_> {
 pub(crate) fn read<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
-) -> (Model, [Health; 5]) {
+) -> (Model, [Health; 4]) {
     let mut view = View::open(flash, pages).unwrap();
     let value = Group::ALL.map(|group| {
         let mut buf = [0; MAX_VALUE];
@@ -82,7 +82,7 @@ pub(crate) fn read_good<const ERASE: usize, const WORD: usize>(
     pages: Pages,
 ) -> Model {
     let (model, health) = read(flash, pages);
-    assert_eq!(health, [Health::Good; 5], "a power cut is no damage");
+    assert_eq!(health, [Health::Good; 4], "a power cut is no damage");
     model
 }
 

@@ -24,6 +24,11 @@ const fn state(sub: u8, name: &'static str) -> Object {
         .mappable(Mapping::Tpdo)
 }
 
+/// Where the readings of the sensor are: a preset says that they are to be believed.
+const fn reading(sub: u8, name: &'static str) -> Object {
+    Object::new(0x2304, sub, name, Type::Unsigned32, Access::ReadOnly).unit("6384h:1")
+}
+
 const fn lamp(sub: u8, name: &'static str) -> Object {
     Object::new(0x2322, sub, name, Type::Unsigned8, Access::ReadWrite).mappable(Mapping::Rpdo)
 }
@@ -49,6 +54,14 @@ pub(super) const OBJECTS: &[Object] = &[
     state(2, "Position unit 2 state"),
     state(3, "Position unit 3 state"),
     state(4, "Position unit 4 state"),
+    Object::highest(0x2304, 4, "Position unit readings"),
+    reading(1, "Position unit 1 reading"),
+    reading(2, "Position unit 2 reading"),
+    reading(3, "Position unit 3 reading"),
+    reading(4, "Position unit 4 reading"),
+    Object::highest(0x2305, 2, "Sensor references"),
+    Object::new(0x2305, 1, "Sensor 1 references", Type::Unsigned8, Access::ReadOnly),
+    Object::new(0x2305, 2, "Sensor 2 references", Type::Unsigned8, Access::ReadOnly),
     Object::highest(0x2310, 2, "Load filter"),
     // As 61A0h and 61A1h of CiA 404.
     parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),

@@ -90,6 +90,11 @@ impl Profile for Objects {
         self.fields.write(entry, bytes, image)
     }
 
+    /// A preset is kept, as that of CiA 406 is.
+    fn stores(&self, index: u16, sub: u8) -> bool {
+        index == 0x6382 && sub > 0
+    }
+
     /// The load measuring unit is on the pressure input, the position units are on those of the encoder.
     fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {
         each(&pressure::objects::SENSOR_BREAK, snapshot.load.is_broken);

@@ -1,7 +1,7 @@
 //! What a write to an object of the lift means beyond storing a value.
 
 use super::values::{Fields, UnitFields};
-use crate::lift::position::{INVERTED, UNKNOWN};
+use crate::lift::position::{INVERTED, NOT_REFERENCED, Source, UNKNOWN};
 use crate::pressure::objects::calibration;
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::Abort;
@@ -72,13 +72,17 @@ impl Fields {
     /// Finds the offset, and shows the position that it leads to: whoever reads it next reads the preset.
     fn preset(&self, number: usize, preset: u32, image: &mut [u8]) -> Result<(), Abort> {
         let unit = self.unit(number)?;
-        if unit.source.u8(image) == 0 || unit.state.u8(image) & UNKNOWN != 0 {
+        let source = Source::from_code(unit.source.u8(image)).ok_or(Abort::DeviceState)?;
+        if unit.state.u8(image) & (UNKNOWN | NOT_REFERENCED) == UNKNOWN {
             return Err(Abort::DeviceState);
         }
-        let position = unit.position.u32(image);
+        let position = unit.reading.u32(image);
         let offset = self.position_parameters(image).preset(number, position, preset);
         unit.offset.store(image, offset.ok_or(Abort::InvalidValue)?.to_le_bytes());
         unit.position.store(image, preset.to_le_bytes());
+        // 0 is only before the first.
+        let references = source.of(&self.references);
+        references.store(image, [references.u8(image).checked_add(1).unwrap_or(1)]);
         Ok(())
     }
 

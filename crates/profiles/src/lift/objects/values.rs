@@ -17,6 +17,8 @@ pub struct Fields {
     pub(super) sensors: Sensors,
     pub(super) transducer: Places,
     pub(super) units: [UnitFields; UNITS],
+    /// How often a preset has said where the sensor of a channel is.
+    pub(super) references: [Field; 2],
     travel: Field,
     position_step: Field,
     speed_step: Field,
@@ -46,6 +48,7 @@ pub(super) struct UnitFields {
     pub(super) state: Field,
     pub(super) operating: Field,
     pub(super) position: Field,
+    pub(super) reading: Field,
     speed: Field,
     limits: [Field; 2],
     operating_status: Field,
@@ -62,6 +65,7 @@ impl UnitFields {
             state: d.field(0x2303, sub),
             operating: d.field(0x6380, sub),
             position: d.field(0x6383, sub),
+            reading: d.field(0x2304, sub),
             speed: d.field(0x6390, sub),
             limits: [d.field(0x63B4, sub), d.field(0x63B8, sub)],
             operating_status: d.field(0x63C0, sub),
@@ -90,6 +94,7 @@ impl UnitFields {
         // A sample from before the last preset must not bring the old position back.
         if values.offset == integer(self.offset, image) {
             self.position.store(image, values.position.to_le_bytes());
+            self.reading.store(image, values.reading.to_le_bytes());
             self.state.store(image, [values.state]);
         }
     }
@@ -108,6 +113,7 @@ impl Fields {
                 UnitFields::new(d, 3),
                 UnitFields::new(d, 4),
             ],
+            references: pair(d, 0x2305, 1),
             travel: d.field(0x2300, 0),
             position_step: d.field(0x6384, 1),
             speed_step: d.field(0x6384, 2),
@@ -180,8 +186,12 @@ impl Fields {
     }
 
     pub(super) fn position_parameters(&self, image: &[u8]) -> position::Parameters {
+        let mut sensors = self.sensors.parameters(image);
+        for (channel, references) in sensors.channels.iter_mut().zip(&self.references) {
+            channel.references = references.u8(image);
+        }
         position::Parameters {
-            sensors: self.sensors.parameters(image),
+            sensors,
             travel: NonZeroU32::new(self.travel.u32(image)).unwrap_or(NonZeroU32::MIN),
             position_step: NonZeroU16::new(self.position_step.u16(image)).unwrap_or(NonZeroU16::MIN),
             speed_step: NonZeroU16::new(self.speed_step.u16(image)).unwrap_or(NonZeroU16::MIN),
