@@ -214,5 +214,9 @@ fn without_a_battery_the_count_begins_anew() {
     assert_eq!(f64::from(read(&mut world, &master, POSITION)), 10.0 * COUNTS);
     cycle_power(&mut world);
     assert_eq!(read(&mut world, &master, POSITION), 0);
-    assert_eq!(read(&mut world, &master, SENSOR_STATE), UNREFERENCED);
+    assert_eq!(
+        read(&mut world, &master, SENSOR_STATE),
+        UNREFERENCED | POSITION_ERROR,
+        "and says that it is lost"
+    );
 }

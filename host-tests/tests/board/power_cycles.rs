@@ -5,7 +5,9 @@ use fastrand::Rng;
 use host_tests::thorough;
 use sim::world::World;
 
-use crate::encoder::{COUNTS, POSITION, SENSOR_STATE, STEPS, start, start_absolute, stimulate, wait};
+use crate::encoder::{
+    COUNTS, POSITION, POSITION_ERROR, SENSOR_STATE, STEPS, start, start_absolute, stimulate, wait,
+};
 use crate::support::{Master, SECOND, read, run, write};
 
 const PRESET: (u16, u8) = (0x6003, 0);
@@ -92,6 +94,49 @@ fn an_incremental_encoder_at_rest_keeps_its_position_through_power_that_fails_at
         let found = read(&mut world, &master, POSITION);
         assert!(found.abs_diff(expected) <= 1, "cycle {cycle}: {found} instead of {expected}");
         assert_eq!(read(&mut world, &master, ALARMS), 0, "cycle {cycle}");
+    }
+}
+
+/// Without a battery the position of an absolute encoder is found again from its offset.
+#[test]
+fn an_absolute_encoder_without_a_battery_keeps_its_preset() {
+    const VALUE: u32 = 1000;
+    let mut rng = Rng::with_seed(24);
+    let (mut world, master) = start_absolute("--shaft const:7.125 --fault battery-empty@0");
+    write(&mut world, &master, PRESET, 4, VALUE);
+    let zero = revolutions(&mut world) * STEPS - f64::from(VALUE);
+    for cycle in 0..cycles() {
+        stimulate(&mut world, "shaft", &format!("rpm:{}", rng.i32(-600..600)));
+        world.run_until(world.now() + Time::from_micros(rng.u64(1..100_000)));
+        fail(&mut world, &mut rng);
+        let rest = (revolutions(&mut world) * STEPS).floor() / STEPS;
+        stimulate(&mut world, "shaft", &format!("const:{rest}"));
+        wait(&mut world, 10);
+        let expected = (rest * STEPS - zero) as i64 as u32 & 0x1FF_FFFF;
+        assert_eq!(read(&mut world, &master, POSITION), expected, "cycle {cycle}");
+        assert_eq!(read(&mut world, &master, ALARMS), 0, "cycle {cycle}");
+    }
+}
+
+/// Without a battery no start knows where a counted position is: each one says so, until the position is preset.
+#[test]
+fn an_incremental_encoder_without_a_battery_never_shows_a_wrong_position_as_right() {
+    let mut rng = Rng::with_seed(25);
+    let (mut world, master) = start("--shaft rpm:600 --fault battery-empty@0");
+    wait(&mut world, 300);
+    for cycle in 0..cycles() {
+        world.run_until(world.now() + Time::from_micros(rng.u64(1..100_000)));
+        fail(&mut world, &mut rng);
+        let (state, alarms) = (read(&mut world, &master, SENSOR_STATE), read(&mut world, &master, ALARMS));
+        assert_eq!((state & POSITION_ERROR, alarms), (POSITION_ERROR, 1), "cycle {cycle}");
+        // The index says where the shaft is in its turn, and not in which turn.
+        wait(&mut world, rng.u64(0..250));
+        assert_ne!(read(&mut world, &master, SENSOR_STATE) & POSITION_ERROR, 0, "cycle {cycle}");
+        if rng.bool() {
+            write(&mut world, &master, PRESET, 4, 5000);
+            wait(&mut world, 2);
+            assert_eq!(read(&mut world, &master, SENSOR_STATE) & POSITION_ERROR, 0, "cycle {cycle}");
+        }
     }
 }
 

@@ -93,9 +93,21 @@ impl Encoder {
         snapshot.operating_time = time.tenths();
     }
 
+    /// The stored form of what is to outlive a loss of power, in its place.
+    pub(crate) fn retain_in(&self, words: &mut [u32; RETAINED_WORDS]) {
+        let (places, rest) = words.as_chunks_mut::<{ KeptChannel::WORDS }>();
+        for ((place, channel), before) in places.iter_mut().zip(&self.channels).zip(&self.kept.channels) {
+            match channel {
+                Some(channel) => channel.retain(place),
+                None => *place = before.to_words(),
+            }
+        }
+        rest.iter_mut().zip(self.kept.operating_time.to_words()).for_each(|(to, from)| *to = from);
+    }
+
     /// What is to outlive a loss of power: see [`Kept`].
     #[must_use]
-    #[inline]
+    #[inline(never)]
     pub fn kept(&self) -> Kept {
         let ([first, second], [before, before_too]) = (&self.channels, &self.kept.channels);
         let kept = |channel: &Option<Channel>, before: &KeptChannel| match channel {
@@ -136,7 +148,7 @@ impl Chain for Encoder {
     }
 
     fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
-        *words = self.kept().to_words();
+        self.retain_in(words);
         true
     }
 }

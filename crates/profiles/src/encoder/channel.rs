@@ -2,7 +2,8 @@
 
 use super::area::area_state;
 use super::commissioning::Commissioning;
-use super::input::Input;
+use super::input::{Input, Left};
+use super::reference::Trust;
 use super::speed::speed_value;
 use super::{
     Area, CamChannel, ChannelParameters, Command, KeptChannel, Module, Parameters, Position, Progress, Scale,
@@ -171,10 +172,28 @@ impl Channel {
         there.map_or(position, |there| self.position.scale().value(there.shaft(), self.position.offset()))
     }
 
-    /// What outlives a loss of power.
+    /// What outlives a loss of power with a battery.
     pub(super) fn kept(&self) -> KeptChannel {
         let kind = self.input.sensor().kind;
+        let (trust, needs_memory) = (Trust::from_bits(self.input.trust()), self.input.needs_memory());
         let kept = |left| KeptChannel::new(kind, self.resolution, left);
-        self.input.left().map_or_else(|| KeptChannel::unread(self.input.unread()), kept)
+        match (self.input.tracker(), self.input.left()) {
+            (Some(tracker), _) => kept(Left { total: tracker.total(), trust, needs_memory }),
+            (None, Some(left)) => kept(left),
+            (None, None) => KeptChannel::unread((trust.lost, needs_memory)),
+        }
+    }
+
+    /// The same in its stored form, in its place.
+    #[inline]
+    pub(super) fn retain(&self, words: &mut [u32; KeptChannel::WORDS]) {
+        match self.input.tracker() {
+            Some(tracker) => {
+                let kind = self.input.sensor().kind;
+                let (trust, needs_memory) = (self.input.trust(), self.input.needs_memory());
+                *words = KeptChannel::words(kind, self.resolution, tracker.total(), trust, needs_memory);
+            }
+            None => *words = self.kept().to_words(),
+        }
     }
 }

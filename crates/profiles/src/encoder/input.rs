@@ -134,6 +134,7 @@ impl Input {
     }
 
     /// The position is known from here on, as a preset says: what the sensor reads is believed, and the count put right.
+    #[inline(never)]
     pub(super) fn refer(&mut self) {
         let correction = self.reference.preset();
         if let Some(tracker) = &mut self.tracker {
@@ -145,11 +146,15 @@ impl Input {
     }
 
     /// Where the shaft is by readings or an index that are not believed; `None` while they are.
+    #[inline]
     pub(super) fn doubtful(&self) -> Option<Tracker> {
+        let is_believed = self.stray.is_none() && self.reference.state() & SENSOR_INDEX == 0;
+        if is_believed { None } else { self.as_read() }
+    }
+
+    #[inline(never)]
+    fn as_read(&self) -> Option<Tracker> {
         let correction = self.reference.correction();
-        if self.stray.is_none() && correction == 0 {
-            return None;
-        }
         let mut tracker = self.tracker?;
         if let Some(stray) = self.stray {
             tracker.follow(stray.word());
@@ -172,17 +177,21 @@ impl Input {
         i64::from(tracker.word()) + i64::from(self.offset)
     }
 
-    /// Where it would go on after a loss of power. Readings that are not believed now are not believed then.
-    pub(super) fn left(&self) -> Option<Left> {
-        let trust = self.reference.trust();
-        let trust = Trust { lost: trust.lost || self.stray.is_some(), ..trust };
-        let at = |tracker: &Tracker| Left { total: tracker.total(), trust, needs_memory: self.needs_memory };
-        self.tracker.as_ref().map(at).or(self.left)
+    /// How far the position can be trusted at the next start: bits of [`Trust`]. Readings that are not believed now are not believed then.
+    #[inline]
+    pub(super) fn trust(&self) -> u8 {
+        self.reference.trust() | if self.stray.is_some() { Trust::LOST } else { 0 }
     }
 
-    /// What to know of a sensor that was never read.
-    pub(super) fn unread(&self) -> (bool, bool) {
-        (self.reference.trust().lost, self.needs_memory)
+    /// Whether nothing but a memory knows how often the code has come round.
+    #[inline]
+    pub(super) fn needs_memory(&self) -> bool {
+        self.needs_memory
+    }
+
+    /// Where it was left before the start, as long as it has not been read.
+    pub(super) fn left(&self) -> Option<Left> {
+        self.left
     }
 
     /// Takes a sample.
@@ -215,6 +224,7 @@ impl Input {
     }
 
     /// Whether the sensor can be there.
+    #[inline]
     fn is_plausible(&mut self, word: u32) -> bool {
         let fastest = self.sensor.fastest;
         let Some(tracker) = &self.tracker else { return true };
@@ -290,10 +300,18 @@ impl Input {
         Observation { state, moved, code: raw.counter.into() }
     }
 
+    #[inline]
     fn follow(&mut self, word: u32, scale: &Scale) -> i32 {
         if let Some(tracker) = &mut self.tracker {
             return tracker.follow(word);
         }
+        self.begin(word, scale);
+        0
+    }
+
+    /// The first reading says where to go on.
+    #[inline(never)]
+    fn begin(&mut self, word: u32, scale: &Scale) {
         let (turn, bits) = (scale.turn(), self.sensor.bits());
         let total = match self.left {
             Some(left) if self.sensor.kind.is_absolute() => {
@@ -307,7 +325,6 @@ impl Input {
             None => self.offset.into(),
         };
         self.tracker = Some(Tracker::new(turn, bits, word, total));
-        0
     }
 
     /// The index is the zero of a rod, and of every turn of a shaft.

@@ -22,6 +22,11 @@ pub struct OperatingTime {
 }
 
 impl OperatingTime {
+    /// The stored form.
+    pub(super) fn to_words(self) -> [u32; 2] {
+        [self.tenths, self.millis]
+    }
+
     /// In units of 0.1 h.
     #[must_use]
     pub fn tenths(&self) -> u32 {
@@ -51,6 +56,7 @@ pub struct KeptChannel {
 }
 
 impl KeptChannel {
+    #[inline]
     pub(super) fn new(kind: SensorType, resolution: u32, left: Left) -> KeptChannel {
         let Left { total, trust, needs_memory } = left;
         KeptChannel { kind: kind.code(), resolution, total, trust, needs_memory }
@@ -188,6 +194,7 @@ impl Kept {
 
     /// The form to be stored. It has no check of its own: whoever stores it adds one.
     #[must_use]
+    #[inline(never)]
     pub fn to_words(&self) -> [u32; Kept::WORDS] {
         let OperatingTime { tenths, millis } = self.operating_time;
         let [[a0, a1, a2, a3], [b0, b1, b2, b3]] = self.channels.map(KeptChannel::to_words);
@@ -212,13 +219,24 @@ impl Kept {
 }
 
 impl KeptChannel {
-    fn to_words(self) -> [u32; CHANNEL] {
-        let Trust { referenced, lost, doubted } = self.trust;
-        let bit = |set: bool, place: u8| if set { 1 << place } else { 0 };
-        let trust = bit(referenced, 0) | bit(lost, 1) | bit(doubted, 2);
-        let flags = u32::from_le_bytes([self.kind, trust, self.needs_memory.into(), 0]);
-        let [total, total_high] = halves(self.total.cast_unsigned());
-        [flags, self.resolution, total, total_high]
+    /// Words of the stored form.
+    pub(super) const WORDS: usize = CHANNEL;
+
+    #[inline(never)]
+    pub(super) fn to_words(self) -> [u32; CHANNEL] {
+        stored_form(self.kind, self.resolution, self.total, self.trust.bits(), self.needs_memory)
+    }
+
+    /// The stored form of a position.
+    #[inline]
+    pub(super) fn words(
+        kind: SensorType,
+        resolution: u32,
+        total: i64,
+        trust: u8,
+        needs_memory: bool,
+    ) -> [u32; CHANNEL] {
+        stored_form(kind.code(), resolution, total, trust, needs_memory)
     }
 
     fn from_words(words: &[u32; CHANNEL]) -> KeptChannel {
@@ -228,10 +246,17 @@ impl KeptChannel {
             kind,
             resolution,
             total: whole([total, total_high]).cast_signed(),
-            trust: Trust { referenced: trust & 1 != 0, lost: trust & 2 != 0, doubted: trust & 4 != 0 },
+            trust: Trust::from_bits(trust),
             needs_memory: needs_memory != 0,
         }
     }
+}
+
+#[inline]
+fn stored_form(kind: u8, resolution: u32, total: i64, trust: u8, needs_memory: bool) -> [u32; CHANNEL] {
+    let flags = u32::from_le_bytes([kind, trust, needs_memory.into(), 0]);
+    let [total, total_high] = halves(total.cast_unsigned());
+    [flags, resolution, total, total_high]
 }
 
 /// The low and the high word.

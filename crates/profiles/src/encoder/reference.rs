@@ -44,6 +44,25 @@ pub(super) struct Trust {
     pub(super) doubted: bool,
 }
 
+impl Trust {
+    /// A bit for each.
+    pub(super) fn bits(self) -> u8 {
+        let Trust { referenced, lost, doubted } = self;
+        let bit = |set: bool, bit: u8| if set { bit } else { 0 };
+        bit(referenced, Trust::REFERENCED) | bit(lost, Trust::LOST) | bit(doubted, Trust::DOUBTED)
+    }
+
+    /// From the bits.
+    pub(super) fn from_bits(bits: u8) -> Trust {
+        let is = |bit: u8| bits & bit != 0;
+        Trust { referenced: is(Trust::REFERENCED), lost: is(Trust::LOST), doubted: is(Trust::DOUBTED) }
+    }
+
+    const REFERENCED: u8 = 1 << 0;
+    pub(super) const LOST: u8 = 1 << 1;
+    const DOUBTED: u8 = 1 << 2;
+}
+
 /// How the index comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Marks {
@@ -67,11 +86,14 @@ pub(super) struct Reference {
     too_many: u32,
     /// Bits of the sensor state that follow.
     state: u8,
+    /// What to know of it at the next start, as bits.
+    kept: u8,
 }
 
 impl Reference {
     pub(super) fn new(marks: Marks, trust: Trust) -> Reference {
-        let mut new = Reference { marks, trust, index: Index::Right, since: 0, too_many: u32::MAX, state: 0 };
+        let mut new =
+            Reference { marks, trust, index: Index::Right, since: 0, too_many: u32::MAX, state: 0, kept: 0 };
         new.settle();
         new
     }
@@ -92,9 +114,9 @@ impl Reference {
         self.state
     }
 
-    /// What to know of it at the next start.
-    pub(super) fn trust(&self) -> Trust {
-        Trust { doubted: self.trust.doubted || self.index != Index::Right, ..self.trust }
+    /// What to know of it at the next start: bits of [`Trust`].
+    pub(super) fn trust(&self) -> u8 {
+        self.kept
     }
 
     /// The sensor has moved.
@@ -184,6 +206,7 @@ impl Reference {
             | bit(lost, SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR)
             | bit(doubted, SENSOR_POSITION_ERROR)
             | bit(is_wrong, SENSOR_INDEX | SENSOR_POSITION_ERROR);
+        self.kept = Trust { doubted: doubted || is_wrong, ..self.trust }.bits();
         // Once it is missing, it is missing until it comes.
         let is_due = self.marks.is_used && referenced && self.index != Index::Missing;
         let turn = self.marks.turn.filter(|_| is_due).map_or(u32::MAX, NonZeroU32::get);
@@ -275,7 +298,7 @@ mod tests {
         reference.lose();
         reference.index(0, 0);
         assert_eq!(reference.state(), SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR);
-        assert!(reference.trust().lost);
+        assert_ne!(reference.trust() & Trust::LOST, 0);
         reference.preset();
         assert_eq!(reference.state(), 0);
         let mut reference = Reference::new(Marks { suffice: true, ..marks() }, Trust::default());

@@ -174,14 +174,14 @@ impl Supervision {
         let supplies = limits.lowest_supply..=limits.highest_supply;
         let current = board.current.is_some_and(|current| current > limits.highest_current);
         let voltage = board.supply.is_some_and(|supply| !supplies.contains(&supply));
-        let broken = SENSOR_NO_SIGNAL | SENSOR_POSITION_ERROR;
-        let is_wrong = |channel: &ChannelValues| channel.sensor_state & broken == SENSOR_POSITION_ERROR;
+        let (sensor_break, is_wrong) =
+            if sensors(channels) & SENSOR_POSITION_ERROR == 0 { (false, false) } else { errors(channels) };
         Conditions {
             current: self.current.update(current),
             voltage: self.voltage.update(voltage),
             memory: self.is_damaged || board.memory_error,
-            sensor_break: channels.iter().any(|channel| channel.sensor_state & broken == broken),
-            position: self.position.update(channels.iter().any(is_wrong)),
+            sensor_break,
+            position: self.position.update(is_wrong),
         }
     }
 
@@ -192,6 +192,14 @@ impl Supervision {
         self.has_been_old |= self.is_old;
         self.is_old
     }
+}
+
+/// Whether a sensor does not answer, and whether the position of one that does is wrong.
+#[inline(never)]
+fn errors(channels: &[ChannelValues; 2]) -> (bool, bool) {
+    let broken = SENSOR_NO_SIGNAL | SENSOR_POSITION_ERROR;
+    let is = |bits: u8| channels.iter().any(|channel| channel.sensor_state & broken == bits);
+    (is(broken), is(SENSOR_POSITION_ERROR))
 }
 
 fn sensors(channels: &[ChannelValues; 2]) -> u8 {

@@ -74,7 +74,7 @@ impl Chain for Lift {
     }
 
     fn retain(&self, words: &mut [u32; RETAINED_WORDS]) -> bool {
-        *words = self.position.kept().to_words();
+        self.position.retain(words);
         true
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! Positions are unsigned as those of CiA 406 are, and go round at the ends: a preset puts the whole way of the car above 0.
 
-use crate::board::RawEncoder;
+use crate::board::{RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
 use core::num::{NonZeroU16, NonZeroU32};
 
@@ -308,6 +308,11 @@ impl PositionUnits {
         let values =
             |unit: Option<Unit>| unit.map(|unit| unit.values(&channels, warnings)).unwrap_or_default();
         Snapshot { units: self.units.map(values), conditions }
+    }
+
+    /// The same in its stored form, in its place.
+    pub(super) fn retain(&self, words: &mut [u32; RETAINED_WORDS]) {
+        self.encoder.retain_in(words);
     }
 
     /// What is to outlive a loss of power.
