@@ -6,6 +6,7 @@
 //! priorities share the device by its halves, one for process data and one for services.
 
 mod application;
+mod events;
 mod faults;
 mod lss;
 mod multiplexed;
@@ -80,6 +81,8 @@ struct Core<A, const N: usize, const T: usize, const R: usize, const W: usize, c
     /// the set, and need no further look.
     rpdo_filter: u32,
     scanner: Scanner<M>,
+    /// One of the TPDOs tells events.
+    tells_events: bool,
     /// Where the chains of PDOs begin.
     first_tpdos: Links,
     first_rpdos: Links,
@@ -130,6 +133,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 rpdos: [const { Rpdo::new() }; R],
                 rpdo_filter: 0,
                 scanner: Scanner::new(),
+                tells_events: false,
                 first_tpdos: Links::END,
                 first_rpdos: Links::END,
                 process_due: Instant::NEVER,

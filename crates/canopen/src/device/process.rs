@@ -80,6 +80,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             tpdo.poll(image, turn);
             due = due.min(tpdo.due());
         });
+        due = due.min(core.send_events(turn));
         core.scanner.poll(&core.image, turn);
         core.process_due = due.min(core.scanner.due()).min(core.sync.due());
     }
@@ -117,8 +118,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.start_by_itself(turn);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
             self.core.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, turn));
+            let events_due = self.core.send_events(turn);
             self.core.scanner.on_change(&self.core.image, turn);
-            self.core.process_due = self.core.process_due.min(self.core.scanner.due());
+            self.core.process_due = self.core.process_due.min(self.core.scanner.due()).min(events_due);
         }
         self.send_process(turn);
     }
