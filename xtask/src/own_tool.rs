@@ -37,6 +37,10 @@ pub(crate) fn run(tool: &str, arguments: &[OsString]) -> Result<()> {
     let here = std::env::current_dir().context("there is no current directory")?;
     let manifest = root().join("Cargo.toml");
     let mut command = command::cargo();
-    command.args(["run", "--quiet", "--profile", "sim", "-p", tool, "--manifest-path"]).arg(manifest).arg("--").args(arguments);
+    command
+        .args(["run", "--quiet", "--profile", "sim", "-p", tool, "--manifest-path"])
+        .arg(manifest)
+        .arg("--")
+        .args(arguments);
     command::run(command.current_dir(here))
 }

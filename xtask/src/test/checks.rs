@@ -1,35 +1,52 @@
-//! What comes before the tests: formatting, lints, documentation, and everything that is compiled.
+//! What is compiled before the tests, and what is looked at beside them: lints and documentation.
 
 use anyhow::{Result, ensure};
 
 use super::host;
 use super::report::Step;
 use crate::command::{cargo, root, run};
+use crate::own_tool::Tools;
 use crate::setup::{self, python};
 use crate::target::Toolchain;
-use crate::{bench, images, progress};
+use crate::{bench, callgraph, images, progress};
 
 /// The chips whose images are built beside those of the default one.
 const OTHER_CHIPS: [&str; 2] = ["stm32f405", "stm32f407"];
 
-/// For this machine.
-pub(super) fn lane_of_host() -> Vec<Step> {
+/// What the tests need, for this machine.
+pub(super) fn builds_for_host() -> Vec<Step> {
     vec![
         Step::new("format", || run(cargo().args(["fmt", "--all", "--check"]))),
         Step::new("build host", || progress::build("host", &mut host::build()?)),
-        Step::new("lint host", lint_host),
-        Step::new("documentation", document_host),
         Step::new("python", || python::clients().map(|_| ())),
     ]
 }
 
-/// For the Cortex-M4.
-pub(super) fn lane_of_images() -> Vec<Step> {
+/// What the tests need, for the Cortex-M4.
+pub(super) fn builds_for_target() -> Vec<Step> {
     vec![
         Step::new("system packages", || setup::install(setup::TEST)),
         Step::new("production bootloader", || images::compile_production(&Toolchain::ensure()?)),
         Step::new("build images", || images::compile_all(&Toolchain::ensure()?)),
         Step::new("build bench images", || bench::build(&bench::Options::default()).map(|_| ())),
+    ]
+}
+
+/// What no test waits for, for this machine. Cargo does one at a time.
+pub(super) fn checks_for_host() -> Vec<Step> {
+    vec![
+        Step::new("lint host", lint_host),
+        Step::new("documentation", document_host),
+        Step::new("examples of the documentation", || run(host::cargo("test")?.args(["--quiet", "--doc"]))),
+    ]
+}
+
+/// What no test waits for, for the Cortex-M4. Cargo does one at a time.
+pub(super) fn checks_for_target() -> Vec<Step> {
+    vec![
+        Step::new("no panic in the images", callgraph::check_panics),
+        Step::new("stack", || callgraph::stack(false, Tools::Built)),
+        Step::new("performance", bench::check),
         Step::new("no panic", no_panic),
         Step::new("lint images", lint_images),
         Step::new("other chips", other_chips),
@@ -61,10 +78,9 @@ fn lint_images() -> Result<()> {
 fn other_chips() -> Result<()> {
     let toolchain = Toolchain::ensure()?;
     for chip in OTHER_CHIPS {
+        let images = ["-p", "firmware", "-p", "bootloader"];
         let features = ["--release", "--no-default-features", "--features", chip];
-        for package in ["firmware", "bootloader"] {
-            progress::build(chip, toolchain.cargo("check", &features).args(["-p", package]))?;
-        }
+        progress::build(chip, toolchain.cargo("check", &features).args(images))?;
     }
     Ok(())
 }

@@ -72,7 +72,9 @@ pub(super) fn test_programs() -> Result<Vec<TestProgram>> {
     for line in BufReader::new(stdout).lines() {
         let message: Message = serde_json::from_str(&line?).context("cargo says what is not understood")?;
         if let Some(program) = test_program(message) {
-            programs.insert(program.label.clone(), program);
+            let label = program.label.clone();
+            ensure!(!programs.contains_key(&label), "two programs with tests are called {label}");
+            programs.insert(label, program);
         }
     }
     ensure!(child.wait()?.success(), "the tests do not compile");
@@ -88,6 +90,7 @@ fn test_program(message: Message) -> Option<TestProgram> {
     let package = directory.file_name().map(Path::new)?.display().to_string();
     let label = match target.kind.first().map(String::as_str) {
         Some("lib") => package,
+        Some("bin") => format!("{package}/bin/{}", target.name),
         _ => format!("{package}/{}", target.name),
     };
     Some(TestProgram { label, path, directory })

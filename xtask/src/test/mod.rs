@@ -1,8 +1,8 @@
 //! `cargo xtask test`: every check of the project.
 //!
-//! Two lanes at a time compile and lint, one for this machine and one for the Cortex-M4. Then all tests run, as many at a time as
-//! there are cores, each in a process of its own. A step or a test that fails has its output printed; the output of all
-//! is in target/test-logs.
+//! Two lanes at a time compile, one for this machine and one for the Cortex-M4. Then the tests run, as many at a time as there are
+//! cores, each in a process of its own, and the two lanes go on beside them with lints and documentation. A step or a
+//! test that fails has its output printed; the output of all is in target/test-logs.
 
 mod checks;
 mod host;
@@ -13,7 +13,7 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::setup;
-use checks::{lane_of_host, lane_of_images};
+use checks::{builds_for_host, builds_for_target, checks_for_host, checks_for_target};
 use report::Report;
 
 /// Flags of the command.
@@ -31,8 +31,8 @@ pub(crate) struct Flags {
 pub(crate) fn run(flags: &Flags) -> Result<()> {
     setup::check(setup::TEST)?;
     let report = Report::new(flags.only.as_deref())?;
-    report.lanes(lane_of_host(), lane_of_images())?;
+    report.run([builds_for_host(), builds_for_target()], Vec::new())?;
     let tests = suite::collect(flags.thorough, report.only())?;
-    report.pool("tests", tests)?;
+    report.run([checks_for_host(), checks_for_target()], tests)?;
     report.finish()
 }

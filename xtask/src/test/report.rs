@@ -34,6 +34,40 @@ impl Step {
     }
 }
 
+/// Tests that wait for a worker. A test that fails keeps no other from running.
+struct Pool {
+    all: usize,
+    waiting: Mutex<VecDeque<Step>>,
+    finished: AtomicUsize,
+    told: Mutex<Instant>,
+}
+
+impl Pool {
+    fn new(tests: Vec<Step>) -> Pool {
+        let all = tests.len();
+        if all > 0 {
+            eprintln!("== {all} tests");
+        }
+        let waiting = Mutex::new(VecDeque::from(tests));
+        Pool { all, waiting, finished: AtomicUsize::new(0), told: Mutex::new(Instant::now()) }
+    }
+
+    /// Takes tests until there are none. Now and then the number of those that have run is told.
+    fn work(&self, run: impl Fn(Step) -> bool) {
+        // The queue is free again before the test runs.
+        let next = || lock(&self.waiting).pop_front();
+        while let Some(test) = next() {
+            run(test);
+            let finished = self.finished.fetch_add(1, Ordering::Relaxed) + 1;
+            let mut told = lock(&self.told);
+            if told.elapsed() >= PERIOD {
+                *told = Instant::now();
+                eprintln!("tests: {finished} of {}", self.all);
+            }
+        }
+    }
+}
+
 /// What was done.
 struct Done {
     name: String,
@@ -47,7 +81,7 @@ pub(super) struct Report<'a> {
     begin: Instant,
     done: Mutex<Vec<Done>>,
     failed: Mutex<Vec<String>>,
-    /// The steps build on each other: after one that failed, no other begins.
+    /// A step of a lane has failed.
     is_over: AtomicBool,
 }
 
@@ -63,15 +97,22 @@ impl<'a> Report<'a> {
         self.only
     }
 
-    /// Runs two lists of steps at the same time, each in its order.
-    pub(super) fn lanes(&self, left: Vec<Step>, right: Vec<Step>) -> Result<()> {
+    /// Runs lanes of steps, each in its order, and beside them the tests in any order, as many at a time as there are cores.
+    pub(super) fn run(&self, lanes: [Vec<Step>; 2], tests: Vec<Step>) -> Result<()> {
+        let workers = thread::available_parallelism().map_or(2, usize::from);
+        let pool = Pool::new(tests);
         thread::scope(|scope| {
-            scope.spawn(|| self.lane(left));
-            self.lane(right);
+            for lane in lanes {
+                scope.spawn(|| self.lane(lane));
+            }
+            for _ in 0..workers {
+                scope.spawn(|| pool.work(|test| self.step(test, true)));
+            }
         });
         self.ensure_none_failed()
     }
 
+    /// The steps build on each other: after one that failed, no other begins.
     fn lane(&self, steps: Vec<Step>) {
         for step in steps {
             let is_skipped = self.only.is_some_and(|only| !step.name.contains(only));
@@ -79,43 +120,14 @@ impl<'a> Report<'a> {
                 continue;
             }
             eprintln!("== {}", step.name);
-            if !self.run(step, false) {
+            if !self.step(step, false) {
                 self.is_over.store(true, Ordering::Relaxed);
             }
         }
     }
 
-    /// Runs tests in any order, as many at a time as there are cores. A test that fails keeps no other from running.
-    pub(super) fn pool(&self, name: &str, tests: Vec<Step>) -> Result<()> {
-        let all = tests.len();
-        if all > 0 {
-            eprintln!("== {all} {name}");
-        }
-        let workers = thread::available_parallelism().map_or(2, usize::from);
-        let queue = Mutex::new(VecDeque::from(tests));
-        let (finished, told) = (AtomicUsize::new(0), Mutex::new(Instant::now()));
-        // The queue is free again before the test runs.
-        let next = || lock(&queue).pop_front();
-        thread::scope(|scope| {
-            for _ in 0..workers {
-                scope.spawn(|| {
-                    while let Some(test) = next() {
-                        self.run(test, true);
-                        let number = finished.fetch_add(1, Ordering::Relaxed) + 1;
-                        let mut told = lock(&told);
-                        if told.elapsed() >= PERIOD {
-                            *told = Instant::now();
-                            eprintln!("{name}: {number} of {all}");
-                        }
-                    }
-                });
-            }
-        });
-        self.ensure_none_failed()
-    }
-
     /// Runs one step. What it printed is told when it fails.
-    fn run(&self, step: Step, is_test: bool) -> bool {
+    fn step(&self, step: Step, is_test: bool) -> bool {
         let begin = Instant::now();
         let path = logs().join(step.name.replace(['/', ':', ' '], "_")).with_extension("log");
         let result =
@@ -151,6 +163,7 @@ impl<'a> Report<'a> {
             eprintln!("{:>7.1} s  {}", step.time.as_secs_f64(), step.name);
         }
         remember(&done)?;
+        let passed = done.len();
         done.retain(|done| done.is_test);
         done.sort_by_key(|test| std::cmp::Reverse(test.time));
         if !done.is_empty() {
@@ -161,29 +174,30 @@ impl<'a> Report<'a> {
             eprintln!("{:>7.1} s  {}", test.time.as_secs_f64(), test.name);
         }
         eprintln!("\n{:>7.1} s  from begin to end", self.begin.elapsed().as_secs_f64());
-        println!("{} passed, 0 failed", fs::read_to_string(times())?.lines().count());
+        println!("{passed} passed, 0 failed");
         Ok(())
     }
 }
 
-/// Writes how long each step took, for the next run to begin with the slowest tests.
+/// Writes how long each step took, for the next run to begin with the slowest tests. What did not run this time keeps its time.
 fn remember(done: &[Done]) -> Result<()> {
-    let mut lines: Vec<String> =
-        done.iter().map(|step| format!("{:.3} {}\n", step.time.as_secs_f64(), step.name)).collect();
+    let mut times = last_times();
+    times.extend(done.iter().map(|step| (step.name.clone(), step.time.as_secs_f64())));
+    let mut lines: Vec<String> = times.iter().map(|(name, time)| format!("{time:.3} {name}\n")).collect();
     lines.sort();
-    fs::write(times(), lines.concat()).context("cannot write the times")
+    fs::write(times_file(), lines.concat()).context("cannot write the times")
 }
 
 /// How long a test took in the last run, in seconds.
 pub(super) fn last_times() -> std::collections::HashMap<String, f64> {
-    let text = fs::read_to_string(times()).unwrap_or_default();
+    let text = fs::read_to_string(times_file()).unwrap_or_default();
     let line = |line: &str| {
         line.split_once(' ').and_then(|(time, name)| Some((name.to_owned(), time.parse().ok()?)))
     };
     text.lines().filter_map(line).collect()
 }
 
-fn times() -> PathBuf {
+fn times_file() -> PathBuf {
     logs().join("times.txt")
 }
 

@@ -1,4 +1,4 @@
-//! The tests: those of every crate, the examples of the documentation, the Python clients, the checks of the images.
+//! The tests: those of every crate and the Python clients.
 
 use std::path::Path;
 use std::process::Command;
@@ -9,9 +9,9 @@ use anyhow::{Context, Result, ensure};
 use super::host::{self, TestProgram};
 use super::report::{Step, last_times};
 use crate::command::{built, root, run};
+use crate::images;
 use crate::own_tool::Tools;
 use crate::setup::python;
-use crate::{bench, callgraph, images};
 
 /// The tests that run on the emulated board are the longest: they begin first when nothing is known of a last run.
 const LONG: &str = "/board";
@@ -20,12 +20,10 @@ const LONG: &str = "/board";
 pub(super) fn collect(thorough: bool, only: Option<&str>) -> Result<Vec<Step>> {
     let programs = host::test_programs()?;
     images::build(Tools::Built)?;
-    let mut steps = of_images();
+    let mut steps = of_python(thorough)?;
     for program in programs {
         steps.extend(of_program(&program, thorough)?);
     }
-    steps.push(Step::new("documentation examples", doc_tests));
-    steps.extend(of_python(thorough)?);
     steps.retain(|step| only.is_none_or(|only| step.name().contains(only)));
     let times = last_times();
     let unknown = |name: &str| if name.contains(LONG) { 5.0 } else { 0.5 };
@@ -58,18 +56,6 @@ fn one(program: &Path, directory: &Path, test: &str, thorough: bool) -> Result<(
         .current_dir(directory)
         .env("CARGO_MANIFEST_DIR", directory);
     run(with_images(&mut command, thorough))
-}
-
-fn of_images() -> Vec<Step> {
-    vec![
-        Step::new("no panic in the images", callgraph::check_panics),
-        Step::new("stack", || callgraph::stack(false, Tools::Built)),
-        Step::new("performance", bench::check),
-    ]
-}
-
-fn doc_tests() -> Result<()> {
-    run(host::cargo("test")?.args(["--quiet", "--doc"]))
 }
 
 /// The files of Python tests, each a step.

@@ -4,6 +4,7 @@
 //! B is a program of five words, so that all of its update can be cut at every operation; A is the real application.
 
 use canbus::Time;
+use host_tests::thorough::{either, is_thorough};
 use sign::image::Image;
 
 use super::bench::{Bench, CLEAR, STATUS, signed, version_a, version_b};
@@ -118,17 +119,21 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
     });
 }
 
-/// Cuts at every operation whose number has this rest by two, so that two threads share the work.
+/// Every one of so many operations is cut where not all are.
+const SAMPLE: u64 = 3;
+
+/// Cuts at every operation whose number has this rest by two, so that two processes share the work; at a third of them
+/// without `--thorough`.
 fn cut_everywhere(rest: u64) {
     let mut victim = Victim::new();
     let all = victim.update(NO_CUT);
     assert_eq!(victim.recover(), Some(Runs::B), "without a cut");
     let (mut runs, mut twice) = ([0; 2], 0);
     victim.restore();
-    for cut in (1..=all).filter(|cut| cut % 2 == rest) {
+    for cut in (1..=all).filter(|cut| cut % 2 == rest && (is_thorough() || cut / 2 % SAMPLE == 0)) {
         victim.update(cut);
         let second = 1 + cut * 37 % COPY;
-        if cut > all / 2 && cut % SECOND_CUTS < 2 {
+        if cut > all / 2 && cut / 2 % SECOND_CUTS < 2 {
             twice += usize::from(victim.cut_again(second));
         }
         let Some(found) = victim.recover() else { panic!("cut {cut} of {all}, perhaps then {second}") };
@@ -143,7 +148,8 @@ fn cut_everywhere(rest: u64) {
         runs[0],
         runs[1]
     );
-    assert!(runs[0] > 60 && runs[1] > 60 && twice > 10);
+    let (each, second) = either((20, 3), (60, 10));
+    assert!(runs[0] > each && runs[1] > each && twice > second, "{runs:?}, {twice}");
 }
 
 #[test]
@@ -159,16 +165,16 @@ fn the_power_goes_at_every_odd_operation_of_an_update() {
 /// Both are the real application here: whichever it is, it answers.
 #[test]
 fn whenever_the_power_goes_the_node_comes_back_with_one_of_the_two() {
-    const CUTS: u64 = 8;
+    let cuts = either(4, 8);
     let (a, b) = (version_a(), version_b(0));
     let words = (b.to_bytes().len() / 4) as u64;
     // Clear, download, the copy with its erases; the commit record in between.
     let all = 6 + words + 4 + 2 + words;
     let (mut old, mut new) = (0, 0);
-    for cut in 0..CUTS {
+    for cut in 0..cuts {
         let mut bench = Bench::running();
         bench.stop();
-        bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(1 + cut * all / CUTS + cut);
+        bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(1 + cut * all / cuts + cut);
         go_on_without_the_node(&mut bench, &b.to_bytes());
         bench.power_cycle();
         bench.run(SECOND * 6);
@@ -176,6 +182,6 @@ fn whenever_the_power_goes_the_node_comes_back_with_one_of_the_two() {
         assert!([a.header.code_crc(), b.header.code_crc()].contains(&found), "cut {cut}");
         if found == a.header.code_crc() { old += 1 } else { new += 1 }
     }
-    println!("{CUTS} cuts: {old} times the old application, {new} times the new one");
+    println!("{cuts} cuts: {old} times the old application, {new} times the new one");
     assert!(old > 0 && new > 0);
 }

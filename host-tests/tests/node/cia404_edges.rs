@@ -3,10 +3,10 @@
 
 use profiles::pressure::{Channel, ChannelParameters, ChannelValues, Filter, Span, Unit};
 
-const RESPONSE: &str = include_str!("../golden/cia404_response.csv");
-const UNIT: &str = include_str!("../golden/cia404_unit.csv");
-const DIGITS: &str = include_str!("../golden/cia404_digits.csv");
-const STATUS: &str = include_str!("../golden/cia404_status.csv");
+const RESPONSE: &str = include_str!("../../golden/cia404_response.csv");
+const UNIT: &str = include_str!("../../golden/cia404_unit.csv");
+const DIGITS: &str = include_str!("../../golden/cia404_digits.csv");
+const STATUS: &str = include_str!("../../golden/cia404_status.csv");
 
 const STEP: f32 = 100_000.0;
 

@@ -9,7 +9,7 @@ use host_tests::bench::{Bench, ID, raw};
 use node::{BusEvent, FAULTS, Fault, Personality};
 use profiles::board::{Board, RawSample};
 
-const TABLE: &str = include_str!("../tables/emcy.csv");
+const TABLE: &str = include_str!("../../tables/emcy.csv");
 /// A number of mapped objects that makes it a multiplexed PDO with a destination.
 const MULTIPLEXED: u8 = 255;
 const EMCY: u16 = 0x080 + ID as u16;

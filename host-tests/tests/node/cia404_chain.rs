@@ -2,8 +2,8 @@
 
 use profiles::pressure::{Channel, ChannelParameters, Filter, STATUS_INVALID, Span, Unit};
 
-const CHAIN: &str = include_str!("../golden/cia404_chain.csv");
-const FILTER: &str = include_str!("../golden/cia404_filter.csv");
+const CHAIN: &str = include_str!("../../golden/cia404_chain.csv");
+const FILTER: &str = include_str!("../../golden/cia404_filter.csv");
 
 fn number<T: std::str::FromStr<Err: std::fmt::Debug>>(text: &str) -> T {
     text.parse().unwrap()

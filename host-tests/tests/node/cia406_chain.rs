@@ -11,8 +11,8 @@ use profiles::encoder::{
     SCALING, SensorType,
 };
 
-const POSITION: &str = include_str!("../golden/cia406_position.csv");
-const SPEED: &str = include_str!("../golden/cia406_speed.csv");
+const POSITION: &str = include_str!("../../golden/cia406_position.csv");
+const SPEED: &str = include_str!("../../golden/cia406_speed.csv");
 
 fn number<T: FromStr<Err: Debug>>(text: &str) -> T {
     text.parse().unwrap()

@@ -7,7 +7,7 @@ use profiles::lift::catalogue::{
     CobId, Content, Definition, Object, PDOS, Pdo, by_cob_id, by_number, name_of,
 };
 
-const TABLE: &str = include_str!("../tables/lift417.csv");
+const TABLE: &str = include_str!("../../tables/lift417.csv");
 
 /// One row: direction, number, communication and mapping index, identifier rule, type, times, objects.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
