@@ -48,7 +48,7 @@ impl NodeApplication {
     }
 
     /// Shows what was measured.
-    pub(crate) fn show_values(&self, image: &mut [u8]) {
+    pub(crate) fn show_values(&mut self, image: &mut [u8]) {
         self.profile.publish(&self.snapshot, image);
     }
 
@@ -94,12 +94,12 @@ impl Application for NodeApplication {
         self.profile.write(entry, bytes, image)
     }
 
-    fn written(&mut self, _: &Entry, image: &mut [u8]) {
-        self.profile.received(image);
+    fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        self.profile.written(entry, image);
     }
 
-    fn received(&mut self, _: u16, image: &mut [u8]) {
-        self.profile.received(image);
+    fn received(&mut self, rpdo: u16, image: &mut [u8]) {
+        self.profile.received(rpdo, image);
     }
 
     fn state(&mut self, state: State, image: &mut [u8]) {
@@ -108,6 +108,18 @@ impl Application for NodeApplication {
 
     fn sends_events(&self, tpdo: u16) -> bool {
         self.profile.sends_events(tpdo)
+    }
+
+    fn begin_events(&mut self, tpdo: u16, image: &mut [u8]) {
+        self.profile.begin_events(tpdo, image);
+    }
+
+    fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool {
+        self.profile.next_event(tpdo, image)
+    }
+
+    fn broadcasts(&self, at: Multiplexer, image: &[u8]) -> bool {
+        self.profile.broadcasts(at, image)
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {

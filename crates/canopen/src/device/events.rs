@@ -21,7 +21,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Sends what waits with the application, as far as it may be sent. When to ask again.
     #[inline]
     pub(super) fn send_events(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
-        if self.tells_events { self.ask_for_events(turn) } else { Instant::NEVER }
+        if self.tells_events && self.state.has_pdos() { self.ask_for_events(turn) } else { Instant::NEVER }
     }
 
     #[inline(never)]

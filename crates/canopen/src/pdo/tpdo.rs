@@ -174,11 +174,11 @@ impl Tpdo {
 
     /// A SYNC arrived.
     pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let Some(settings) = &self.settings else { return };
-        match settings.transmission {
+        let Some(Settings { transmission, layout, .. }) = self.settings else { return };
+        match transmission {
             Transmission::SyncCyclic(_) if self.is_sent_with(sync) => self.send(image, turn),
             Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, turn),
-            Transmission::SyncRemote => self.data = Some(settings.layout.gather(image)),
+            Transmission::SyncRemote => self.data = Some(layout.gather(image)),
             _ => (),
         }
     }

@@ -205,10 +205,9 @@ fn a_write_to_another_pdo_sends_nothing() {
     let mut bench = sender(DESTINATION);
     bench.nmt(1);
     mpdos(&mut bench);
+    bench.write32(0x1600, 1, 0x6200_0010).unwrap();
+    bench.write(0x1600, 0, &[1]).unwrap();
     for cob_id in [u32::from(RPDO), 0x8000_0000 | u32::from(RPDO)] {
-        bench.write(0x1600, 0, &[0]).unwrap();
-        bench.write32(0x1600, 1, 0x6200_0010).unwrap();
-        bench.write(0x1600, 0, &[1]).unwrap();
         bench.write32(0x1400, 1, cob_id).unwrap();
         bench.write(0x1400, 5, &[100, 0]).unwrap();
     }

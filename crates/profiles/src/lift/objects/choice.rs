@@ -1,0 +1,116 @@
+//! Which virtual devices the node is, in the image: the choice (2305h), what follows from it (1000h, 6000h), and the PDOs that
+//! each of them sends with a CAN-ID that only one device of the lift may have.
+
+use super::values::Fields;
+use crate::lift::devices::Devices;
+use crate::lift::position::UNITS;
+use canopen::dictionary::{Dictionary, Field};
+use canopen::sdo::Multiplexer;
+
+/// Where these values are.
+#[derive(Debug)]
+pub(super) struct Choice {
+    device_type: Field,
+    devices: Field,
+    count: Field,
+    types: [Field; Devices::KINDS],
+    load: CobId,
+    positions: [CobId; UNITS],
+}
+
+/// The COB-ID of a TPDO with a fixed CAN-ID.
+#[derive(Clone, Copy, Debug)]
+struct CobId(Field);
+
+/// Flag of a COB-ID: the PDO does not exist.
+const OFF: u32 = 1 << 31;
+
+impl CobId {
+    const fn of(d: &Dictionary, communication: u16) -> CobId {
+        CobId(d.field(communication, 1))
+    }
+
+    fn switch(self, is_on: bool, image: &mut [u8]) {
+        let CobId(field) = self;
+        let cob_id = field.u32(image) & !OFF | if is_on { 0 } else { OFF };
+        field.store(image, cob_id.to_le_bytes());
+    }
+}
+
+impl Choice {
+    pub(super) const fn new(d: &Dictionary) -> Choice {
+        Choice {
+            device_type: d.field(0x1000, 0),
+            devices: d.field(0x2305, 0),
+            count: d.field(0x6000, 0),
+            types: [d.field(0x6000, 1), d.field(0x6000, 2), d.field(0x6000, 3), d.field(0x6000, 4)],
+            load: CobId::of(d, 0x1901),
+            positions: [
+                CobId::of(d, 0x1906),
+                CobId::of(d, 0x1907),
+                CobId::of(d, 0x1980),
+                CobId::of(d, 0x1981),
+            ],
+        }
+    }
+
+    pub(super) fn devices(&self, image: &[u8]) -> Devices {
+        Devices(self.devices.u8(image))
+    }
+
+    /// Device type and list of virtual devices.
+    pub(super) fn show(&self, devices: Devices, image: &mut [u8]) {
+        self.device_type.store(image, devices.device_type().to_le_bytes());
+        self.types.iter().for_each(|at| at.store(image, [0; 2]));
+        let mut count = 0;
+        for (at, code) in self.types.iter().zip(devices.types()) {
+            at.store(image, code.to_le_bytes());
+            count += 1;
+        }
+        self.count.store(image, [count]);
+    }
+}
+
+impl Fields {
+    /// 2305h: the node is these virtual devices from now on.
+    pub(super) fn choose(&self, devices: Devices, image: &mut [u8]) {
+        self.choice.show(devices, image);
+        self.choice.load.switch(devices.has(Devices::LOAD), image);
+        for (number, unit) in self.units.iter().enumerate() {
+            self.switch_position(number, devices.has(Devices::POSITION) && unit.source.u8(image) != 0, image);
+        }
+    }
+
+    /// Switches the TPDO of a position unit on or off.
+    pub(super) fn switch_position(&self, number: usize, is_on: bool, image: &mut [u8]) {
+        if let Some(cob_id) = self.choice.positions.get(number) {
+            cob_id.switch(is_on, image);
+        }
+    }
+
+    /// Switches the TPDOs off of what the node is not.
+    pub(super) fn silence_others(&self, image: &mut [u8]) {
+        let devices = self.devices(image);
+        if !devices.has(Devices::LOAD) {
+            self.choice.load.switch(false, image);
+        }
+        for (number, unit) in self.units.iter().enumerate() {
+            if !devices.has(Devices::POSITION) || unit.source.u8(image) == 0 {
+                self.switch_position(number, false, image);
+            }
+        }
+    }
+
+    /// Whether an object is one of a virtual device, or of a unit of it, that is there.
+    pub(super) fn is_there(&self, at: Multiplexer, image: &[u8]) -> bool {
+        let devices = self.devices(image);
+        match at.index {
+            0x2313 | 0x6480 | 0x6482 => devices.has(Devices::LOAD),
+            0x2303 | 0x6383..=0x63C5 => {
+                let unit = self.units.get(usize::from(at.sub).wrapping_sub(1));
+                devices.has(Devices::POSITION) && unit.is_some_and(|unit| unit.source.u8(image) != 0)
+            }
+            _ => true,
+        }
+    }
+}
