@@ -29,6 +29,11 @@ pub struct Pair {
 impl Pair {
     const ANY: Pair = Pair { id: 0, mask: 0 };
 
+    /// All identifiers of a function code: those of all nodes (CiA 301, 7.3.5).
+    const fn of_all_nodes(id: u16) -> Pair {
+        Pair { id: id & FUNCTION, mask: FUNCTION }
+    }
+
     /// One identifier, data and remote frames.
     #[must_use]
     pub const fn exactly(id: u16) -> Pair {
@@ -68,17 +73,40 @@ pub fn everything() -> Banks {
 
 const EVERYTHING: Bank = Bank { fifo: Fifo::Services, pairs: [Pair::ANY; 2] };
 
-/// Adds banks for `ids`; false when there is no bank left.
-fn fill(banks: &mut Banks, fifo: Fifo, mut ids: impl Iterator<Item = u16>) -> bool {
+/// The function code in an identifier.
+const FUNCTION: u16 = 0x780;
+
+/// Adds banks for `ids`; false when there is no bank left. More identifiers of one function code than a few, in a row and
+/// ascending, are one pair for all nodes.
+fn fill(banks: &mut Banks, fifo: Fifo, ids: impl Iterator<Item = u16>) -> bool {
+    let mut half = None;
+    let mut add = |pair: Pair| match half.take() {
+        None => {
+            half = Some(pair);
+            true
+        }
+        Some(first) => banks.push(Bank { fifo, pairs: [first, pair] }).is_ok(),
+    };
+    let mut ids = ids.peekable();
     while let Some(first) = ids.next() {
-        let second = ids.next().unwrap_or(first);
-        let pairs = [Pair::exactly(first), Pair::exactly(second)];
-        if banks.push(Bank { fifo, pairs }).is_err() {
+        let mut last = first;
+        while let Some(next) = ids.next_if(|next| *next == last + 1 && next & FUNCTION == first & FUNCTION) {
+            last = next;
+        }
+        let is_added = if last - first >= MANY {
+            add(Pair::of_all_nodes(first))
+        } else {
+            (first..=last).all(|id| add(Pair::exactly(id)))
+        };
+        if !is_added {
             return false;
         }
     }
-    true
+    half.is_none_or(|pair| banks.push(Bank { fifo, pairs: [pair; 2] }).is_ok())
 }
+
+/// A longer run of identifiers is that of a service of all nodes.
+const MANY: u16 = 64;
 
 #[cfg(test)]
 mod tests {
@@ -103,6 +131,15 @@ mod tests {
             };
             assert_eq!(route(&banks, id), wanted, "{id:#x}");
         }
+    }
+
+    #[test]
+    fn a_service_of_all_nodes_is_one_pair() {
+        let process = [0x000, 0x080].into_iter().chain(0x501..=0x507).chain(0x501..=0x57F).chain([0x400]);
+        let banks = pack(process, [0x601].into_iter());
+        assert!((0x501..=0x57F).chain([0x000, 0x400]).all(|id| route(&banks, id) == Some(Fifo::Process)));
+        assert_eq!([0x601, 0x481, 0x580].map(|id| route(&banks, id)), [Some(Fifo::Services), None, None]);
+        assert!(banks.len() < 8);
     }
 
     #[test]

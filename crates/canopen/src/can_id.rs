@@ -26,6 +26,16 @@ impl CanId {
         CanId((function & 0x780) | (node & 0x7F) as u16)
     }
 
+    /// Whether a CAN-ID has the same function code, with the node-ID of any node.
+    pub(crate) const fn is_of_same_service(self, id: u16) -> bool {
+        id & 0x780 == self.0 & 0x780 && id & 0x7F != 0
+    }
+
+    /// The identifiers with this function code, one for each node.
+    pub(crate) fn of_all_nodes(self) -> impl Iterator<Item = CanId> {
+        (1..=0x7F).map(move |node| CanId::of_service(self.0, node))
+    }
+
     /// One of the two identifiers of LSS (CiA 305): 0 for the responses, 1 for the requests.
     pub(crate) const fn of_lss(direction: u16) -> CanId {
         CanId(0x7E4 | (direction & 1))

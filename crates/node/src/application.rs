@@ -118,6 +118,10 @@ impl Application for NodeApplication {
         self.profile.next_event(tpdo, image)
     }
 
+    fn takes_all_nodes(&self, rpdo: u16) -> bool {
+        self.profile.takes_all_nodes(rpdo)
+    }
+
     fn broadcasts(&self, at: Multiplexer, image: &[u8]) -> bool {
         self.profile.broadcasts(at, image)
     }

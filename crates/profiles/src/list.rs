@@ -383,6 +383,15 @@ macro_rules! personalities {
                 }
             }
 
+            /// As [`Profile::takes_all_nodes`]($crate::profile::Profile::takes_all_nodes).
+            #[must_use]
+            pub fn takes_all_nodes(&self, rpdo: u16) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.takes_all_nodes(rpdo),)+
+                }
+            }
+
             /// As [`Profile::broadcasts`]($crate::profile::Profile::broadcasts).
             #[must_use]
             pub fn broadcasts(&self, at: canopen::sdo::Multiplexer, image: &[u8]) -> bool {

@@ -127,6 +127,10 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         }
     }
 
+    fn takes_all_nodes(&self, rpdo: u16) -> bool {
+        self.0.takes_all_nodes(rpdo) || self.1.takes_all_nodes(rpdo)
+    }
+
     fn broadcasts(&self, at: Multiplexer, image: &[u8]) -> bool {
         self.0.broadcasts(at, image) && self.1.broadcasts(at, image)
     }

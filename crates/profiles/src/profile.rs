@@ -98,6 +98,11 @@ pub trait Profile: Sized {
         false
     }
 
+    /// Whether this RPDO, a multiplexed one, takes the frames of all nodes.
+    fn takes_all_nodes(&self, _rpdo: u16) -> bool {
+        false
+    }
+
     /// Whether a multiplexed PDO tells this object to all nodes.
     fn broadcasts(&self, _at: Multiplexer, _image: &[u8]) -> bool {
         true

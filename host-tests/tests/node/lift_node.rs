@@ -316,6 +316,41 @@ fn the_call_controller_asks_for_all_inputs() {
     assert_eq!(hold(&mut bench, [true, false], 5), [(5, 1), (2, 0)]);
 }
 
+/// The multiplexed PDO with which this node sets an object of the others.
+fn set(bench: &mut Bench, producer: u16, (index, sub): (u16, u8), value: u32) {
+    let at = Multiplexer { index, sub };
+    let mpdo = Mpdo { address: Address::Destination(None), at, data: value.to_le_bytes() };
+    bench.receive(&Frame::new(0x500 + producer, &mpdo.encode()).unwrap());
+}
+
+#[test]
+fn multiplexed_pdos_of_all_nodes_are_taken() {
+    let mut bench = operational();
+    for producer in 1..=127 {
+        set(&mut bench, producer, (0x2322, 1), producer.into());
+        assert_eq!(number(&mut bench, 0x2322, 1), producer.into());
+    }
+    bench.write(0x1401, 1, &0x8000_0501_u32.to_le_bytes()).unwrap();
+    for (producer, lamp) in [(8, 127), (127, 127), (1, 127), (2, 2)] {
+        set(&mut bench, producer, (0x2322, 1), producer.into());
+        assert_eq!(number(&mut bench, 0x2322, 1), lamp, "node {producer}: 1401h is off, 1402h has its own");
+    }
+}
+
+/// Limits of the load, a preset: a controller need not ask by SDO.
+#[test]
+fn objects_of_the_profile_are_set_by_a_multiplexed_pdo() {
+    let mut bench = operational();
+    set(&mut bench, 20, (0x6483, 4), 650);
+    assert_eq!(number(&mut bench, 0x6483, 4), 650);
+    set(&mut bench, 20, (0x6382, 1), 5000);
+    bench.poll();
+    position(&mut bench, 0);
+    assert_eq!(number(&mut bench, 0x6383, 1), 5000);
+    set(&mut bench, 20, (0x6382, 2), 5000);
+    assert_eq!(number(&mut bench, 0x6383, 2), 0, "there is no unit 2: left out");
+}
+
 #[test]
 fn a_position_outlives_a_power_cut_in_which_the_car_has_not_moved() {
     let mut bench = operational();

@@ -75,6 +75,12 @@ pub trait Application {
         false
     }
 
+    /// Whether a multiplexed RPDO takes the frames of all nodes with the function code of its CAN-ID, and not only those of one
+    /// node: CiA 417 has one such RPDO for each of 127 producers. Nodes that have an RPDO of their own are left to that one.
+    fn takes_all_nodes(&self, _rpdo: u16) -> bool {
+        false
+    }
+
     /// Whether a multiplexed TPDO in destination address mode tells this object to all nodes. An application says no for the
     /// objects of a part of the device that is not there. Asked whenever the TPDO is configured, and after a write to an entry
     /// that is [`handled`](crate::dictionary::Object::handled).

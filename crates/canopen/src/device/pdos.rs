@@ -162,11 +162,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 self.first_tpdos.prepend(Chain::Synchronous, place);
             }
         }
-        self.rpdo_filter = 0;
+        (self.rpdo_filter, self.all_nodes) = (0, None);
         for (place, rpdo) in self.rpdos.iter_mut().enumerate().rev() {
             rpdo.links = self.first_rpdos;
             let Some(id) = rpdo.id() else { continue };
             self.rpdo_filter |= filter_bit(id.get());
+            if rpdo.is_multiplexed() && self.application.takes_all_nodes((rpdo.index & 0x1FF) + 1) {
+                self.rpdo_filter = u32::MAX;
+                self.all_nodes = u16::try_from(place).ok().map(|place| (id, place));
+            }
             self.first_rpdos.prepend(Chain::Valid, place);
             if rpdo.is_synchronous() {
                 self.first_rpdos.prepend(Chain::Synchronous, place);

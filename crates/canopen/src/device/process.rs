@@ -129,7 +129,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub fn process_ids(&self) -> impl Iterator<Item = CanId> {
         let received = self.core.rpdos.iter().filter_map(Rpdo::id);
         let requests = self.core.tpdos.iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
-        [CanId::NMT, self.core.sync.id()].into_iter().chain(received).chain(requests.map(|tpdo| tpdo.id))
+        let all_nodes = self.core.all_nodes.into_iter().flat_map(|(id, _)| id.of_all_nodes());
+        let own = [CanId::NMT, self.core.sync.id()].into_iter().chain(received);
+        own.chain(requests.map(|tpdo| tpdo.id)).chain(all_nodes)
     }
 }
 

@@ -14,13 +14,20 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if self.rpdo_filter & filter_bit(frame.id()) == 0 {
             return;
         }
-        let mut links = self.first_rpdos;
+        let (mut links, mut is_taken) = (self.first_rpdos, false);
         while let Some(rpdo) = self.rpdos.get(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
             if rpdo.id().is_some_and(|id| id.get() == frame.id()) {
+                is_taken = true;
                 self.take_rpdo(place, frame, now);
             }
+        }
+        match self.all_nodes {
+            Some((id, place)) if !is_taken && id.is_of_same_service(frame.id()) => {
+                self.take_rpdo(place.into(), frame, now);
+            }
+            _ => (),
         }
     }
 

@@ -26,17 +26,12 @@ impl Devices {
 
     /// Their types as 6000h lists them, in ascending order: bits 16 to 31 of 1000h in a device that is one of them only.
     pub fn types(self) -> impl Iterator<Item = u16> {
-        let all = [
-            (Devices::INPUT_PANEL, 0x0200),
-            (Devices::OUTPUT_PANEL, 0x0300),
-            (Devices::POSITION, 0x0600),
-            (Devices::LOAD, 0x0A00),
-        ];
-        all.into_iter().filter(move |(device, _)| self.has(*device)).map(|(_, code)| code)
+        TYPES.iter().filter(move |(device, _)| self.has(*device)).map(|(_, code)| *code)
     }
 
     /// Device type (1000h): the virtual device that the node is, or 0 in the upper half for several or none.
     #[must_use]
+    #[inline(never)]
     pub fn device_type(self) -> u32 {
         let mut types = self.types();
         let only = match (types.next(), types.next()) {
@@ -46,6 +41,14 @@ impl Devices {
         u32::from(only) << 16 | PROFILE
     }
 }
+
+/// The type of each virtual device.
+static TYPES: [(Devices, u16); Devices::KINDS] = [
+    (Devices::INPUT_PANEL, 0x0200),
+    (Devices::OUTPUT_PANEL, 0x0300),
+    (Devices::POSITION, 0x0600),
+    (Devices::LOAD, 0x0A00),
+];
 
 /// The number of the profile.
 pub const PROFILE: u32 = 417;

@@ -60,6 +60,7 @@ impl Calls {
     }
 
     /// What to tell next.
+    #[inline(never)]
     pub fn next(&mut self) -> Option<Contact> {
         if let Some(change) = self.changes.pop_front() {
             return Some(change);

@@ -68,6 +68,7 @@ impl Word {
 
     /// Whether `output` is for a lamp that has this word.
     #[must_use]
+    #[inline(never)]
     pub fn is_meant_by(self, output: Word) -> bool {
         if self.function() != output.function() || self.sub_function() != output.sub_function() {
             return false;
@@ -81,6 +82,7 @@ impl Word {
 
     /// Whether `command`, as a command of the call controller, asks the input with this word for its state.
     #[must_use]
+    #[inline(never)]
     pub fn is_asked_by(self, command: Word) -> bool {
         let is_kind = match command.sub_function() {
             0x00 => true,

@@ -30,10 +30,11 @@ impl CobId {
         CobId(d.field(communication, 1))
     }
 
+    #[inline(never)]
     fn switch(self, is_on: bool, image: &mut [u8]) {
         let CobId(field) = self;
         let cob_id = field.u32(image) & !OFF | if is_on { 0 } else { OFF };
-        field.store(image, cob_id.to_le_bytes());
+        field.set(image, &cob_id.to_le_bytes());
     }
 }
 
@@ -59,20 +60,23 @@ impl Choice {
     }
 
     /// Device type and list of virtual devices.
+    #[inline(never)]
     pub(super) fn show(&self, devices: Devices, image: &mut [u8]) {
-        self.device_type.store(image, devices.device_type().to_le_bytes());
-        self.types.iter().for_each(|at| at.store(image, [0; 2]));
+        self.device_type.set(image, &devices.device_type().to_le_bytes());
+        let mut types = devices.types();
         let mut count = 0;
-        for (at, code) in self.types.iter().zip(devices.types()) {
-            at.store(image, code.to_le_bytes());
-            count += 1;
+        for at in &self.types {
+            let code = types.next();
+            count += u8::from(code.is_some());
+            at.set(image, &code.unwrap_or(0).to_le_bytes());
         }
-        self.count.store(image, [count]);
+        self.count.set(image, &[count]);
     }
 }
 
 impl Fields {
     /// 2305h: the node is these virtual devices from now on.
+    #[inline(never)]
     pub(super) fn choose(&self, devices: Devices, image: &mut [u8]) {
         self.choice.show(devices, image);
         self.choice.load.switch(devices.has(Devices::LOAD), image);
@@ -82,6 +86,7 @@ impl Fields {
     }
 
     /// Switches the TPDO of a position unit on or off.
+    #[inline(never)]
     pub(super) fn switch_position(&self, number: usize, is_on: bool, image: &mut [u8]) {
         if let Some(cob_id) = self.choice.positions.get(number) {
             cob_id.switch(is_on, image);
@@ -89,6 +94,7 @@ impl Fields {
     }
 
     /// Switches the TPDOs off of what the node is not.
+    #[inline(never)]
     pub(super) fn silence_others(&self, image: &mut [u8]) {
         let devices = self.devices(image);
         if !devices.has(Devices::LOAD) {
@@ -102,6 +108,7 @@ impl Fields {
     }
 
     /// Whether an object is one of a virtual device, or of a unit of it, that is there.
+    #[inline(never)]
     pub(super) fn is_there(&self, at: Multiplexer, image: &[u8]) -> bool {
         let devices = self.devices(image);
         match at.index {

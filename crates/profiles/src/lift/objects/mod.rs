@@ -69,6 +69,8 @@ pub struct Objects {
 /// TPDO of virtual inputs, RPDO of virtual outputs.
 const INPUTS: u16 = 130;
 const OUTPUTS: u16 = 257;
+/// The RPDO that takes the multiplexed PDOs of all nodes that have none of their own.
+const MULTIPLEXED: u16 = 2;
 
 impl Profile for Objects {
     type Chain = Lift;
@@ -134,6 +136,10 @@ impl Profile for Objects {
     fn next_event(&mut self, _: u16, image: &mut [u8]) -> bool {
         self.fields.devices(image).has(Devices::INPUT_PANEL)
             && self.fields.panel.next_call(&mut self.calls, image)
+    }
+
+    fn takes_all_nodes(&self, rpdo: u16) -> bool {
+        rpdo == MULTIPLEXED
     }
 
     fn broadcasts(&self, at: Multiplexer, image: &[u8]) -> bool {

@@ -1,7 +1,7 @@
 //! The panel in the image: words of buttons and lamps, the virtual input and output.
 
-use super::values::{differ, pair};
-use crate::lift::panel::{BUTTONS, Calls, LAMPS};
+use super::values::pair;
+use crate::lift::panel::{BUTTONS, Calls, Contact, LAMPS};
 use crate::lift::word::{Light, Word};
 use canopen::dictionary::{Dictionary, Field};
 
@@ -45,16 +45,17 @@ impl PanelFields {
     }
 
     /// Puts the next call into the virtual input; whether there was one. A button that is not used has none.
+    #[inline(never)]
     pub(super) fn next_call(&self, calls: &mut Calls, image: &mut [u8]) -> bool {
-        while let Some(contact) = calls.next() {
-            let button = usize::from(contact.button);
-            let (Some(words), Some(enabled)) = (self.buttons.get(button), self.enabled.get(button)) else {
-                continue;
+        while let Some(Contact { button, is_pressed }) = calls.next() {
+            let place = usize::from(button);
+            let (Some(words), Some(enabled)) = (self.buttons.get(place), self.enabled.get(place)) else {
+                return false;
             };
-            if differ(*words, image) && enabled.u32(image) & 1 != 0 {
-                let [released, pressed] = words;
-                let word = if contact.is_pressed { pressed } else { released };
-                self.input.store(image, word.load::<6>(image));
+            let [released, pressed] = [words[0], words[1]].map(|at| word(at, image));
+            if released != pressed && enabled.u32(image) & 1 != 0 {
+                let Word(told) = if is_pressed { pressed } else { released };
+                self.input.set(image, &told);
                 return true;
             }
         }
@@ -62,19 +63,19 @@ impl PanelFields {
     }
 
     /// 6100h: an input with the public structure has the same word for both of its states, but for the state.
+    #[inline(never)]
     pub(super) fn take_input(&self, button: usize, bytes: &[u8], image: &mut [u8]) {
-        let (Some(words), Ok(word)) = (self.buttons.get(button), bytes.try_into()) else { return };
-        for (at, is_set) in words.iter().zip([false, true]) {
-            let Word(word) = Word(word).with_state(is_set);
-            at.store(image, word);
-        }
+        let (Some([released, pressed]), Ok(word)) = (self.buttons.get(button), bytes.try_into()) else { return };
+        released.set(image, &Word(word).with_state(false).0);
+        pressed.set(image, &Word(word).with_state(true).0);
     }
 
     /// A command in the virtual output asks inputs for their states.
+    #[inline(never)]
     pub(super) fn answer(&self, calls: &mut Calls, image: &[u8]) {
-        let command = Word(self.output.load(image));
+        let command = word(self.output, image);
         for (button, [released, _]) in self.buttons.iter().enumerate() {
-            if Word(released.load(image)).is_asked_by(command) {
+            if word(*released, image).is_asked_by(command) {
                 calls.ask(button);
             }
         }
@@ -82,21 +83,13 @@ impl PanelFields {
 
     /// Does what a virtual output says to the lamps. To be called for every frame that brings one, the same one too: somebody
     /// else may have changed the lamp since.
+    #[inline(never)]
     pub(super) fn follow_output(&self, states: &mut LampStates, image: &mut [u8]) {
-        let output = self.output.load(image);
-        for ((words, answer), (lamp, lit_by)) in
-            self.lamp_words.iter().zip(&self.answers).zip(self.lamps.iter().zip(&mut states.lit_by))
-        {
-            let [off, on]: [[u8; 6]; 2] = words.map(|at| at.load(image));
-            match (output == on, output == off) {
-                (true, false) => lamp.store(image, [Light::ON.0]),
-                (false, true) => lamp.store(image, [Light::OFF.0]),
-                _ => {}
-            }
-            let (own, output) = (Word(answer.load(image)), Word(output));
-            if own != Word::default() && own.is_meant_by(output) {
-                let light = follow(lit_by, own.lifts() & output.lifts(), output.light());
-                lamp.store(image, [light.unwrap_or(Light(lamp.u8(image))).0]);
+        let output = word(self.output, image);
+        let lamps = self.lamp_words.iter().zip(&self.answers).zip(self.lamps.iter().zip(&mut states.lit_by));
+        for (([off, on], answer), (lamp, lit_by)) in lamps {
+            if let Some(Light(light)) = says([*off, *on, *answer], output, lit_by, image) {
+                lamp.set(image, &[light]);
             }
         }
     }
@@ -109,6 +102,7 @@ impl PanelFields {
     }
 
     /// A millisecond passes: pulses end.
+    #[inline(never)]
     pub(super) fn pass(&self, states: &mut LampStates, image: &mut [u8]) {
         states.milliseconds = states.milliseconds.wrapping_add(1);
         for (lamp, left) in self.lamps.iter().zip(&mut states.pulse) {
@@ -124,9 +118,24 @@ impl PanelFields {
     }
 
     /// Which lamps are lit.
+    #[inline(never)]
     pub(super) fn lit(&self, states: &LampStates, image: &[u8]) -> [bool; LAMPS] {
         self.lamps.map(|lamp| Light(lamp.u8(image)).is_lit(states.milliseconds))
     }
+}
+
+/// What an output says to the lamp with these words: one that puts it out, one that lights it, one that it answers to.
+#[inline(never)]
+fn says(words: [Field; 3], output: Word, lit_by: &mut u8, image: &[u8]) -> Option<Light> {
+    let [off, on, own] = words.map(|at| word(at, image));
+    if own != Word::default() && own.is_meant_by(output) {
+        return follow(lit_by, own.lifts() & output.lifts(), output.light());
+    }
+    if off == on {
+        return None;
+    }
+    let light = if output == on { Light::ON } else { Light::OFF };
+    (output == on || output == off).then_some(light)
 }
 
 /// What becomes of a lamp when these lifts light it or put it out; `None` when others still light it.
@@ -137,4 +146,10 @@ fn follow(lit_by: &mut u8, lifts: u8, light: Light) -> Option<Light> {
     }
     *lit_by |= lifts;
     Some(light)
+}
+
+/// Not inlined: this crate is compiled for speed, and what happens at a call is in no hurry.
+#[inline(never)]
+fn word(at: Field, image: &[u8]) -> Word {
+    Word(at.load(image))
 }

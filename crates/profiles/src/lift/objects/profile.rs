@@ -15,6 +15,11 @@ const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object
     Object::new(index, sub, name, kind, Access::ReadOnly)
 }
 
+/// What another device of the lift may set by a multiplexed PDO.
+const fn taken(row: Object) -> Object {
+    row.mappable(Mapping::Rpdo)
+}
+
 /// Process data: in a PDO of its own, or in the multiplexed one.
 const fn sent(row: Object) -> Object {
     row.mappable(Mapping::Tpdo)
@@ -37,11 +42,11 @@ macro_rules! units {
 const POSITION: &str = "6384h:1";
 
 const fn operating(sub: u8, name: &'static str) -> Object {
-    handled(0x6380, sub, name, Type::Unsigned16)
+    taken(handled(0x6380, sub, name, Type::Unsigned16))
 }
 
 const fn preset(sub: u8, name: &'static str) -> Object {
-    handled(0x6382, sub, name, Type::Unsigned32).unit(POSITION)
+    taken(handled(0x6382, sub, name, Type::Unsigned32)).unit(POSITION)
 }
 
 const fn position(sub: u8, name: &'static str) -> Object {
@@ -54,11 +59,11 @@ const fn speed(sub: u8, name: &'static str) -> Object {
 }
 
 const fn low_limit(sub: u8, name: &'static str) -> Object {
-    parameter(0x63B4, sub, name, Type::Integer32).unit(POSITION)
+    taken(parameter(0x63B4, sub, name, Type::Integer32)).unit(POSITION)
 }
 
 const fn high_limit(sub: u8, name: &'static str) -> Object {
-    parameter(0x63B8, sub, name, Type::Integer32).value(0x7FFF_FFFF).unit(POSITION)
+    taken(parameter(0x63B8, sub, name, Type::Integer32)).value(0x7FFF_FFFF).unit(POSITION)
 }
 
 const fn operating_status(sub: u8, name: &'static str) -> Object {
@@ -82,7 +87,7 @@ const fn warnings(sub: u8, name: &'static str) -> Object {
 }
 
 const fn limit(sub: u8, name: &'static str) -> Object {
-    parameter(0x6483, sub, name, Type::Unsigned16).unit("kg")
+    taken(parameter(0x6483, sub, name, Type::Unsigned16)).unit("kg")
 }
 
 /// 0 behind the last of the list.
@@ -146,6 +151,6 @@ pub(super) const PARTS: &[&[Object]] = &[
         limit(2, "Half load limit"),
         limit(3, "Full load limit"),
         limit(4, "Overload limit"),
-        handled(0x6486, 0, "Car reference weight", Type::Unsigned16).unit("kg"),
+        taken(handled(0x6486, 0, "Car reference weight", Type::Unsigned16)).unit("kg"),
     ],
 ];

@@ -188,10 +188,6 @@ pub(super) const fn pair(d: &Dictionary, index: u16, first: u8) -> [Field; 2] {
     [d.field(index, first), d.field(index, first + 1)]
 }
 
-pub(super) fn differ([a, b]: [Field; 2], image: &[u8]) -> bool {
-    a.get(image) != b.get(image)
-}
-
 fn integer(field: Field, image: &[u8]) -> i32 {
     i32::from_le_bytes(field.load(image))
 }
