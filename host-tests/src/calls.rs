@@ -46,7 +46,8 @@ pub fn verify(transitions: &[Transition], log: &[Transition], lag: u64) -> Resul
                 None => next.push(state),
             };
             let follows = transitions[told..made].first();
-            if follows.is_some_and(|other| (other.button, other.is_pressed) == (word.button, word.is_pressed)) {
+            if follows.is_some_and(|other| (other.button, other.is_pressed) == (word.button, word.is_pressed))
+            {
                 add((told + 1, is_half, Verdict { told: verdict.told + 1, ..verdict }));
             }
             let is_so = |at: usize| level(&transitions[..at], word.button) == word.is_pressed;
@@ -85,8 +86,7 @@ mod tests {
         Transition { at, button, is_pressed }
     }
 
-    const HAPPENED: [Transition; 4] =
-        [at(10, 0, true), at(20, 1, true), at(30, 0, false), at(40, 1, false)];
+    const HAPPENED: [Transition; 4] = [at(10, 0, true), at(20, 1, true), at(30, 0, false), at(40, 1, false)];
 
     fn later(transition: Transition) -> Transition {
         Transition { at: transition.at + 100, ..transition }
@@ -111,7 +111,10 @@ mod tests {
         twice.insert(1, log[0]);
         assert!(verify(&HAPPENED, &twice, 0).is_err());
         assert!(verify(&HAPPENED, &[log[1], log[0], log[2], log[3]], 0).is_err(), "another order");
-        assert!(verify(&HAPPENED, &[at(5, 0, true), log[1], log[2], log[3]], 0).is_err(), "before it happened");
+        assert!(
+            verify(&HAPPENED, &[at(5, 0, true), log[1], log[2], log[3]], 0).is_err(),
+            "before it happened"
+        );
     }
 
     #[test]

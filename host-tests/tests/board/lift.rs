@@ -229,7 +229,8 @@ fn random_presses_on_a_full_bus_with_bus_off_in_between() {
     world.run_until(world.now() + SECOND * 12);
     frames.extend(world.take_frames());
     for (happened, node) in happened.iter().zip(NODES) {
-        let verdict = verify(happened, &told(&frames, node), 20_000_000).unwrap_or_else(|error| panic!("{error}"));
+        let verdict =
+            verify(happened, &told(&frames, node), 20_000_000).unwrap_or_else(|error| panic!("{error}"));
         println!("node {node}: {} transitions, {verdict:?}", happened.len());
         assert!(verdict.told > 0 && verdict.full_states > 1, "{verdict:?}");
     }

@@ -43,10 +43,8 @@ pub(crate) fn every_frame_is_known(log: &[Stamped]) {
         }
     }
     let pdos: Vec<u16> = counts.keys().copied().filter(|id| by_cob_id((*id).into()).is_some()).collect();
-    let expected = [
-        0x182, 0x183, 0x188, 0x18C, 0x200, 0x201, 0x202, 0x205, 0x206, 0x400, 0x491, 0x507, 0x510,
-        0x511,
-    ];
+    let expected =
+        [0x182, 0x183, 0x188, 0x18C, 0x200, 0x201, 0x202, 0x205, 0x206, 0x400, 0x491, 0x507, 0x510, 0x511];
     assert_eq!(pdos, expected, "each device sends its own and nobody sends another's");
 }
 

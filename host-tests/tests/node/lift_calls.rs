@@ -32,6 +32,10 @@ impl Mailboxes for Boxes {
         self.0.push(*frame);
         if self.0.len() <= 3 { Offer::Taken } else { Offer::Replaced(self.0.remove(0)) }
     }
+
+    fn is_idle(&self) -> bool {
+        self.0.is_empty()
+    }
 }
 
 /// What the bus does for a while.

@@ -200,7 +200,8 @@ impl Tpdo {
 
     /// Whether it is the turn of a cyclic synchronous PDO.
     fn is_sent_with(&mut self, sync: Sync) -> bool {
-        let Some(Settings { transmission: Transmission::SyncCyclic(every), sync_start, .. }) = self.settings else {
+        let Some(Settings { transmission: Transmission::SyncCyclic(every), sync_start, .. }) = self.settings
+        else {
             return false;
         };
         self.is_counting |= sync.counter.is_none_or(|counter| [0, counter].contains(&sync_start));

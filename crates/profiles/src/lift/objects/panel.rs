@@ -65,7 +65,9 @@ impl PanelFields {
     /// 6100h: an input with the public structure has the same word for both of its states, but for the state.
     #[inline(never)]
     pub(super) fn take_input(&self, button: usize, bytes: &[u8], image: &mut [u8]) {
-        let (Some([released, pressed]), Ok(word)) = (self.buttons.get(button), bytes.try_into()) else { return };
+        let (Some([released, pressed]), Ok(word)) = (self.buttons.get(button), bytes.try_into()) else {
+            return;
+        };
         released.set(image, &Word(word).with_state(false).0);
         pressed.set(image, &Word(word).with_state(true).0);
     }

@@ -3,8 +3,8 @@ use crate::board::{Inputs, RawEncoder, RawSample};
 use crate::communication::{TRANSFER_BUFFER, personality};
 use crate::lift::catalogue::{CobId, Content, PDOS as CATALOGUE};
 use crate::lift::load::{FULL_LOAD, OVERLOAD, ZERO_LOAD};
-use crate::lift::word::Light;
 use crate::lift::position::{INVERTED, UNKNOWN};
+use crate::lift::word::Light;
 use crate::lift::{Lift, Parameters};
 use crate::pressure::objects::CALIBRATION;
 use crate::profile::Chain;
@@ -450,9 +450,8 @@ fn a_lamp_answers_to_its_lifts_and_flashes() {
 fn the_choice_of_virtual_devices() {
     let mut node = Node::new();
     let list = |node: &Node| [0, 1, 2, 3, 4].map(|sub| node.read(0x6000, sub));
-    let on = |node: &Node| {
-        [0x1901, 0x1906, 0x1907, 0x1980, 0x1981].map(|index| node.read(index, 1) >> 31 == 0)
-    };
+    let on =
+        |node: &Node| [0x1901, 0x1906, 0x1907, 0x1980, 0x1981].map(|index| node.read(index, 1) >> 31 == 0);
     assert_eq!((node.read(0x1000, 0), list(&node), on(&node)), (0x1A1, [0; 5], [false; 5]), "as delivered");
     for (chosen, device_type, types, valid) in [
         (1, 0x0600_01A1, [1, 0x0600, 0, 0, 0], [false, true, false, false, false]),

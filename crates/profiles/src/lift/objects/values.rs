@@ -1,5 +1,7 @@
 //! Measured values into the image, parameters out of it.
 
+use super::choice::Choice;
+use super::panel::PanelFields;
 use crate::encoder::Area;
 use crate::encoder::objects::Sensors;
 use crate::lift::devices::Devices;
@@ -7,8 +9,6 @@ use crate::lift::load::{self, Point};
 use crate::lift::position::{self, Source, UNITS, UnitParameters, UnitValues};
 use crate::lift::{Parameters, Snapshot};
 use crate::pressure::objects::Places;
-use super::choice::Choice;
-use super::panel::PanelFields;
 use canopen::dictionary::{Dictionary, Field};
 use core::num::{NonZeroU16, NonZeroU32};
 
