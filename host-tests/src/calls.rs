@@ -82,7 +82,7 @@ fn level(transitions: &[Transition], button: usize) -> bool {
 mod tests {
     use super::*;
 
-    fn at(at: u64, button: usize, is_pressed: bool) -> Transition {
+    const fn at(at: u64, button: usize, is_pressed: bool) -> Transition {
         Transition { at, button, is_pressed }
     }
 

@@ -9,6 +9,9 @@ impl CanId {
     /// NMT commands (CiA 301, 7.3.5).
     pub const NMT: CanId = CanId(0x000);
 
+    /// The function code in an identifier of the pre-defined connection set.
+    pub(crate) const FUNCTION: u16 = 0x780;
+
     /// `None` above 7FFh.
     #[must_use]
     pub const fn new(id: u16) -> Option<CanId> {
@@ -28,7 +31,7 @@ impl CanId {
 
     /// Whether a CAN-ID has the same function code, with the node-ID of any node.
     pub(crate) const fn is_of_same_service(self, id: u16) -> bool {
-        id & 0x780 == self.0 & 0x780 && id & 0x7F != 0
+        (id ^ self.0) & Self::FUNCTION == 0 && id & 0x7F != 0
     }
 
     /// The identifiers with this function code, one for each node.

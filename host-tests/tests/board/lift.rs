@@ -89,6 +89,23 @@ fn buttons_are_virtual_inputs_and_lamps_follow_virtual_outputs() {
     }
 }
 
+/// Of a node that has no RPDO of its own here: its frames pass the filters of the controller.
+#[test]
+fn multiplexed_pdos_of_any_node_light_a_lamp() {
+    let mut world = world("--bitrate 1000 --node 1:lift");
+    let master = Master::join(&mut world);
+    world.run_until(SECOND);
+    master.send(&mut world, START_ALL.0, &START_ALL.1);
+    for (producer, lit) in [(8, 1), (0, 0), (64, 0), (127, 1), (2, 0)] {
+        if producer != 0 {
+            master.send(&mut world, 0x500 + producer, &[0x80, 0x22, 0x23, 1, lit, 0, 0, 0]);
+        }
+        world.run_until(world.now() + Time::from_millis(2));
+        let expected = if producer == 0 { 1 } else { lit };
+        assert_eq!(lamps(&mut world)[0], expected == 1, "node {producer}");
+    }
+}
+
 /// The frames with these CAN-IDs, which have one producer in a lift.
 fn fixed(world: &mut World, ids: [u16; 2]) -> [usize; 2] {
     let frames = world.take_frames();

@@ -2,7 +2,6 @@
 
 use super::{Application, Core, STALE};
 use crate::pdo::Chain;
-use crate::sync::Sync;
 use crate::transmit::Turn;
 use crate::{Instant, Transmit};
 
@@ -44,11 +43,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// A SYNC sends one event of each TPDO that the SYNC concerns.
-    pub(super) fn send_events_with_sync(&mut self, sync: Sync, turn: &mut Turn<'_, impl Transmit>) {
+    pub(super) fn send_events_with_sync(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let mut links = self.first_tpdos;
         while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Synchronous)) {
             links = tpdo.links;
-            if let Some(number) = tpdo.asks_with_sync(sync) {
+            if let Some(number) = tpdo.asks_with_sync() {
                 let is_event = self.application.next_event(number, &mut self.image);
                 tpdo.take_event(is_event, &self.image, turn);
             }

@@ -127,11 +127,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
     pub fn process_ids(&self) -> impl Iterator<Item = CanId> {
+        let all_nodes = self.core.all_nodes.into_iter().flat_map(|(id, _)| id.of_all_nodes());
+        self.own_process_ids().chain(all_nodes)
+    }
+
+    /// The same for acceptance filters: identifiers, and the bits of them that count. With an RPDO for all nodes
+    /// ([`Application::takes_all_nodes`]) they are fewer by far.
+    pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
+        let all_nodes = self.core.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
+        self.own_process_ids().map(|id| (id, 0x7FF)).chain(all_nodes)
+    }
+
+    fn own_process_ids(&self) -> impl Iterator<Item = CanId> {
         let received = self.core.rpdos.iter().filter_map(Rpdo::id);
         let requests = self.core.tpdos.iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
-        let all_nodes = self.core.all_nodes.into_iter().flat_map(|(id, _)| id.of_all_nodes());
-        let own = [CanId::NMT, self.core.sync.id()].into_iter().chain(received);
-        own.chain(requests.map(|tpdo| tpdo.id)).chain(all_nodes)
+        [CanId::NMT, self.core.sync.id()].into_iter().chain(received).chain(requests.map(|tpdo| tpdo.id))
     }
 }
 

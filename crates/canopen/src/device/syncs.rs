@@ -45,7 +45,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         });
         if self.tells_events {
-            self.send_events_with_sync(sync, turn);
+            self.send_events_with_sync(turn);
         }
         self.process_due = self.process_due.min(self.sync.due());
     }

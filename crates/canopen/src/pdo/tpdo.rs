@@ -183,19 +183,10 @@ impl Tpdo {
         }
     }
 
-    /// The same of a TPDO that tells events: its number, if it sends one with this SYNC.
-    pub(crate) fn asks_with_sync(&mut self, sync: Sync) -> Option<u16> {
-        let settings = self.settings.as_ref()?;
-        let (number, transmission) = (settings.events_of?, settings.transmission);
-        let is_sent = match transmission {
-            Transmission::SyncCyclic(_) => {
-                self.events.is_silent = true;
-                self.is_sent_with(sync)
-            }
-            Transmission::SyncAcyclic => true,
-            _ => false,
-        };
-        (is_sent && !self.pending).then_some(number)
+    /// The same of a TPDO that tells events: its number. A SYNC sends one event, whatever the type counts.
+    pub(crate) fn asks_with_sync(&self) -> Option<u16> {
+        let settings = self.settings.as_ref().filter(|_| !self.pending)?;
+        settings.events_of
     }
 
     /// Whether it is the turn of a cyclic synchronous PDO.

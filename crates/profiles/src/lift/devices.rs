@@ -24,31 +24,27 @@ impl Devices {
         self.0 & device.0 == device.0
     }
 
-    /// Their types as 6000h lists them, in ascending order: bits 16 to 31 of 1000h in a device that is one of them only.
+    /// Their types as 6000h lists them, in the order of their bits: bits 16 to 31 of 1000h in a device that is one of them only.
     pub fn types(self) -> impl Iterator<Item = u16> {
-        TYPES.iter().filter(move |(device, _)| self.has(*device)).map(|(_, code)| *code)
+        let mut rest = self.0 & Devices::ALL.0;
+        core::iter::from_fn(move || {
+            let place = (rest != 0).then_some(rest.trailing_zeros())?;
+            rest &= rest - 1;
+            Some(u16::from_be_bytes([CODES.to_le_bytes()[place as usize & 3], 0]))
+        })
     }
 
     /// Device type (1000h): the virtual device that the node is, or 0 in the upper half for several or none.
     #[must_use]
-    #[inline(never)]
     pub fn device_type(self) -> u32 {
-        let mut types = self.types();
-        let only = match (types.next(), types.next()) {
-            (Some(code), None) => code,
-            _ => 0,
-        };
-        u32::from(only) << 16 | PROFILE
+        let is_one = (self.0 & Devices::ALL.0).count_ones() == 1;
+        let code = self.types().next().filter(|_| is_one).unwrap_or(0);
+        u32::from(code) << 16 | PROFILE
     }
 }
 
-/// The type of each virtual device.
-static TYPES: [(Devices, u16); Devices::KINDS] = [
-    (Devices::INPUT_PANEL, 0x0200),
-    (Devices::OUTPUT_PANEL, 0x0300),
-    (Devices::POSITION, 0x0600),
-    (Devices::LOAD, 0x0A00),
-];
+/// The upper bytes of the types, in the order of the bits: car position, load measuring, input panel, output panel.
+const CODES: u32 = 0x0302_0A06;
 
 /// The number of the profile.
 pub const PROFILE: u32 = 417;
@@ -64,8 +60,8 @@ mod tests {
     }
 
     #[test]
-    fn the_list_has_them_in_ascending_order() {
-        assert_eq!(Devices::ALL.types().collect::<Vec<_>>(), [0x0200, 0x0300, 0x0600, 0x0A00]);
+    fn the_list_has_them_in_the_order_of_the_bits() {
+        assert_eq!(Devices::ALL.types().collect::<Vec<_>>(), [0x0600, 0x0A00, 0x0200, 0x0300]);
         assert_eq!(Devices(0).types().count(), 0);
     }
 }

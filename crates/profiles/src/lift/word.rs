@@ -61,6 +61,7 @@ impl Word {
 
     /// The word of an input that is set or not: bits 0 and 1 of the function data.
     #[must_use]
+    #[inline(never)]
     pub const fn with_state(self, is_set: bool) -> Word {
         let Word([a, b, c, d, e, data]) = self;
         Word([a, b, c, d, e, data & !0x03 | is_set as u8])
@@ -113,14 +114,13 @@ impl Word {
         let (property, parameter) = (data >> 1 & 0x07, data >> 4 & 0x07);
         match (data & 0x01, property) {
             (0, _) => Light::OFF,
-            (_, 2) => Light::pulse(parameter),
             (_, 3) => Light::flashing(parameter),
             _ => Light::ON,
         }
     }
 }
 
-/// How a lamp is lit, as 2322h says: 0 off, 10h to 17h flashing, 20h to 27h one pulse, any other value on.
+/// How a lamp is lit, as 2322h says: 0 off, 10h to 17h flashing, any other value on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Light(pub u8);
 
@@ -134,10 +134,6 @@ impl Light {
         Light(0x10 | parameter & 0x07)
     }
 
-    const fn pulse(parameter: u8) -> Light {
-        Light(0x20 | parameter & 0x07)
-    }
-
     /// Milliseconds of the period of a flashing lamp.
     #[must_use]
     pub const fn period(self) -> Option<u32> {
@@ -145,15 +141,9 @@ impl Light {
         if self.0 & 0xF8 == 0x10 { Some(PERIODS[(self.0 & 0x07) as usize]) } else { None }
     }
 
-    /// Milliseconds of a pulse.
-    #[must_use]
-    pub const fn duration(self) -> Option<u16> {
-        const DURATIONS: [u16; 8] = [500, 1000, 1500, 2000, 3000, 5000, 10_000, 15_000];
-        if self.0 & 0xF8 == 0x20 { Some(DURATIONS[(self.0 & 0x07) as usize]) } else { None }
-    }
-
     /// Whether the lamp is lit at this millisecond.
     #[must_use]
+    #[inline(never)]
     pub fn is_lit(self, millisecond: u32) -> bool {
         match self.period() {
             Some(period) => millisecond % period < period / 2,
@@ -231,8 +221,8 @@ mod tests {
             (0x03, Light::ON),
             (0x06, Light::OFF),
             (0x37, Light(0x13)),
-            (0x05, Light(0x20)),
-            (0xF5, Light(0x27)),
+            (0x05, Light::ON),
+            (0xF7, Light(0x17)),
         ] {
             assert_eq!(with(CAR, 5, data).light(), light, "{data:X}h");
         }
@@ -243,7 +233,6 @@ mod tests {
         let light = Light::flashing(3);
         assert_eq!([0, 249, 250, 499, 500].map(|at| light.is_lit(at)), [true, true, false, false, true]);
         assert!(Light(0xFF).is_lit(77));
-        assert_eq!(Light::pulse(7).duration(), Some(15_000));
     }
 
     #[test]

@@ -33,8 +33,7 @@ impl CobId {
     #[inline(never)]
     fn switch(self, is_on: bool, image: &mut [u8]) {
         let CobId(field) = self;
-        let cob_id = field.u32(image) & !OFF | if is_on { 0 } else { OFF };
-        field.set(image, &cob_id.to_le_bytes());
+        put(field, field.u32(image) & !OFF | if is_on { 0 } else { OFF }, image);
     }
 }
 
@@ -60,28 +59,37 @@ impl Choice {
     }
 
     /// Device type and list of virtual devices.
-    #[inline(never)]
-    pub(super) fn show(&self, devices: Devices, image: &mut [u8]) {
-        self.device_type.set(image, &devices.device_type().to_le_bytes());
+    fn show(&self, devices: Devices, image: &mut [u8]) {
+        put(self.device_type, devices.device_type(), image);
+        put(self.count, devices.types().count() as u32, image);
         let mut types = devices.types();
-        let mut count = 0;
         for at in &self.types {
-            let code = types.next();
-            count += u8::from(code.is_some());
-            at.set(image, &code.unwrap_or(0).to_le_bytes());
+            put(*at, types.next().unwrap_or(0).into(), image);
         }
-        self.count.set(image, &[count]);
     }
 }
 
+/// Not inlined: this crate is compiled for speed, and a choice is in no hurry.
+#[inline(never)]
+fn put(at: Field, value: u32, image: &mut [u8]) {
+    at.set(image, &value.to_le_bytes());
+}
+
 impl Fields {
-    /// 2305h: the node is these virtual devices from now on.
+    /// The node is these virtual devices from now on: it sends nothing of the others. `begins` is true for a new choice (2305h), which
+    /// switches on what is chosen, and false after a reset.
     #[inline(never)]
-    pub(super) fn choose(&self, devices: Devices, image: &mut [u8]) {
+    pub(super) fn choose(&self, devices: Devices, begins: bool, image: &mut [u8]) {
         self.choice.show(devices, image);
-        self.choice.load.switch(devices.has(Devices::LOAD), image);
-        for (number, unit) in self.units.iter().enumerate() {
-            self.switch_position(number, devices.has(Devices::POSITION) && unit.source.u8(image) != 0, image);
+        let has_load = devices.has(Devices::LOAD);
+        if begins || !has_load {
+            self.choice.load.switch(has_load, image);
+        }
+        for (unit, cob_id) in self.units.iter().zip(&self.choice.positions) {
+            let is_there = devices.has(Devices::POSITION) && unit.source.u8(image) != 0;
+            if begins || !is_there {
+                cob_id.switch(is_there, image);
+            }
         }
     }
 
@@ -90,20 +98,6 @@ impl Fields {
     pub(super) fn switch_position(&self, number: usize, is_on: bool, image: &mut [u8]) {
         if let Some(cob_id) = self.choice.positions.get(number) {
             cob_id.switch(is_on, image);
-        }
-    }
-
-    /// Switches the TPDOs off of what the node is not.
-    #[inline(never)]
-    pub(super) fn silence_others(&self, image: &mut [u8]) {
-        let devices = self.devices(image);
-        if !devices.has(Devices::LOAD) {
-            self.choice.load.switch(false, image);
-        }
-        for (number, unit) in self.units.iter().enumerate() {
-            if !devices.has(Devices::POSITION) || unit.source.u8(image) == 0 {
-                self.switch_position(number, false, image);
-            }
         }
     }
 

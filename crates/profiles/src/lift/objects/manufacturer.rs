@@ -80,7 +80,7 @@ pub(super) const OBJECTS: &[Object] = &[
     parameter(0x2321, 2, "Virtual output that lights lamp 1", Type::Unsigned48),
     parameter(0x2321, 3, "Virtual output that puts lamp 2 out", Type::Unsigned48),
     parameter(0x2321, 4, "Virtual output that lights lamp 2", Type::Unsigned48),
-    // Not 0: lit; 10h to 17h flashing, 20h to 27h for the time of one pulse. A multiplexed PDO may write it, and an SDO client.
+    // Not 0: lit; 10h to 17h flashing. A multiplexed PDO may write it, and an SDO client.
     Object::highest(0x2322, 2, "Lamps"),
     lamp(1, "Lamp 1"),
     lamp(2, "Lamp 2"),

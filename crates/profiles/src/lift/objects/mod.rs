@@ -91,7 +91,7 @@ impl Profile for Objects {
     fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
         self.fields.publish(snapshot, image);
         self.calls.observe(snapshot.buttons);
-        self.fields.panel.pass(&mut self.lamps, image);
+        self.lamps.milliseconds = self.lamps.milliseconds.wrapping_add(1);
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {

@@ -24,11 +24,9 @@ pub(super) struct PanelFields {
 /// The lamps beyond what the image says of them.
 #[derive(Debug, Default)]
 pub(super) struct LampStates {
-    milliseconds: u32,
+    pub(super) milliseconds: u32,
     /// The lifts that have lit a lamp: one of them does not put out what another one has lit.
     lit_by: [u8; LAMPS],
-    /// What is left of a pulse, in ms; 0 before its first.
-    pulse: [u16; LAMPS],
 }
 
 impl PanelFields {
@@ -98,24 +96,8 @@ impl PanelFields {
 
     /// A client has set a lamp: whoever has lit it before has no part in it any more.
     pub(super) fn forget_lamp(&self, lamp: usize, states: &mut LampStates) {
-        if let (Some(lit_by), Some(pulse)) = (states.lit_by.get_mut(lamp), states.pulse.get_mut(lamp)) {
-            (*lit_by, *pulse) = (0, 0);
-        }
-    }
-
-    /// A millisecond passes: pulses end.
-    #[inline(never)]
-    pub(super) fn pass(&self, states: &mut LampStates, image: &mut [u8]) {
-        states.milliseconds = states.milliseconds.wrapping_add(1);
-        for (lamp, left) in self.lamps.iter().zip(&mut states.pulse) {
-            let Some(duration) = Light(lamp.u8(image)).duration() else {
-                *left = 0;
-                continue;
-            };
-            *left = if *left == 0 { duration } else { *left - 1 };
-            if *left == 0 {
-                lamp.store(image, [Light::OFF.0]);
-            }
+        if let Some(lit_by) = states.lit_by.get_mut(lamp) {
+            *lit_by = 0;
         }
     }
 

@@ -59,7 +59,7 @@ impl Fields {
             Rule::Measure => self.measure_anew(entry.field(), bytes, image),
             Rule::Source => self.take_source(unit, entry.field(), bytes, image),
             Rule::Devices => {
-                self.choose(Devices(value.to_le_bytes()[0]), image);
+                self.choose(Devices(value.to_le_bytes()[0]), true, image);
                 Ok(())
             }
             Rule::Input => {

@@ -173,8 +173,7 @@ impl Fields {
     /// Fills in what follows from the parameters: which virtual devices the node is. One that it is not sends nothing, whatever
     /// else is stored.
     pub(crate) fn initialise(&self, image: &mut [u8]) {
-        self.choice.show(self.devices(image), image);
-        self.silence_others(image);
+        self.choose(self.devices(image), false, image);
     }
 
     /// The virtual devices that are chosen.
