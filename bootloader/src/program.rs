@@ -23,7 +23,6 @@ const IDENTITY: [Field; 4] = [
     DICTIONARY.field(0x1018, 4),
 ];
 const PROGRAM_CONTROL: Field = DICTIONARY.field(0x1F51, 1);
-const IDENTIFICATION: Field = DICTIONARY.field(0x1F56, 1);
 const STATUS: Field = DICTIONARY.field(0x1F57, 1);
 
 /// The update under way, as the application of the CANopen device.
@@ -50,8 +49,7 @@ impl Program {
 
     /// What the objects read now.
     pub(crate) fn readings(&self) -> Readings {
-        let identification = self.updater.identification().unwrap_or(0);
-        Readings { identification, status: self.updater.status() }
+        Readings { status: self.updater.status() }
     }
 
     fn control(&mut self, command: u8) -> Result<(), Abort> {
@@ -74,17 +72,14 @@ impl Program {
     }
 }
 
-/// What the objects of the program read.
+/// What the objects of the program read. 1F56h reads 0: no program runs.
 pub(crate) struct Readings {
-    /// CRC of the program that was downloaded and found good; 0 until then.
-    identification: u32,
     status: Status,
 }
 
 impl Readings {
     pub(crate) fn store(&self, image: &mut [u8]) {
         PROGRAM_CONTROL.store(image, [STOP]);
-        IDENTIFICATION.store(image, self.identification.to_le_bytes());
         STATUS.store(image, self.status.word().to_le_bytes());
     }
 }

@@ -1,6 +1,7 @@
 //! The one loop of the bootloader.
 
 use bsp::led::Led;
+use bsp::transmit_queue::Mailboxes;
 use bsp::{Alarm, Clock, Frames, StartUpWatchdog, Transmitter};
 use canopen::{Duration, Instant};
 use cortex_m::peripheral::SCB;

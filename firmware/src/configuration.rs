@@ -4,7 +4,7 @@ use core::mem::MaybeUninit;
 
 use bsp::reset_cause::ResetCause;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory};
-use node::{BitRate, NodeId, Parameters, Personality, Protocol, Setup};
+use node::{BitRate, Fault, Identity, NodeId, Parameters, Personality, Protocol, Setup};
 use profiles::board::{ChipThermometer, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 
@@ -19,6 +19,8 @@ pub(crate) struct Loaded {
     /// Those of the measurement.
     pub(crate) parameters: Parameters,
     pub(crate) setup: Setup,
+    /// What is wrong with the device record.
+    pub(crate) boot_data: Option<Fault>,
     /// Ready to store; `None` where nothing can be stored.
     pub(crate) store: Option<Store<ParameterFlash>>,
 }
@@ -32,13 +34,14 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
             let setup = setup(None);
             let protocol = make(place, &setup);
             let parameters = protocol.load_defaults();
-            return Loaded { protocol, parameters, setup, store: None };
+            return Loaded { protocol, parameters, setup, boot_data: None, store: None };
         }
     };
-    let setup = setup(view.device().ok().flatten());
+    let Identity { record, fault } = Identity::read(&mut view);
+    let setup = setup(record);
     let protocol = make(place, &setup);
     let parameters = protocol.load(&mut view);
-    Loaded { protocol, parameters, setup, store: prepare(view) }
+    Loaded { protocol, parameters, setup, boot_data: fault, store: prepare(view) }
 }
 
 /// Not inlined: the stack on which the value is made is free again for what reads the flash.

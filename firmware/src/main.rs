@@ -112,11 +112,11 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, store } =
+        let Loaded { protocol, parameters, setup, boot_data, store } =
             configuration::load(board.parameters, cx.local.protocol);
         let storage = StorageTask::new(store, cx.local.job.write(StoreJob::new(setup.personality)));
         let crashed = configuration::report_start(&setup, board.reset_cause);
-        let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working() };
+        let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working(), boot_data };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
         let surroundings = Surroundings { watchdog_reset, ..Surroundings::default() };
         let (receiver_process, process_frames) = Receiver::new(Fifo::Process, cx.local.process_queue, lost);

@@ -11,7 +11,7 @@ use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
 use node::fault::{PARAMETER_STORE, UNEXPECTED_RESET};
-use node::{Action, BusEvent, Next, NodeId, Parameters, Protocol};
+use node::{Action, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
 
 use crate::bit_rate::Rate;
 use crate::bus::event_of;
@@ -51,6 +51,16 @@ pub(crate) struct StartUpFaults {
     pub(crate) crashed: bool,
     /// Nothing can be stored.
     pub(crate) no_store: bool,
+    /// What is wrong with the device record.
+    pub(crate) boot_data: Option<Fault>,
+}
+
+impl StartUpFaults {
+    fn all(&self) -> impl Iterator<Item = Fault> {
+        let crashed = self.crashed.then_some(UNEXPECTED_RESET);
+        let no_store = self.no_store.then_some(PARAMETER_STORE);
+        [crashed, no_store, self.boot_data].into_iter().flatten()
+    }
 }
 
 impl Services {
@@ -212,8 +222,18 @@ impl Services {
         if !self.go_on_bus(node) {
             return self.call(node, |protocol, out| protocol.poll_services(Clock::now(), out));
         }
-        let next = self.call(node, |protocol, out| protocol.start(Clock::now(), out));
-        self.report_start_up_faults(node);
+        let faults = self.start_up_faults;
+        // In one call: a node with an error must not have started by itself before it knows the error.
+        let next = self.call(node, |protocol, out| {
+            let now = Clock::now();
+            let next = protocol.start(now, out);
+            // The messages go out with the next poll.
+            for fault in faults.all() {
+                let _ = protocol.set_fault(&fault, true, now);
+            }
+            next
+        });
+        self.start_up_faults.crashed = false;
         rtic::pend(PROCESS);
         next
     }
@@ -238,17 +258,6 @@ impl Services {
         let Rate::Known(timing) = self.rate else { return };
         let node_id = node.call(|protocol, _| protocol.node_id());
         retained::hand_over(&Handover { node_id: node_id.map(NodeId::get), timing, stay });
-    }
-
-    fn report_start_up_faults(&mut self, node: &mut impl Shared) {
-        let StartUpFaults { crashed, no_store } = self.start_up_faults;
-        self.start_up_faults.crashed = false;
-        for (fault, found) in [(UNEXPECTED_RESET, crashed), (PARAMETER_STORE, no_store)] {
-            if found {
-                // The message goes out with the next poll.
-                let _ = node.call(|protocol, _| protocol.set_fault(&fault, true, Clock::now()));
-            }
-        }
     }
 
     fn filter(&mut self, node: &mut impl Shared) {

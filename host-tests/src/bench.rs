@@ -2,7 +2,7 @@
 
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
-use node::{BitRate, BusEvent, Fault, Measurement, Personality, Protocol, Setup, StoreJob};
+use node::{BitRate, BusEvent, Fault, Identity, Measurement, Personality, Protocol, Setup, StoreJob};
 use profiles::board::{ChipThermometer, Inputs, PowerOn, RawEncoder, RawSample};
 use std::collections::VecDeque;
 use storage::{DeviceRecord, Memory, Pages, Store, View};
@@ -48,6 +48,8 @@ pub struct Bench {
     setup: Setup,
     actions: VecDeque<Action>,
     has_parameters: bool,
+    /// What is wrong with the device record.
+    boot_data: Option<Fault>,
 }
 
 /// The parameter store in RAM.
@@ -152,7 +154,7 @@ impl Bench {
 
     fn start(flash: Vec<u8>, unless_stored: &Setup, power_on: PowerOn) -> Bench {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
-        let record = view.device().expect("a record or none");
+        let Identity { record, fault } = Identity::read(&mut view);
         let setup = record.map_or(*unless_stored, |record| stored_setup(record, unless_stored));
         let mut protocol = Protocol::new(&setup);
         protocol.load(&mut view);
@@ -167,6 +169,7 @@ impl Bench {
             setup: *unless_stored,
             actions: VecDeque::new(),
             has_parameters: true,
+            boot_data: fault,
         };
         bench.restart();
         bench.take();
@@ -189,7 +192,7 @@ impl Bench {
         let mut flash = self.store.into_flash().0;
         let (first_page, _) = flash.split_at(flash.len() / 2);
         let last = first_page.iter().rposition(|&byte| byte != 0xFF).expect("something is stored");
-        // Behind the values are the commit word and the closing mark, four bytes each.
+        // Behind the last record, which ends in its check, are the commit word and the closing mark, four bytes each.
         flash[last - 8] ^= 1;
         Bench::start(flash, &self.setup, intact())
     }
@@ -197,6 +200,9 @@ impl Bench {
     /// Boots, or boots again after a reset.
     pub fn restart(&mut self) {
         let next = self.protocol.start(self.now, &mut self.out);
+        if let Some(fault) = self.boot_data {
+            let _ = self.protocol.set_fault(&fault, true, self.now);
+        }
         self.keep(next);
     }
 

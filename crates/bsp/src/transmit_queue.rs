@@ -10,6 +10,9 @@
 //! * A state ([`Transmit::send_state`]), such as a heartbeat or a measured value, is worth nothing once there is a newer one. The newer
 //!   frame takes the place of the older one of its CAN-ID. So a node that more urgent frames keep silent for minutes sends one frame of
 //!   each CAN-ID in the first gap, and not a queue of old values.
+//!
+//! The boot-up message is an event before which no other frame may be on the bus, although most CAN-IDs are more urgent. The queue
+//! holds all other frames back until the boot-up message has left its mailbox.
 
 use canopen::{Frame, QueueFull, Transmit};
 use heapless::Vec;
@@ -32,6 +35,9 @@ pub enum Offer {
 pub trait Mailboxes {
     /// Puts a frame into a mailbox when that keeps the order on the bus.
     fn offer(&mut self, frame: &Frame) -> Offer;
+
+    /// Whether all mailboxes are empty: every frame that was taken has been sent.
+    fn is_idle(&self) -> bool;
 }
 
 /// A frame that waits.
@@ -42,9 +48,20 @@ struct Waiting {
     is_state: bool,
 }
 
+/// What has become of the boot-up message.
+#[derive(Clone, Copy, Debug, Default)]
+enum BootUp {
+    /// The message was sent, or there was none yet.
+    #[default]
+    Sent,
+    Waits(Frame),
+    InMailbox,
+}
+
 /// The queue.
 #[derive(Debug, Default)]
 pub struct TransmitQueue {
+    boot_up: BootUp,
     /// The most urgent frame is the last one.
     waiting: Vec<Waiting, CAPACITY>,
 }
@@ -53,33 +70,50 @@ impl TransmitQueue {
     /// An empty queue.
     #[must_use]
     pub const fn new() -> TransmitQueue {
-        TransmitQueue { waiting: Vec::new() }
+        TransmitQueue { boot_up: BootUp::Sent, waiting: Vec::new() }
     }
 
     /// Moves frames into the mailboxes until they take no more.
     pub fn pump(&mut self, mailboxes: &mut impl Mailboxes) {
-        while let Some(Waiting { frame, .. }) = self.waiting.last() {
-            match mailboxes.offer(frame) {
-                Offer::Refused => return,
-                Offer::Taken => drop(self.waiting.pop()),
-                Offer::Replaced(other) => {
-                    self.waiting.pop();
-                    // The frame that left made room for this one.
-                    let _ = self.push_first(other);
-                }
+        while let Some(frame) = self.next(mailboxes) {
+            let offer = mailboxes.offer(&frame);
+            if offer == Offer::Refused {
+                return;
+            }
+            if matches!(self.boot_up, BootUp::Waits(_)) {
+                self.boot_up = BootUp::InMailbox;
+            } else {
+                self.waiting.pop();
+            }
+            if let Offer::Replaced(other) = offer {
+                // The frame that left made room for this one.
+                let _ = self.push_first(other);
             }
         }
+    }
+
+    /// The frame that is to go into a mailbox next. The boot-up message has all mailboxes for itself.
+    fn next(&mut self, mailboxes: &impl Mailboxes) -> Option<Frame> {
+        if !matches!(self.boot_up, BootUp::Sent) && !mailboxes.is_idle() {
+            return None;
+        }
+        if let BootUp::Waits(frame) = self.boot_up {
+            return Some(frame);
+        }
+        self.boot_up = BootUp::Sent;
+        self.waiting.last().map(|waiting| waiting.frame)
     }
 
     /// Whether nothing waits.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
+        self.waiting.is_empty() && !matches!(self.boot_up, BootUp::Waits(_))
     }
 
     /// Drops everything that waits.
     pub fn clear(&mut self) {
         self.waiting.clear();
+        self.boot_up = BootUp::Sent;
     }
 
     /// Adds a frame that comes back from a mailbox. The frame was queued before all others of its identifier, so its place is before
@@ -124,6 +158,12 @@ impl Transmit for TransmitQueue {
         Ok(())
     }
 
+    /// Takes the boot-up message, for which there is a place of its own.
+    fn send_boot_up(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.boot_up = BootUp::Waits(frame);
+        Ok(())
+    }
+
     fn room(&self) -> usize {
         CAPACITY - self.waiting.len()
     }
@@ -148,6 +188,10 @@ mod tests {
             }
             self.pending.push(*frame);
             if self.pending.len() <= 3 { Offer::Taken } else { Offer::Replaced(self.pending.remove(0)) }
+        }
+
+        fn is_idle(&self) -> bool {
+            self.pending.is_empty()
         }
     }
 
@@ -310,6 +354,30 @@ mod tests {
         while queue.send(frame(1, 0)).is_ok() {}
         assert_eq!(queue.send_state(frame(0x181, 1)), Ok(()));
         assert_eq!(queue.send_state(frame(0x182, 0)), Err(QueueFull));
+    }
+
+    #[test]
+    fn nothing_passes_the_boot_up_message() {
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        queue.send_boot_up(frame(0x701, 0)).unwrap();
+        assert!(!queue.is_empty());
+        queue.pump(&mut bus);
+        for id in [0x581, 0x181, 0x081] {
+            queue.send(frame(id, 1)).unwrap();
+            queue.pump(&mut bus);
+        }
+        assert_eq!(bus.pending.len(), 1, "the boot-up message is alone in the mailboxes");
+        let order = sent(&mut queue, &mut bus);
+        assert_eq!(order, [(0x701, 0), (0x081, 1), (0x181, 1), (0x581, 1)]);
+    }
+
+    #[test]
+    fn a_cleared_queue_waits_for_no_boot_up_message() {
+        let (mut queue, mut bus) = (TransmitQueue::new(), Fake::default());
+        queue.send_boot_up(frame(0x701, 0)).unwrap();
+        queue.clear();
+        queue.send(frame(0x081, 1)).unwrap();
+        assert_eq!(sent(&mut queue, &mut bus), [(0x081, 1)]);
     }
 
     #[test]

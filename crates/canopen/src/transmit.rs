@@ -32,6 +32,15 @@ pub trait Transmit {
         self.send(frame)
     }
 
+    /// Queues the boot-up message. No frame that is queued later may be on the bus before it, whatever the identifiers: a node
+    /// says nothing before it has booted up (CiA 301, 7.3.2.2). A queue that keeps the order of its frames needs nothing for it.
+    ///
+    /// # Errors
+    /// As [`send`](Transmit::send).
+    fn send_boot_up(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.send(frame)
+    }
+
     /// How many frames `send` would take now.
     fn room(&self) -> usize;
 }
@@ -48,6 +57,11 @@ impl<T: Transmit> Turn<'_, T> {
     /// Queues a frame; whether there was room.
     pub(crate) fn send(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send(frame).is_ok()
+    }
+
+    /// The same for the boot-up message.
+    pub(crate) fn send_boot_up(&mut self, frame: Frame) -> bool {
+        self.is_open && self.out.send_boot_up(frame).is_ok()
     }
 
     /// The same for a frame of which only the newest counts.

@@ -1,9 +1,10 @@
 //! The application of the CANopen device: what the node adds to CiA 301, and its profile.
 
 use canopen::dictionary::{Entry, Group};
+use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
-use canopen::{Application, Condition, Part};
+use canopen::{Application, Condition, Part, Soundness};
 use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY};
 use profiles::fault::Flags;
 use profiles::{AnyProfile, Snapshot};
@@ -72,6 +73,10 @@ impl NodeApplication {
 impl Application for NodeApplication {
     const CONDITIONS: &'static [Condition] = &CONDITIONS;
 
+    fn register_bits(&self) -> u8 {
+        self.profile.register_bits()
+    }
+
     fn initialise(&mut self, image: &mut [u8]) {
         let setup = &self.setup;
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
@@ -106,6 +111,10 @@ impl Application for NodeApplication {
         self.profile.state(state, image);
     }
 
+    fn fault(&mut self, _: Fault, _: bool, image: &mut [u8]) {
+        self.show_flags(image);
+    }
+
     fn sends_events(&self, tpdo: u16) -> bool {
         self.profile.sends_events(tpdo)
     }
@@ -115,7 +124,7 @@ impl Application for NodeApplication {
         if self.setup.personality.has_group(group) {
             self.stored.get(group)
         } else {
-            canopen::Stored { packed: &[], is_sound: true }
+            canopen::Stored { packed: &[], soundness: Soundness::Whole }
         }
     }
 

@@ -9,34 +9,27 @@ const fn fault(name: &'static str, code: u16, flags: Flags) -> Fault {
     Fault { name, condition: Condition::new(code), flags }
 }
 
-/// The clock of the sensor.
-pub const SENSOR_CLOCK: Fault = fault("SensorClock", 0x5004, Flags::sensor(1));
-/// The sensor did not start.
-pub const SENSOR_BOOT: Fault = fault("SensorBoot", 0x5005, Flags::sensor(2));
-/// The sensor's memory is corrupt.
-pub const SENSOR_MEMORY: Fault = fault("SensorMemory", 0x5007, Flags::sensor(6));
-/// A module did not initialise.
-pub const MODULE_INITIALISATION: Fault = fault("ModuleInitialisation", 0x5001, Flags::system(0));
-/// The image does not fit the hardware.
-pub const HARDWARE_IDENTIFICATION: Fault = fault("HardwareIdentification", 0x5002, Flags::system(1));
 /// The parameter store cannot be used.
 pub const PARAMETER_STORE: Fault = fault("ParameterStore", 0x5003, Flags::system(2));
-/// Node-ID and bit rate could not be loaded.
-pub const BOOT_DATA: Fault = fault("BootData", 0x6301, Flags::system(3));
+/// The device record (node-ID, bit rate, personality) could not be read: the defaults hold.
+pub const BOOT_DATA: Fault = with_detail("BootData", DEFAULTS_HOLD);
+/// What was stored last of the device record could not be read: the record before holds.
+pub const OLDER_BOOT_DATA: Fault = with_detail("OlderBootData", OLDER_HOLDS);
 /// The node restarted without having been told to.
 pub const UNEXPECTED_RESET: Fault = fault("UnexpectedReset", 0x6101, Flags::system(6));
 
+/// First byte of the error field of an EMCY about stored data, as in [`canopen::Fault::OlderData`] and
+/// [`canopen::Fault::StoredData`].
+const OLDER_HOLDS: u8 = 1;
+const DEFAULTS_HOLD: u8 = 2;
+
+const fn with_detail(name: &'static str, holds: u8) -> Fault {
+    let condition = Condition { code: 0x6301, register: 0, detail: [holds, 0, 0, 0, 0] };
+    Fault { name, condition, flags: Flags::system(3) }
+}
+
 /// Those that no profile finds.
-const OWN: &[Fault] = &[
-    SENSOR_CLOCK,
-    SENSOR_BOOT,
-    SENSOR_MEMORY,
-    MODULE_INITIALISATION,
-    HARDWARE_IDENTIFICATION,
-    PARAMETER_STORE,
-    BOOT_DATA,
-    UNEXPECTED_RESET,
-];
+const OWN: &[Fault] = &[PARAMETER_STORE, BOOT_DATA, OLDER_BOOT_DATA, UNEXPECTED_RESET];
 
 const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
 

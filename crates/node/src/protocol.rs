@@ -34,6 +34,8 @@ impl Protocol {
     /// and again for `Action::ResetCommunication`.
     pub fn start(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
         let next = self.device.start(now, out);
+        // The error register is known only now.
+        self.device.show(|application, image| application.show_flags(image));
         self.note(next)
     }
 

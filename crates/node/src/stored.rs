@@ -1,6 +1,7 @@
 //! What the parameter store holds of the dictionary, kept in RAM for the resets to come: reset communication must not
 //! wait for the flash.
 
+use canopen::Soundness;
 use canopen::dictionary::{Group, Groups};
 use embedded_storage::nor_flash::ReadNorFlash;
 use profiles::Personality;
@@ -23,15 +24,19 @@ pub(crate) fn layout_of(group: Group, layout: u16) -> u16 {
     if group == Group::Calibration { FORM.into() } else { layout }
 }
 
-/// The values that are stored, and the groups of which they are damaged.
+/// The values that are stored, and how far they can be trusted.
 #[derive(Debug)]
 pub(crate) struct Stored {
     packed: PackedGroups,
-    damaged: Groups,
+    /// The groups of which nothing can be read.
+    lost: Groups,
+    /// The groups of which what was stored last cannot be read.
+    older: Groups,
 }
 
 impl Stored {
-    pub(crate) const NOTHING: Stored = Stored { packed: PackedGroups::EMPTY, damaged: Groups::NONE };
+    pub(crate) const NOTHING: Stored =
+        Stored { packed: PackedGroups::EMPTY, lost: Groups::NONE, older: Groups::NONE };
 
     /// Reads all groups. What cannot be read counts as not stored, and as a fault.
     pub(crate) fn load<F: ReadNorFlash>(&mut self, layout: u16, view: &mut View<F>) {
@@ -42,24 +47,31 @@ impl Stored {
                 is_readable = read.is_some();
                 read.unwrap_or(0)
             });
-            let is_sound = is_readable && view.health(record_of(group)) == Health::Good;
-            self.damaged.set(group, !is_sound);
+            let health = if is_readable { view.health(record_of(group)) } else { Health::Lost };
+            self.lost.set(group, health == Health::Lost);
+            self.older.set(group, health == Health::FellBack);
         }
     }
 
     /// Takes what has just been stored.
     pub(crate) fn replace(&mut self, group: Group, packed: &[u8]) {
         let fits = self.packed.replace(group, packed);
-        self.damaged.set(group, !fits);
+        self.lost.set(group, !fits);
+        self.older.set(group, false);
     }
 
     /// 1F57h:1 as the running program gives it (CiA 302-3): 0, or in bits 1 to 7 code 3, format or CRC error.
     pub(crate) fn flash_status(&self) -> u32 {
-        if self.damaged == Groups::NONE { 0 } else { 3 << 1 }
+        if (self.lost, self.older) == (Groups::NONE, Groups::NONE) { 0 } else { 3 << 1 }
     }
 
     pub(crate) fn get(&self, group: Group) -> canopen::Stored<'_> {
-        canopen::Stored { packed: self.packed.get(group), is_sound: !self.damaged.contains(group) }
+        let soundness = match (self.lost.contains(group), self.older.contains(group)) {
+            (true, _) => Soundness::Lost,
+            (_, true) => Soundness::Older,
+            _ => Soundness::Whole,
+        };
+        canopen::Stored { packed: self.packed.get(group), soundness }
     }
 }
 

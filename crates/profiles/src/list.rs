@@ -283,6 +283,15 @@ macro_rules! personalities {
                 }
             }
 
+            /// As [`Profile::REGISTER_BITS`]($crate::profile::Profile::REGISTER_BITS).
+            #[must_use]
+            pub fn register_bits(&self) -> u8 {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(_) => $module::Objects::REGISTER_BITS,)+
+                }
+            }
+
             /// As [`Profile::initialise`]($crate::profile::Profile::initialise).
             pub fn initialise(&mut self, image: &mut [u8]) {
                 use $crate::profile::Profile;

@@ -48,6 +48,9 @@ pub trait Profile: Sized {
     /// Where the values of its objects are in the image of a dictionary.
     type Fields: 'static;
 
+    /// The bits of the error register (1001h) that a device of the profile has; the generic error, bit 0, is one of them.
+    const REGISTER_BITS: u8 = 0xFF;
+
     /// The profile in a dictionary.
     fn new(fields: &'static Self::Fields) -> Self;
 

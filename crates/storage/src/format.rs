@@ -2,6 +2,8 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
+use crate::group::GroupSet;
+
 /// A word of the format. The flash may program more at once: see [`Format`].
 pub(crate) const WORD: u32 = 4;
 /// A word that was not programmed since the page was erased.
@@ -10,7 +12,7 @@ pub(crate) const ERASED: u32 = u32::MAX;
 /// once more after a cut that left the word half programmed but reading as erased is sound.
 pub(crate) const MARK: u32 = 0;
 /// First word of a page whose erase has run to its end; the digit is the version of this format.
-pub(crate) const CLEAN: u32 = u32::from_le_bytes(*b"PRM1");
+pub(crate) const CLEAN: u32 = u32::from_le_bytes(*b"PRM2");
 /// The most bytes that a flash may program as one.
 pub(crate) const LARGEST_UNIT: u32 = 32;
 
@@ -41,9 +43,9 @@ impl Format {
         2 * self.unit
     }
 
-    /// Size of what precedes the records of a transaction: begin mark; generation and length.
+    /// Size of what precedes the records of a transaction: begin mark; contents.
     pub(crate) fn head(self) -> u32 {
-        self.unit + self.padded(2 * WORD)
+        2 * self.unit
     }
 
     /// Size of what follows the records: commit word, closing mark.
@@ -51,12 +53,17 @@ impl Format {
         2 * self.unit
     }
 
-    /// Size of what precedes the value of a record: group, kind and version; length.
+    /// Size of what precedes the value of a record: group, kind and version; length and generation.
     pub(crate) fn record_head(self) -> u32 {
         self.padded(2 * WORD)
     }
 
-    /// Bytes that a value takes up: whole units. A unit is a power of two, so there is no division that could be by zero.
+    /// Size of a value of `len` bytes and of the check word behind it: whole units.
+    pub(crate) fn body(self, len: u32) -> u32 {
+        self.padded(in_words(len) + WORD)
+    }
+
+    /// Bytes that something takes up: whole units. A unit is a power of two, so there is no division that could be by zero.
     pub(crate) fn padded(self, len: u32) -> u32 {
         let most = self.unit.wrapping_sub(1);
         len.wrapping_add(most) & !most
@@ -67,6 +74,11 @@ impl Format {
 pub(crate) const KIND_VALUE: u8 = 1;
 pub(crate) const KIND_RESTORED: u8 = 2;
 
+/// The bytes of so many whole words that a value of `len` bytes fits.
+pub(crate) fn in_words(len: u32) -> u32 {
+    len.wrapping_add(WORD - 1) & !(WORD - 1)
+}
+
 /// A reference, as the linker keeps one of equal constants of several crates, but every static: the table takes 1 KiB.
 static CRC: &Crc<u32> = &Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -76,6 +88,30 @@ pub(crate) fn guarded(value: u16) -> u32 {
     u32::from(value) | u32::from(!value) << 16
 }
 
+/// How many bits of [`Contents`] are the number of words: enough for four values of [`crate::MAX_VALUE`].
+const WORDS: u32 = 12;
+
+/// What a transaction says of itself: how many words its records have, and which groups they are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Contents {
+    pub(crate) words: u16,
+    pub(crate) groups: GroupSet,
+}
+
+impl Contents {
+    /// The guarded word; `None` for more words than a transaction can have.
+    pub(crate) fn word(self) -> Option<u32> {
+        (self.words >> WORDS == 0).then(|| guarded(self.words | u16::from(self.groups.0) << WORDS))
+    }
+
+    /// The contents in a guarded word.
+    pub(crate) fn of(word: u32) -> Option<Contents> {
+        let [low, high] = unguarded(word)?.to_le_bytes();
+        let (number, groups) = (u16::from_le_bytes([low, high]), GroupSet(high >> 4));
+        Some(Contents { words: number & ((1 << WORDS) - 1), groups })
+    }
+}
+
 /// The number in a guarded word.
 pub(crate) fn unguarded(word: u32) -> Option<u16> {
     let [low, high, ..] = word.to_le_bytes();
@@ -83,11 +119,11 @@ pub(crate) fn unguarded(word: u32) -> Option<u16> {
     (guarded(value) == word).then_some(value)
 }
 
-/// The running check of a transaction.
+/// The running check of a transaction or of a record.
 pub(crate) struct Check(Digest<'static, u32>);
 
 impl Check {
-    /// Begins with the place in the page, so that a transaction found elsewhere, as a copy in a value, is none.
+    /// Begins with the place in the page, so that what is found elsewhere, as a copy in a value, is none.
     pub(crate) fn new(at: u32) -> Check {
         let mut check = Check(CRC.digest());
         check.add(at);

@@ -39,9 +39,9 @@ pub enum Health {
     /// What was last saved is what is read; a save that a power cut kept from completing counts as not made.
     #[default]
     Good,
-    /// A save is damaged and may have held this group: the state before it is read.
+    /// What was saved last of this group is damaged: the value before it is read.
     FellBack,
-    /// A save is damaged and no older state of this group is left: nothing is read, the defaults hold.
+    /// What was saved of this group is damaged, and there is no older value: nothing is read, the defaults hold.
     Lost,
 }
 
@@ -80,6 +80,32 @@ pub struct Loaded {
     pub len: usize,
 }
 
+/// A set of groups: bit 0 for the group with the number 1, and so on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct GroupSet(pub(crate) u8);
+
+impl GroupSet {
+    pub(crate) const NONE: GroupSet = GroupSet(0);
+    pub(crate) const ALL: GroupSet = GroupSet(0xF);
+
+    pub(crate) fn contains(self, group: Group) -> bool {
+        self.0 & GroupSet::bit(group) != 0
+    }
+
+    pub(crate) fn insert(&mut self, group: Group) {
+        self.0 |= GroupSet::bit(group);
+    }
+
+    /// The groups of this set that are not in the other.
+    pub(crate) fn without(self, other: GroupSet) -> GroupSet {
+        GroupSet(self.0 & !other.0)
+    }
+
+    fn bit(group: Group) -> u8 {
+        1 << (group.id() - 1)
+    }
+}
+
 /// One `T` for each group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PerGroup<T>([T; 4]);
@@ -113,7 +139,7 @@ impl<T> PerGroup<T> {
         Group::ALL.into_iter().zip(&self.0)
     }
 
-    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
-        self.0.iter_mut()
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (Group, &mut T)> {
+        Group::ALL.into_iter().zip(&mut self.0)
     }
 }

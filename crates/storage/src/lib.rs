@@ -40,39 +40,40 @@
 //! | saved at once | saves from empty pages on | saves until worn out | words of one save |
 //! |---|---|---|---|
 //! | application group of 212 bytes | 136 | 1,360,000 | 60, 1.0 ms |
-//! | communication and application groups, 1405 bytes | 22 | 220,000 | 361, 5.8 ms |
-//! | all four groups of [`MAX_VALUE`] bytes | 2 | 20,000 | 2061, 33 ms |
+//! | communication and application groups, 1405 bytes | 22 | 220,000 | 362, 5.8 ms |
+//! | all four groups of [`MAX_VALUE`] bytes | 2 | 20,000 | 2064, 33 ms |
 //!
 //! # Format
 //!
 //! Everything is words of 32 bits, low byte first, and no word is programmed twice. A flash that programs 8, 16 or 32 bytes
 //! as one ([`Pages::with_words`]) has the same words in units of that size: every mark and the commit word have a unit of
-//! their own; generation and length share one, as do the two words of a record's head, and a value fills whole units; what is
-//! left of a unit is zeros. Zeros must be allowed over a unit that is programmed already (RM0440, 3.3.8).
+//! their own, as has the contents; the two words of a record's head share one, and a value with its check fills whole units; what
+//! is left of a unit is zeros. Zeros must be allowed over a unit that is programmed already (RM0440, 3.3.8).
 //!
 //! ```text
 //! page         transaction        record
 //! ┌──────────┐ ┌────────────────┐ ┌───────────────────────────────────┐
 //! │ clean    │ │ begin = 0      │ │ group (8) │ kind (8) │ version (16) │
-//! │ left     │ │ generation │ ! │ │ length of the value in bytes        │
-//! ├──────────┤ │ words      │ ! │ │ value, zeros up to a whole word     │
-//! │ transac- │ ├────────────────┤ └───────────────────────────────────┘
-//! │ tion     │ │ record         │
-//! ├──────────┤ │ record ...     │   kind 1: the group has this value
-//! │ transac- │ ├────────────────┤   kind 2: it has none (length 0), the defaults hold
-//! │ tion ... │ │ commit: CRC-32 │
-//! ├──────────┤ │ closed = 0     │   !: complement of the lower half
-//! │ erased   │ └────────────────┘
+//! │ left     │ │ contents   │ ! │ │ length (16) │ generation (16)     │
+//! ├──────────┤ ├────────────────┤ │ value, zeros up to a whole word     │
+//! │ transac- │ │ record         │ │ check: CRC-32                       │
+//! │ tion     │ │ record ...     │ └───────────────────────────────────┘
+//! ├──────────┤ ├────────────────┤   kind 1: the group has this value
+//! │ transac- │ │ commit: CRC-32 │   kind 2: it has none (length 0), the defaults hold
+//! │ tion ... │ │ closed = 0     │
+//! ├──────────┤ └────────────────┘   !: complement of the lower half
+//! │ erased   │
 //! └──────────┘
 //! ```
 //!
 //! | word | meaning |
 //! |---|---|
-//! | clean | `PRM1`, programmed when the erase of the page has run to its end; without it the erase may have been cut |
+//! | clean | `PRM2`, programmed when the erase of the page has run to its end; without it the erase may have been cut |
 //! | left | 0 once the store has moved on to the other page |
 //! | begin | 0, not looked at. Programming zeros over a half programmed word is sound, so if a cut leaves no trace of this first word, the next save may start at it again |
-//! | generation | counts the uses of pages: the page with the later one is in use. It wraps after 65,536; as the two are never far apart, the order is that of their difference |
-//! | words | number of words of records |
+//! | generation | the same in all records of a page, counts the uses of pages: the page with the later one is in use. It wraps after 65,536; as the two are never far apart, the order is that of their difference |
+//! | contents | number of words of records in 12 bits, and the groups of the records in 4 |
+//! | check | CRC-32 over the offset of the record in the page and the words of the record before the check |
 //! | commit | CRC-32 (ISO HDLC) over the offset of the transaction in the page and all its words but begin; all ones are stored as 0. From this word on the transaction counts |
 //! | closed | 0: the commit word is whole, not just lucky to read well after a cut |
 //!
@@ -88,8 +89,10 @@
 //!
 //! # Damage
 //!
-//! A transaction whose CRC fails is left out as a whole, and the search for the next goes on word by word. The state of
-//! every group it may have held is then the one before, and [`Health`] says so. A save that was cut is no damage: its
+//! Of a transaction whose CRC fails, every record counts whose own check is right: a damaged record is damage to its group and
+//! to no other. The state of that group is then the one before, and [`Health`] says so, unless a later save holds the group.
+//! Where neither the contents nor the records tell which groups there were, all of them are in doubt. The first transaction of a
+//! page counts as a whole as long as the page before it is there to go back to. A save that was cut is no damage: its
 //! words end in order, before the closing mark. Cells of the newest transactions that return to the erased value
 //! altogether look just like it; this is the one loss that goes unreported. The other way round, an erase that was cut
 //! where nothing was ever saved cannot be told from damage: it is reported though nothing is lost.

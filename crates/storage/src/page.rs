@@ -3,7 +3,8 @@
 use embedded_storage::nor_flash::ReadNorFlash;
 
 use crate::error::Error;
-use crate::format::{Check, ERASED, Format, MARK, WORD, unguarded};
+use crate::format::{Check, Contents, ERASED, Format, KIND_RESTORED, KIND_VALUE, MARK, WORD, in_words};
+use crate::group::{Group, GroupSet};
 
 /// Where the two pages of the store lie in the flash. Both are of the same size and adjacent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,10 +66,24 @@ pub(crate) struct Page {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Transaction {
     pub(crate) at: u32,
-    pub(crate) generation: u16,
     pub(crate) records_end: u32,
     pub(crate) end: u32,
     pub(crate) closed: bool,
+}
+
+/// A record whose check word agrees with its content.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StoredRecord {
+    /// `None` for a group that this version does not know.
+    pub(crate) group: Option<Group>,
+    pub(crate) kind: u8,
+    pub(crate) version: u16,
+    pub(crate) generation: u16,
+    /// The first byte of the value.
+    pub(crate) data: u32,
+    pub(crate) len: u32,
+    /// Where the next record begins.
+    pub(crate) end: u32,
 }
 
 impl Page {
@@ -108,44 +123,85 @@ impl Page {
         flash: &mut F,
         at: u32,
     ) -> Result<Option<Transaction>, F::Error> {
-        let Head::Whole { generation, records_end } = self.head(flash, at)? else { return Ok(None) };
-        let mut check = Check::new(at);
+        let Some((_, records_end)) = self.head(flash, at)? else { return Ok(None) };
         let unit = self.format.unit;
-        for at in (at + unit..records_end).step_by(WORD as usize) {
-            check.add(self.word(flash, at)?);
-        }
-        if self.word(flash, records_end)? != check.commit_word() {
+        if self.check(flash, at, at + unit, records_end)? != self.word(flash, records_end)? {
             return Ok(None);
         }
-        let closed = self.word(flash, records_end + unit)? == MARK;
-        Ok(Some(Transaction { at, generation, records_end, end: records_end + self.format.tail(), closed }))
+        let closed = self.is_closed(flash, records_end)?;
+        Ok(Some(Transaction { at, records_end, end: records_end + self.format.tail(), closed }))
+    }
+
+    /// The record at `at`, if there is one that is intact and ends before `limit`. The record vouches for itself, whatever has
+    /// become of the transaction around it.
+    pub(crate) fn record<F: ReadNorFlash>(
+        self,
+        flash: &mut F,
+        at: u32,
+        limit: u32,
+    ) -> Result<Option<StoredRecord>, F::Error> {
+        let data = at + self.format.record_head();
+        if data >= limit {
+            return Ok(None);
+        }
+        let [id, kind, low, high] = self.word(flash, at)?.to_le_bytes();
+        let [len_low, len_high, generation_low, generation_high] = self.word(flash, at + WORD)?.to_le_bytes();
+        let len = u32::from(u16::from_le_bytes([len_low, len_high]));
+        let (check_at, end) = (data + in_words(len), data + self.format.body(len));
+        let is_record = matches!(kind, KIND_VALUE | KIND_RESTORED) && end <= limit;
+        if !is_record || self.check(flash, at, at, check_at)? != self.word(flash, check_at)? {
+            return Ok(None);
+        }
+        let (version, generation) =
+            (u16::from_le_bytes([low, high]), u16::from_le_bytes([generation_low, generation_high]));
+        Ok(Some(StoredRecord { group: Group::from_id(id), kind, version, generation, data, len, end }))
+    }
+
+    /// The check word over the words between two places, of what begins at `at`.
+    fn check<F: ReadNorFlash>(self, flash: &mut F, at: u32, from: u32, to: u32) -> Result<u32, F::Error> {
+        let mut check = Check::new(at);
+        for place in (from..to).step_by(WORD as usize) {
+            check.add(self.word(flash, place)?);
+        }
+        Ok(check.commit_word())
+    }
+
+    /// Whether the transaction whose records end there was written to its end.
+    pub(crate) fn is_closed<F: ReadNorFlash>(
+        self,
+        flash: &mut F,
+        records_end: u32,
+    ) -> Result<bool, F::Error> {
+        Ok(self.word(flash, records_end + self.format.unit)? == MARK)
     }
 
     /// The end of what a save that was cut can have programmed if it began at `at`: the words are programmed in order,
     /// so after a head that is not whole there is nothing, and after a commit word that is wrong no closing mark.
     pub(crate) fn reach_of_a_cut<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<u32, F::Error> {
-        Ok(match self.head(flash, at)? {
-            Head::Torn { end } => end,
-            Head::Whole { records_end, .. } => records_end + self.format.unit,
-        })
+        if !self.has_room_for_a_head(at) {
+            return Ok(at);
+        }
+        let head = self.head(flash, at)?;
+        Ok(head.map_or(at + self.format.head(), |(_, records_end)| records_end + self.format.unit))
     }
 
-    fn head<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<Head, F::Error> {
-        let (head, tail, unit) = (self.format.head(), self.format.tail(), self.format.unit);
-        if at + head + tail > self.size {
-            return Ok(Head::Torn { end: at });
+    /// Which groups the transaction at `at` has named, and where its records end; `None` for a head that is not whole.
+    pub(crate) fn head<F: ReadNorFlash>(
+        self,
+        flash: &mut F,
+        at: u32,
+    ) -> Result<Option<(GroupSet, u32)>, F::Error> {
+        if !self.has_room_for_a_head(at) {
+            return Ok(None);
         }
-        let generation = unguarded(self.word(flash, at + unit)?);
-        let words = unguarded(self.word(flash, at + unit + WORD)?);
-        let records_end = words.map(|words| at + head + u32::from(words) * WORD);
-        Ok(match (generation, records_end) {
-            (Some(generation), Some(records_end)) if self.is_end_of_records(records_end) => {
-                Head::Whole { generation, records_end }
-            }
-            // Where each of them is programmed on its own, nothing comes after a torn generation.
-            (None, _) => Head::Torn { end: at + 2 * unit },
-            _ => Head::Torn { end: at + head },
-        })
+        let contents = Contents::of(self.word(flash, at + self.format.unit)?);
+        let whole = contents
+            .map(|Contents { words, groups }| (groups, at + self.format.head() + u32::from(words) * WORD));
+        Ok(whole.filter(|(_, records_end)| self.is_end_of_records(*records_end)))
+    }
+
+    fn has_room_for_a_head(self, at: u32) -> bool {
+        at + self.format.head() + self.format.tail() <= self.size
     }
 
     fn is_end_of_records(self, end: u32) -> bool {
@@ -156,16 +212,4 @@ impl Page {
     pub(crate) fn room(self) -> u32 {
         self.size - self.format.first()
     }
-}
-
-/// The words before the records.
-enum Head {
-    Whole {
-        generation: u16,
-        records_end: u32,
-    },
-    /// What was programmed of it ends before `end`.
-    Torn {
-        end: u32,
-    },
 }

@@ -2,16 +2,16 @@
 
 use embedded_storage::nor_flash::ReadNorFlash;
 
-use crate::format::{CLEAN, KIND_VALUE, MARK, WORD};
-use crate::group::{Group, Health, PerGroup};
-use crate::page::{Page, Transaction};
+use crate::format::{CLEAN, KIND_VALUE, MARK};
+use crate::group::{GroupSet, Health, PerGroup};
+use crate::page::{Page, StoredRecord, Transaction};
 
 /// Where a stored value is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Slot {
     pub(crate) page: Page,
-    /// The transaction that holds it.
-    pub(crate) transaction: u32,
+    /// Where its record begins.
+    pub(crate) record: u32,
     /// Its first byte.
     pub(crate) data: u32,
     pub(crate) version: u16,
@@ -31,7 +31,7 @@ pub(crate) enum Content {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry {
     pub(crate) content: Content,
-    /// A damaged transaction came later and may have named the group.
+    /// A record that came later is damaged, and was or may have been one of this group.
     pub(crate) suspect: bool,
 }
 
@@ -39,8 +39,8 @@ impl Entry {
     pub(crate) fn health(&self) -> Health {
         match (self.suspect, self.content) {
             (false, _) => Health::Good,
-            (true, Content::Unnamed) => Health::Lost,
-            (true, _) => Health::FellBack,
+            (true, Content::Value(_)) => Health::FellBack,
+            (true, _) => Health::Lost,
         }
     }
 }
@@ -105,7 +105,10 @@ impl Scan {
                 continue;
             };
             if at != self.end {
-                self.damaged();
+                self.salvage(flash, at)?;
+                if at != self.end {
+                    self.suspect(GroupSet::ALL);
+                }
             }
             self.take(flash, &transaction)?;
             at = transaction.end;
@@ -114,39 +117,40 @@ impl Scan {
     }
 
     fn take<F: ReadNorFlash>(&mut self, flash: &mut F, transaction: &Transaction) -> Result<(), F::Error> {
-        self.generation = Some(transaction.generation);
         if transaction.at == self.page.format.first() {
             self.first = if transaction.closed { First::Closed } else { First::Open };
         }
         self.tidy &= transaction.closed;
         self.end = transaction.end;
-        let format = self.page.format;
-        let mut at = transaction.at + format.head();
-        while at + format.record_head() <= transaction.records_end {
-            at = self.take_record(flash, transaction, at)?;
-        }
+        self.records(flash, transaction.at + self.page.format.head(), transaction.records_end)?;
         Ok(())
     }
 
-    /// Takes the record at `at` and returns where the next one is.
-    fn take_record<F: ReadNorFlash>(
-        &mut self,
-        flash: &mut F,
-        transaction: &Transaction,
-        at: u32,
-    ) -> Result<u32, F::Error> {
-        let [id, kind, low, high] = self.page.word(flash, at)?.to_le_bytes();
-        let len = self.page.word(flash, at + WORD)?;
-        let (data, version) = (at + self.page.format.record_head(), u16::from_le_bytes([low, high]));
-        if len > transaction.records_end - data {
-            return Ok(transaction.records_end);
+    /// Takes every intact record between two places, and says of which groups they are. What is damaged is passed over unit
+    /// by unit.
+    fn records<F: ReadNorFlash>(&mut self, flash: &mut F, from: u32, to: u32) -> Result<GroupSet, F::Error> {
+        let (mut at, mut found) = (from, GroupSet::NONE);
+        while at < to {
+            at = match self.page.record(flash, at, to)? {
+                None => at + self.page.format.unit,
+                Some(record) => {
+                    self.take_record(at, &record, &mut found);
+                    record.end
+                }
+            };
         }
-        let slot = Slot { page: self.page, transaction: transaction.at, data, version, len };
+        Ok(found)
+    }
+
+    fn take_record(&mut self, at: u32, record: &StoredRecord, found: &mut GroupSet) {
+        self.generation = Some(record.generation);
+        let &StoredRecord { kind, version, data, len, .. } = record;
+        let slot = Slot { page: self.page, record: at, data, version, len };
         let content = if kind == KIND_VALUE { Content::Value(slot) } else { Content::Restored };
-        if let Some(group) = Group::from_id(id) {
+        if let Some(group) = record.group {
+            found.insert(group);
             *self.groups.get_mut(group) = Entry { content, suspect: false };
         }
-        Ok(data + self.page.format.padded(len))
     }
 
     /// Judges what follows the last complete transaction: erased, a save that was cut, or damage.
@@ -154,19 +158,78 @@ impl Scan {
         if self.page.erased_from(flash, self.end)? {
             return Ok(());
         }
-        self.tidy = false;
-        let reach = self.page.reach_of_a_cut(flash, self.end)?;
-        let foreign = self.generation.is_none() && self.page.word(flash, 0)? != CLEAN;
-        if foreign || !self.page.erased_from(flash, reach)? {
-            self.damaged();
+        self.salvage(flash, self.page.size)?;
+        if self.generation.is_none() && self.page.word(flash, 0)? != CLEAN {
+            self.suspect(GroupSet::ALL);
         }
         Ok(())
     }
 
-    /// Notes that a transaction at this place cannot be read: any group may have been in it.
-    fn damaged(&mut self) {
+    /// Takes what is intact of damaged transactions, from the end of the last one that was read up to `to`. Stops at a save
+    /// that was cut: nothing of it counts, and nothing is lost.
+    fn salvage<F: ReadNorFlash>(&mut self, flash: &mut F, to: u32) -> Result<(), F::Error> {
         self.tidy = false;
-        self.groups.iter_mut().for_each(|entry| entry.suspect = true);
+        while self.end < to {
+            let reach = self.page.reach_of_a_cut(flash, self.end)?;
+            if self.page.erased_from(flash, reach)? {
+                return Ok(());
+            }
+            let missing = match self.page.head(flash, self.end)? {
+                Some((named, end)) if end + self.page.format.tail() <= to => {
+                    self.salvage_named(flash, named, end)?
+                }
+                _ => self.salvage_unnamed(flash, to)?,
+            };
+            self.suspect(missing);
+            if missing == GroupSet::ALL {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// A transaction whose head is intact and which has named these groups: those of which there is no intact record.
+    fn salvage_named<F: ReadNorFlash>(
+        &mut self,
+        flash: &mut F,
+        named: GroupSet,
+        records_end: u32,
+    ) -> Result<GroupSet, F::Error> {
+        let found = self.records(flash, self.end + self.page.format.head(), records_end)?;
+        let missing = named.without(found);
+        self.pass(records_end, missing);
+        Ok(missing)
+    }
+
+    /// A transaction whose head is damaged. When its records follow each other up to a closing mark, nothing is missing;
+    /// otherwise any group may have been in it.
+    fn salvage_unnamed<F: ReadNorFlash>(&mut self, flash: &mut F, to: u32) -> Result<GroupSet, F::Error> {
+        let first = self.end + self.page.format.head();
+        let limit = to.saturating_sub(self.page.format.tail());
+        let (mut at, mut found) = (first, GroupSet::NONE);
+        while let Some(record) = self.page.record(flash, at, limit)? {
+            self.take_record(at, &record, &mut found);
+            at = record.end;
+        }
+        if at == first || !self.page.is_closed(flash, at)? {
+            return Ok(GroupSet::ALL);
+        }
+        self.pass(at, GroupSet::NONE);
+        Ok(GroupSet::NONE)
+    }
+
+    /// Goes on behind a transaction that is not whole.
+    fn pass(&mut self, records_end: u32, missing: GroupSet) {
+        if self.end == self.page.format.first() && missing == GroupSet::NONE {
+            self.first = First::Closed;
+        }
+        self.end = records_end + self.page.format.tail();
+    }
+
+    /// Notes that what was saved last of these groups cannot be read.
+    fn suspect(&mut self, groups: GroupSet) {
+        let named = self.groups.iter_mut().filter(|(group, _)| groups.contains(*group));
+        named.for_each(|(_, entry)| entry.suspect = true);
     }
 }
 
@@ -175,19 +238,22 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::format::{Check, ERASED, Format, guarded};
+    use crate::format::{Check, Contents, ERASED, Format, WORD};
+    use crate::group::Group;
     use crate::memory::Memory;
 
     const FORMAT: Format = Format::new(WORD).unwrap();
 
-    /// A page of 64 bytes with one transaction of these records.
-    fn scan(records: &[u32]) -> Scan {
-        let len = u16::try_from(records.len()).unwrap();
-        let mut words = [&[CLEAN, ERASED, MARK, guarded(1), guarded(len)], records].concat();
-        let mut check = Check::new(FORMAT.first());
-        for word in &words[3..] {
-            check.add(*word);
-        }
+    /// A page of 64 bytes with one transaction of these words, the first of them the head of a record.
+    fn scan(words_of_record: &[u32]) -> Scan {
+        let first = FORMAT.first();
+        let mut record = Check::new(first + FORMAT.head());
+        words_of_record.iter().for_each(|word| record.add(*word));
+        let record = [words_of_record, &[record.commit_word()]].concat();
+        let contents = Contents { words: u16::try_from(record.len()).unwrap(), groups: GroupSet(1) };
+        let mut words = [&[CLEAN, ERASED, MARK, contents.word().unwrap()], &record[..]].concat();
+        let mut check = Check::new(first);
+        words[3..].iter().for_each(|word| check.add(*word));
         words.extend([check.commit_word(), MARK]);
         words.resize(16, ERASED);
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -200,7 +266,8 @@ mod tests {
 
     #[test]
     fn a_record_ends_where_its_transaction_ends_at_the_latest() {
-        for (len, fits) in [(0, true), (1, true), (8, true), (9, false), (u32::MAX, false)] {
+        // Five to eight bytes have their check word where the test puts it.
+        for (len, fits) in [(5, true), (8, true), (9, false), (0xFFFF, false)] {
             let scan = scan(&[head(Group::Device), len, 0x1111, 0x2222]);
             let content = scan.groups.get(Group::Device).content;
             assert_eq!(matches!(content, Content::Value(slot) if slot.len == len), fits, "{len} bytes");

@@ -41,7 +41,7 @@ impl<F: ReadNorFlash> View<F> {
     }
 
     /// Puts the value of a group at the beginning of `buf`; `None` when there is none and the caller's defaults hold.
-    /// The value is checked once more against its transaction's CRC-32.
+    /// The value is checked once more against its CRC-32.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]; [`Error::Corrupt`] when the flash has changed since it was opened;
@@ -82,19 +82,18 @@ impl<F: ReadNorFlash> View<F> {
         self.flash
     }
 
-    /// Checks the transaction of a value again.
+    /// Checks the record of a value again.
     pub(crate) fn verify(&mut self, slot: &Slot) -> Result<(), Error<F::Error>> {
-        match slot.page.transaction(&mut self.flash, slot.transaction)? {
-            Some(_) => Ok(()),
-            None => Err(Error::Corrupt),
-        }
+        if self.is_intact(slot)? { Ok(()) } else { Err(Error::Corrupt) }
+    }
+
+    fn is_intact(&mut self, slot: &Slot) -> Result<bool, F::Error> {
+        Ok(slot.page.record(&mut self.flash, slot.record, slot.page.size)?.is_some())
     }
 
     /// Whether a stored value is intact and these bytes.
     pub(crate) fn holds(&mut self, slot: &Slot, value: &[u8]) -> Result<bool, F::Error> {
-        if slot.len as usize != value.len()
-            || slot.page.transaction(&mut self.flash, slot.transaction)?.is_none()
-        {
+        if slot.len as usize != value.len() || !self.is_intact(slot)? {
             return Ok(false);
         }
         let places = (slot.data..).step_by(WORD as usize);

@@ -3,8 +3,8 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::error::Error;
-use crate::format::{Check, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, guarded};
-use crate::group::{Change, Group, PerGroup};
+use crate::format::{Check, Contents, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, in_words};
+use crate::group::{Change, Group, GroupSet, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};
 
@@ -54,7 +54,7 @@ pub(crate) fn size(records: &Records<'_>, format: Format) -> u32 {
 
 fn records_size(records: &Records<'_>, format: Format) -> u32 {
     let records = records.iter().filter_map(|(_, record)| record.as_ref());
-    records.map(|record| format.record_head() + format.padded(record.len())).sum()
+    records.map(|record| format.record_head() + format.body(record.len())).sum()
 }
 
 /// Where the next unit goes.
@@ -62,7 +62,10 @@ pub(crate) struct Writer<'f, F> {
     flash: &'f mut F,
     page: Page,
     at: u32,
+    /// Of the transaction.
     check: Check,
+    /// Of the record under way.
+    record_check: Check,
     /// The words of a unit that is not full yet, and zeros.
     unit: [u8; LARGEST_UNIT as usize],
     filled: u32,
@@ -70,7 +73,8 @@ pub(crate) struct Writer<'f, F> {
 
 impl<'f, F: NorFlash> Writer<'f, F> {
     pub(crate) fn new(flash: &'f mut F, page: Page, at: u32) -> Self {
-        Writer { flash, page, at, check: Check::new(at), unit: [0; LARGEST_UNIT as usize], filled: 0 }
+        let (check, record_check) = (Check::new(at), Check::new(at));
+        Writer { flash, page, at, check, record_check, unit: [0; LARGEST_UNIT as usize], filled: 0 }
     }
 
     /// Programs a transaction. It counts from the commit word on; the closing mark after it says that the commit word
@@ -82,13 +86,16 @@ impl<'f, F: NorFlash> Writer<'f, F> {
     ) -> Result<(), Error<F::Error>> {
         let words = records_size(records, self.page.format) / WORD;
         let words = u16::try_from(words).map_err(|_| Error::TooLong)?;
+        let mut groups = GroupSet::NONE;
+        let named = records.iter().filter(|(_, record)| record.is_some());
+        named.for_each(|(group, _)| groups.insert(group));
+        let contents = Contents { words, groups }.word().ok_or(Error::TooLong)?;
         self.program(MARK)?;
-        self.word(guarded(generation))?;
-        self.word(guarded(words))?;
+        self.word(contents)?;
         self.fill()?;
         for (group, record) in records.iter() {
             if let Some(record) = record {
-                self.record(group, record)?;
+                self.record(group, record, generation)?;
             }
         }
         let check = core::mem::replace(&mut self.check, Check::new(0));
@@ -96,35 +103,40 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.program(MARK)
     }
 
-    fn record(&mut self, group: Group, record: &Record<'_>) -> Result<(), Error<F::Error>> {
+    fn record(&mut self, group: Group, record: &Record<'_>, generation: u16) -> Result<(), Error<F::Error>> {
         let (kind, version) = match *record {
             Record::Set { version, .. } | Record::Kept(Slot { version, .. }) => (KIND_VALUE, version),
             Record::Restored => (KIND_RESTORED, 0),
         };
+        self.record_check = Check::new(self.at);
         let [low, high] = version.to_le_bytes();
         self.word(u32::from_le_bytes([group.id(), kind, low, high]))?;
-        self.word(record.len())?;
+        let len = u16::try_from(record.len()).map_err(|_| Error::TooLong)?;
+        self.word(u32::from(len) | u32::from(generation) << 16)?;
         self.fill()?;
         match *record {
-            Record::Set { value, .. } => self.value(value),
-            Record::Kept(slot) => self.copy(&slot),
-            Record::Restored => Ok(()),
+            Record::Set { value, .. } => self.value(value)?,
+            Record::Kept(slot) => self.copy(&slot)?,
+            Record::Restored => {}
         }
+        let check = core::mem::replace(&mut self.record_check, Check::new(0));
+        self.word(check.commit_word())?;
+        self.fill()
     }
 
-    /// The value and zeros up to a whole unit.
+    /// The value and zeros up to a whole word.
     fn value(&mut self, value: &[u8]) -> Result<(), Error<F::Error>> {
         for chunk in value.chunks(WORD as usize) {
             let mut word = [0; WORD as usize];
             word.iter_mut().zip(chunk).for_each(|(to, from)| *to = *from);
             self.word(u32::from_le_bytes(word))?;
         }
-        self.fill()
+        Ok(())
     }
 
     /// A value that is in flash already: no buffer is needed to move it.
     fn copy(&mut self, slot: &Slot) -> Result<(), Error<F::Error>> {
-        let end = slot.data + self.page.format.padded(slot.len);
+        let end = slot.data + in_words(slot.len);
         for at in (slot.data..end).step_by(WORD as usize) {
             let word = slot.page.word(self.flash, at)?;
             self.word(word)?;
@@ -140,9 +152,10 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// A word that the commit word vouches for.
+    /// A word that the check of the record and the commit word vouch for.
     fn word(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         self.check.add(word);
+        self.record_check.add(word);
         self.put(word)
     }
 

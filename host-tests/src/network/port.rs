@@ -45,6 +45,10 @@ impl Mailboxes for Boxes {
         let is_sending = self.frames.first().is_some_and(|first| self.on_wire == Some(first.id()));
         Offer::Replaced(self.frames.remove(usize::from(is_sending)))
     }
+
+    fn is_idle(&self) -> bool {
+        self.frames.is_empty()
+    }
 }
 
 impl Port {
@@ -103,6 +107,10 @@ impl Transmit for Port {
 
     fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.queue.send_state(frame)
+    }
+
+    fn send_boot_up(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.queue.send_boot_up(frame)
     }
 
     fn room(&self) -> usize {

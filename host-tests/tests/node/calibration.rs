@@ -4,7 +4,7 @@ use host_tests::bench::{Bench, raw};
 use node::Personality;
 use profiles::board::RawSample;
 
-const ACCESS: u32 = 0x0601_0000;
+const DEVICE_STATE: u32 = 0x0800_0022;
 const PARAMETER: u32 = 0x0604_0043;
 const INVALID_VALUE: u32 = 0x0609_0030;
 const TOO_HIGH: u32 = 0x0609_0031;
@@ -45,10 +45,10 @@ fn reset(bench: &mut Bench, command: u8) {
 #[test]
 fn the_lock_opens_with_its_key_until_the_node_is_reset() {
     let mut bench = Bench::booted();
-    assert_eq!(write_real(&mut bench, 0x2200, 3, 0.11), Err(ACCESS));
+    assert_eq!(write_real(&mut bench, 0x2200, 3, 0.11), Err(DEVICE_STATE));
     for wrong in [*b"Cali", *b"save", [1, 0, 0, 0]] {
         assert_eq!(bench.write(0x2203, 0, &wrong), Err(NOT_STORED));
-        assert_eq!(write_real(&mut bench, 0x2200, 3, 0.11), Err(ACCESS));
+        assert_eq!(write_real(&mut bench, 0x2200, 3, 0.11), Err(DEVICE_STATE));
     }
     bench.write(0x2203, 0, b"cali").unwrap();
     assert_eq!(bench.write(0x2203, 0, b"ilac"), Err(NOT_STORED), "a wrong key does not close it");
@@ -57,10 +57,10 @@ fn the_lock_opens_with_its_key_until_the_node_is_reset() {
     reset(&mut bench, RESET_COMMUNICATION);
     assert_eq!(bench.write(0x2202, 1, &[2, 0, 0, 0]), Ok(()));
     bench.write(0x2203, 0, &[0; 4]).unwrap();
-    assert_eq!(bench.write(0x2202, 1, &[3, 0, 0, 0]), Err(ACCESS));
+    assert_eq!(bench.write(0x2202, 1, &[3, 0, 0, 0]), Err(DEVICE_STATE));
     bench.write(0x2203, 0, b"cali").unwrap();
     reset(&mut bench, RESET_NODE);
-    assert_eq!(bench.write(0x2202, 1, &[4, 0, 0, 0]), Err(ACCESS));
+    assert_eq!(bench.write(0x2202, 1, &[4, 0, 0, 0]), Err(DEVICE_STATE));
     assert_eq!(bench.read(0x2203, 0), Ok(vec![0; 4]));
 }
 

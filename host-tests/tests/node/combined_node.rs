@@ -75,7 +75,7 @@ fn a_broken_sensor_of_each_device_has_its_own_flag() {
     bench.write(0x2100, 1, &[2]).unwrap();
     (0..5).for_each(|_| bench.sample(&broken));
     assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 5, 1, 0, 0]));
-    assert_eq!(bench.read(0x1002, 0), Ok(vec![1, 0, 0, 0]));
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![5, 0, 0, 0]));
     let details: Vec<u8> =
         bench.take().iter().filter(|(id, _)| *id == 0x80 + u16::from(ID)).map(|(_, data)| data[3]).collect();
     assert_eq!(details, [0, 1], "both are 5006h");

@@ -57,6 +57,9 @@ impl Any {
             Bus::StoredData(Group::Communication),
             Bus::StoredData(Group::Application),
             Bus::StoredData(Group::Calibration),
+            Bus::OlderData(Group::Communication),
+            Bus::OlderData(Group::Application),
+            Bus::OlderData(Group::Calibration),
         ];
         FAULTS.into_iter().map(Any::Node).chain(bus.into_iter().map(Any::Bus))
     }
@@ -65,6 +68,7 @@ impl Any {
         match self {
             Any::Node(fault) => fault.name.into(),
             Any::Bus(canopen::Fault::StoredData(group)) => format!("{group:?}Data"),
+            Any::Bus(canopen::Fault::OlderData(group)) => format!("Older{group:?}Data"),
             Any::Bus(fault) => format!("{fault:?}"),
         }
     }
@@ -150,19 +154,40 @@ fn provoke_on_bus(bench: &mut Bench, fault: canopen::Fault) {
             bench.receive(&Frame::new(0x705, &[5]).unwrap());
         }
         Fault::StoredData(group) => return lose_stored(bench, group),
+        Fault::OlderData(group) => {
+            store(bench, group, 5);
+            return lose_stored(bench, group);
+        }
         Fault::Application(_) => unreachable!("the node names its own"),
     }
     (0..1000).for_each(|_| bench.sample(&intact()));
 }
 
-/// Stores a group, and starts with one bit of it changed.
-fn lose_stored(bench: &mut Bench, group: Group) {
+/// Stores a group with a value that it has not had.
+fn store(bench: &mut Bench, group: Group, value: u8) {
     let (index, sub) = match group {
-        Group::Communication => (0x1010, 2),
-        Group::Application => (0x1010, 3),
-        Group::Calibration => (0x2204, 0),
+        Group::Communication => {
+            bench.write(0x1017, 0, &[value, 0]).unwrap();
+            (0x1010, 2)
+        }
+        Group::Application => {
+            bench.write(0x4000, 1, &[value, 0, 0, 0]).unwrap();
+            (0x1010, 3)
+        }
+        Group::Calibration => {
+            bench.write(0x2203, 0, b"cali").unwrap();
+            bench.write(0x2202, 1, &[value, 0, 0, 0]).unwrap();
+            (0x2204, 0)
+        }
     };
     bench.write(index, sub, b"save").unwrap();
+}
+
+/// Stores a group, and starts with one bit of it changed. The first save of all says something of every group, so it is one of
+/// another group.
+fn lose_stored(bench: &mut Bench, group: Group) {
+    store(bench, if group == Group::Application { Group::Communication } else { Group::Application }, 3);
+    store(bench, group, 7);
     *bench = std::mem::replace(bench, Bench::booted()).power_cycled_with_damage();
     bench.restart();
     (0..20).for_each(|_| bench.sample(&intact()));
@@ -216,6 +241,8 @@ fn every_fault_is_told_in_an_emcy_in_the_list_in_the_register_and_in_its_flag() 
         };
         assert_eq!(([*a, *b], detail), ([low, high], &fault.condition().detail), "{row:X?}");
         assert_eq!(register & 1, 1, "{row:X?}");
+        let is_alone = messages.iter().all(|data| data[..2] == [low, high] || data[..2] == [0, 0]);
+        assert!(is_alone || row.code >> 8 != 0x63, "only the group that is damaged is told: {messages:X?}");
         let listed: Vec<_> = (1..=10).filter_map(|sub| bench.read(0x1003, sub).ok()).collect();
         assert!(listed.contains(&vec![low, high, 0, 0]), "{row:X?}: {listed:X?}");
         let is_over = messages.last().is_some_and(|data| data[..2] == [0, 0]);
@@ -223,6 +250,11 @@ fn every_fault_is_told_in_an_emcy_in_the_list_in_the_register_and_in_its_flag() 
         if let Some((index, sub, bit)) = row.flag {
             let flags = u32::from_le_bytes(bench.read(index, sub).unwrap().try_into().unwrap());
             assert_ne!(flags & 1 << bit, 0, "{row:X?}: {flags:X}");
+            assert!(flags == 1 << bit || row.code >> 8 != 0x63, "{row:X?}: {flags:X}");
+            let other = u32::from_le_bytes(bench.read(index, 4 - sub).unwrap().try_into().unwrap());
+            assert!(other == 0 || row.code >> 8 != 0x63, "{row:X?}: {other:X}");
+            let summary = bench.read(0x1002, 0).unwrap()[0];
+            assert_eq!(summary, u8::from(sub == 1) | 1 << 2, "{row:X?}: 1002h");
         }
     }
 }

@@ -82,8 +82,10 @@ fn writing_is_refused_or_taken_as_the_access_says() {
             _ => bench.read(row.index, row.sub).unwrap(),
         };
         let expected = match (row.index, row.sub) {
-            // Factory data and the calibration are locked.
-            (0x2107 | 0x2200..=0x2202, _) => Err(ACCESS),
+            // Factory data are locked.
+            (0x2107, _) => Err(ACCESS),
+            // The calibration is locked until the key is written.
+            (0x2200..=0x2202, _) => Err(DEVICE_STATE),
             // There is no second encoder.
             (0x6010, 2) => Err(DEVICE_STATE),
             // Nothing was measured yet.

@@ -127,7 +127,7 @@ fn a_broken_sensor_is_found_within_a_second_and_signalled_everywhere() {
     assert_eq!(emergencies(&mut bench), [(0x5006, 1)]);
     assert_eq!(bench.read(0x6150, 1), Ok(vec![1 | 4]));
     assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 5, 0, 0, 0]));
-    assert_eq!(bench.read(0x1002, 0), Ok(vec![1, 0, 0, 0]));
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![5, 0, 0, 0]));
     assert_eq!(bench.read(0x1001, 0), Ok(vec![1]));
     assert_eq!(bench.read(0x1003, 1), Ok(vec![0x06, 0x50, 0, 0]));
     assert_eq!(bench.protocol.state(), State::PreOperational);
@@ -201,11 +201,11 @@ fn flags_survive_a_reset_as_what_they_report_does() {
 fn bus_off_applies_the_communication_error_behaviour_and_is_told_afterwards() {
     let mut bench = operational();
     bench.bus_event(BusEvent::Passive);
-    assert_eq!(emergencies(&mut bench), [(0x8120, 0x11)]);
+    assert_eq!(emergencies(&mut bench), [(0x8120, 1)]);
     bench.bus_event(BusEvent::BusOff);
     assert_eq!(bench.protocol.state(), State::PreOperational);
     bench.bus_event(BusEvent::Recovered);
-    assert_eq!(emergencies(&mut bench), [(0x8140, 0x11), (0, 0)]);
+    assert_eq!(emergencies(&mut bench), [(0x8140, 1), (0, 0)]);
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn a_warning_says_nothing_and_an_overrun_is_an_event() {
     bench.bus_event(BusEvent::Warning);
     assert_eq!(emergencies(&mut bench), []);
     bench.bus_event(BusEvent::Overrun);
-    assert_eq!(emergencies(&mut bench), [(0x8110, 0x11), (0, 0)]);
+    assert_eq!(emergencies(&mut bench), [(0x8110, 1), (0, 0)]);
     assert_eq!(bench.protocol.state(), State::Operational);
 }
 

@@ -78,14 +78,14 @@ impl Device {
     }
 
     /// The default of a row. The node itself fills in the identity, which is not in the table; the serial number is
-    /// another one in each device.
+    /// another one in each device, and the identification of the program another one in each version.
     fn default(&self, row: &Row) -> Option<Formula> {
         let number = |value: u32| Some(Formula::Constant(Value::Integer(value.into())));
         match (row.index, row.sub) {
             (0x1018, 1) => number(VENDOR_ID),
             (0x1018, 2) => number(self.personality.product_code()),
             (0x1018, 3) => number(REVISION),
-            (0x1018, 4) => None,
+            (0x1018, 4) | (0x1F56, 1) => None,
             _ => default(row.default),
         }
     }

@@ -52,12 +52,6 @@ impl Transmitter {
         }
     }
 
-    /// Whether all mailboxes are empty: everything that was sent is on the wire.
-    pub fn is_idle(&self) -> bool {
-        let status = registers().tsr().read();
-        status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
-    }
-
     /// Puts a frame into the first mailbox, if that is free. For whoever uses no other: frames keep their order then.
     pub fn put(&mut self, frame: &Frame) -> bool {
         let is_free = registers().tsr().read().tme0().bit_is_set();
@@ -94,6 +88,11 @@ impl Mailboxes for Transmitter {
         let replaced = replaced.filter(|_| !is_sent(number));
         load(last, frame);
         replaced.map_or(Offer::Taken, Offer::Replaced)
+    }
+
+    fn is_idle(&self) -> bool {
+        let status = registers().tsr().read();
+        status.tme0().bit_is_set() && status.tme1().bit_is_set() && status.tme2().bit_is_set()
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a device does beyond CANopen, as the device sees it.
 
-use super::Stored;
+use super::{Soundness, Stored};
 use crate::dictionary::{Entry, Group};
 use crate::emcy::{Condition, Fault};
 use crate::nmt::State;
@@ -18,6 +18,12 @@ pub trait Application {
 
     /// The faults of the application itself, at most 32. [`Fault::Application`] names one by its place here.
     const CONDITIONS: &'static [Condition] = &[];
+
+    /// The bits of the error register (1001h) that the device has. The generic error, bit 0, must be one of them (CiA 301,
+    /// 7.5.2.2).
+    fn register_bits(&self) -> u8 {
+        0xFF
+    }
 
     /// Fills in what no table can know (identity, versions, the last measured values), after every reset.
     fn initialise(&mut self, _image: &mut [u8]) {}
@@ -61,7 +67,7 @@ pub trait Application {
 
     /// What is stored of a group, for every reset that covers it.
     fn stored(&self, _group: Group) -> Stored<'_> {
-        Stored { packed: &[], is_sound: true }
+        Stored { packed: &[], soundness: Soundness::Whole }
     }
 
     /// Whether what is stored of a group was sound and fitted the dictionary. Where it did not fit, the group has its

@@ -52,12 +52,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Sets or clears a fault of the application, by its number in [`Application::CONDITIONS`]. It is signalled once, until
     /// it is cleared.
     pub fn set_condition(&mut self, number: u8, active: bool, now: Instant) -> Next {
-        let fault = Fault::Application(number);
-        if active {
-            self.core.raise(fault, now);
-        } else {
-            self.core.clear(fault, now);
-        }
+        self.core.set_fault(Fault::Application(number), active, now);
         self.process_next()
     }
 
@@ -106,6 +101,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if self.emcy.clear(fault, now) {
             self.fault_changed(fault, false);
         }
+    }
+
+    pub(super) fn set_fault(&mut self, fault: Fault, active: bool, now: Instant) {
+        if active { self.raise(fault, now) } else { self.clear(fault, now) }
     }
 
     fn fault_changed(&mut self, fault: Fault, active: bool) {

@@ -23,7 +23,7 @@ mod watches;
 pub use application::{Application, ErrorClass, Part};
 pub use faults::BusEvent;
 pub use next::{Action, Next};
-pub use store::{Job, Stored};
+pub use store::{Job, Soundness, Stored};
 
 use crate::dictionary::{Dictionary, Groups};
 use crate::lss::{BitRate, Configuration, Slave};
@@ -88,8 +88,10 @@ struct Core<A, const N: usize, const T: usize, const R: usize, const W: usize, c
     services_due: Instant,
     pending: state::Pending,
     jobs: store::Jobs,
-    /// The groups whose stored values were not loaded as they should.
-    unsound: Groups,
+    /// The groups of which the defaults hold although values are stored.
+    lost: Groups,
+    /// The groups of which older values hold than those that were stored last.
+    older: Groups,
     is_bus_off: bool,
 }
 
@@ -107,6 +109,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         application: A,
     ) -> Device<A, N, T, R, W, M> {
         let node_id = node_id.into();
+        let emcy = emcy::Producer::new(A::CONDITIONS, application.register_bits());
         Device {
             server: Server::new(),
             reply_due: Instant::NEVER,
@@ -125,7 +128,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 heartbeat: heartbeat::Producer::new(),
                 watches: heartbeat::Consumer::new(),
                 sync: sync::Consumer::new(),
-                emcy: emcy::Producer::new(A::CONDITIONS),
+                emcy,
                 tpdos: [const { Tpdo::new() }; T],
                 rpdos: [const { Rpdo::new() }; R],
                 rpdo_filter: 0,
@@ -136,7 +139,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 services_due: Instant::NEVER,
                 pending: state::Pending::new(),
                 jobs: store::Jobs::new(),
-                unsound: Groups::NONE,
+                lost: Groups::NONE,
+                older: Groups::NONE,
                 is_bus_off: false,
             },
         }

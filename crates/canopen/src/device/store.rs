@@ -38,8 +38,20 @@ pub enum Job {
 pub struct Stored<'a> {
     /// As [`Dictionary::pack`](crate::dictionary::Dictionary::pack) has made it; empty for the defaults.
     pub packed: &'a [u8],
-    /// The memory is sure that it is what was stored last.
-    pub is_sound: bool,
+    /// Whether it is what was stored last.
+    pub soundness: Soundness,
+}
+
+/// How far what is stored of a group can be trusted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Soundness {
+    /// It is what was stored last, or nothing was.
+    #[default]
+    Whole,
+    /// What was stored last is damaged; this was stored before it.
+    Older,
+    /// What was stored is damaged, and nothing older is left.
+    Lost,
 }
 
 /// The job under way and who waits for its end.
@@ -162,21 +174,23 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if A::SERVICES_ONLY {
             return;
         }
-        let Stored { packed, is_sound } = self.application.stored(group);
+        let Stored { packed, soundness } = self.application.stored(group);
         let fits =
             self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
         if !fits {
             self.load_defaults(Scope::Group(group));
         }
-        self.unsound.set(group, !(fits && is_sound));
-        self.application.loaded(group, fits && is_sound);
+        self.lost.set(group, !fits || soundness == Soundness::Lost);
+        self.older.set(group, fits && soundness == Soundness::Older);
+        self.application.loaded(group, fits && soundness == Soundness::Whole);
     }
 
     /// Says on the bus what could not be loaded.
     pub(super) fn report_stored(&mut self, now: Instant) {
         for group in Group::ALL {
-            let fault = Fault::StoredData(group);
-            if self.unsound.contains(group) { self.raise(fault, now) } else { self.clear(fault, now) }
+            let (lost, older) = (self.lost.contains(group), self.older.contains(group));
+            self.set_fault(Fault::StoredData(group), lost, now);
+            self.set_fault(Fault::OlderData(group), older, now);
         }
     }
 }

@@ -26,8 +26,12 @@ pub enum Fault {
     RpdoTooLong(u16),
     /// An RPDO, counted the same way, did not come in time (8250h).
     RpdoDeadline(u16),
-    /// The stored values of a group could not be loaded (6302h, 6303h; 6300h for the calibration).
+    /// The stored values of a group could not be loaded, and the defaults hold (6302h, 6303h; 6300h for the calibration;
+    /// the first byte of the error field is 2).
     StoredData(Group),
+    /// What was stored last of a group could not be loaded, and the values that were stored before hold (the same codes; the
+    /// first byte of the error field is 1).
+    OlderData(Group),
     /// A condition of the application, by its place in
     /// [`Application::CONDITIONS`](crate::Application::CONDITIONS).
     Application(u8),
@@ -53,13 +57,17 @@ impl Condition {
     }
 }
 
+/// Error field of an EMCY about stored data: what holds instead of what was stored last.
+const OLDER_HOLDS: u16 = 1;
+const DEFAULTS_HOLD: u16 = 2;
+
 /// The error register: any fault, and communication.
 const GENERIC: u8 = 1;
 const COMMUNICATION: u8 = 1 << 4;
 
 impl Fault {
     /// The communication faults that exist once, in the order of their bits, and those of the storage groups.
-    const SINGLE: [Fault; 9] = [
+    const SINGLE: [Fault; 12] = [
         Fault::Overrun,
         Fault::ErrorPassive,
         Fault::BusOffRecovered,
@@ -69,6 +77,9 @@ impl Fault {
         Fault::StoredData(Group::Communication),
         Fault::StoredData(Group::Application),
         Fault::StoredData(Group::Calibration),
+        Fault::OlderData(Group::Communication),
+        Fault::OlderData(Group::Application),
+        Fault::OlderData(Group::Calibration),
     ];
     /// Bits of the communication faults among them.
     const OF_COMMUNICATION: u16 = 0x3F;
@@ -83,12 +94,13 @@ impl Fault {
             Fault::SyncLength => Some(4),
             Fault::MpdoNotTaken => Some(5),
             Fault::StoredData(group) => Some(6 + group as u8),
+            Fault::OlderData(group) => Some(9 + group as u8),
             _ => None,
         }
     }
 
     /// How the fault looks on the bus. Of faults that exist several times the error field says which one it is, from 1,
-    /// in its first two bytes. `conditions` are those of the application.
+    /// in its first two bytes; of stored data the first byte says what holds instead. `conditions` are those of the application.
     #[must_use]
     pub fn condition(self, conditions: &[Condition]) -> Condition {
         let code = match self {
@@ -102,21 +114,25 @@ impl Fault {
             Fault::RpdoTooShort(_) => 0x8210,
             Fault::RpdoTooLong(_) => 0x8220,
             Fault::RpdoDeadline(_) => 0x8250,
-            Fault::StoredData(Group::Communication) => 0x6302,
-            Fault::StoredData(Group::Application) => 0x6303,
-            Fault::StoredData(Group::Calibration) => 0x6300,
+            Fault::StoredData(group) | Fault::OlderData(group) => match group {
+                Group::Communication => 0x6302,
+                Group::Application => 0x6303,
+                Group::Calibration => 0x6300,
+            },
             Fault::Application(number) => {
                 return conditions.get(usize::from(number)).copied().unwrap_or(Condition::new(0x1000));
             }
         };
-        let [low, high] = self.instance().to_le_bytes();
+        let [low, high] = self.detail().to_le_bytes();
         let register = if code >> 8 == 0x63 { 0 } else { COMMUNICATION };
         Condition { code, register, detail: [low, high, 0, 0, 0] }
     }
 
-    /// Which one of those that exist several times, from 1; 0 for the others.
-    const fn instance(self) -> u16 {
+    /// Which one of those that exist several times, from 1; what holds instead of stored data; 0 for the others.
+    const fn detail(self) -> u16 {
         match self {
+            Fault::OlderData(_) => OLDER_HOLDS,
+            Fault::StoredData(_) => DEFAULTS_HOLD,
             Fault::Heartbeat(number) => number as u16 + 1,
             Fault::RpdoTooShort(number) | Fault::RpdoTooLong(number) | Fault::RpdoDeadline(number) => {
                 number.saturating_add(1)

@@ -16,6 +16,8 @@ const WAITING: usize = 8;
 pub(crate) struct Producer {
     /// Those of the application.
     conditions: &'static [Condition],
+    /// The bits of the error register that the device has.
+    register_bits: u8,
     /// 1014h; `None` while bit 31 says that there is no EMCY.
     id: Option<CobId>,
     active: FaultSet,
@@ -29,9 +31,10 @@ pub(crate) struct Producer {
 }
 
 impl Producer {
-    pub(crate) const fn new(conditions: &'static [Condition]) -> Producer {
+    pub(crate) const fn new(conditions: &'static [Condition], register_bits: u8) -> Producer {
         Producer {
             conditions,
+            register_bits,
             id: None,
             active: FaultSet::EMPTY,
             history: History::new(),
@@ -97,7 +100,7 @@ impl Producer {
     /// The error register, object 1001h.
     #[inline(never)]
     pub(crate) fn register(&self) -> u8 {
-        self.active.register(self.conditions)
+        self.active.register(self.conditions) & self.register_bits
     }
 
     pub(crate) fn history(&self) -> &History {

@@ -43,7 +43,7 @@ impl Producer {
         }
         let message = |state: State| Frame::data_frame(id, 1, [state.code(), 0, 0, 0, 0, 0, 0, 0]);
         let sent = if self.boot_up {
-            turn.send(message(State::Initialising))
+            turn.send_boot_up(message(State::Initialising))
         } else {
             turn.send_state(message(state))
         };

@@ -5,7 +5,7 @@ use canopen::nmt::State;
 use canopen::sdo::{Abort, Bytes, Initiate, Multiplexer, Request, Response, Segment};
 use canopen::{
     Action, Application, BusEvent, Condition, Device, Duration, ErrorClass, Fault, Frame, Instant, Next,
-    NodeId, Part, QueueFull, Stored, Transmit,
+    NodeId, Part, QueueFull, Soundness, Stored, Transmit,
 };
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
@@ -181,7 +181,8 @@ impl Application for Numbers {
             Group::Application => application,
             Group::Calibration => calibration,
         };
-        Stored { packed, is_sound: !self.is_damaged }
+        let soundness = if self.is_damaged { Soundness::Older } else { Soundness::Whole };
+        Stored { packed, soundness }
     }
 
     fn loaded(&mut self, group: Group, good: bool) {

@@ -18,10 +18,11 @@
 //! * Zero is signalled below its limit, the others above theirs; where the first limit that is on is the highest,
 //!   everything is the other way round.
 //! * The reference weight (6486h) is the load in the car at the moment when it is written.
-//! * A sensor that is broken gives the highest load there is: a car that cannot be weighed does not leave.
+//! * A sensor that is broken gives the highest load there is: a car that cannot be weighed does not leave. That holds until the
+//!   filter is full of samples of an intact sensor.
 
 use crate::board::{ChipThermometer, RawSample};
-use crate::pressure::{Calibration, Filter};
+use crate::pressure::{Calibration, Filter, Recovery};
 
 /// Load signal (6482h): the car is empty.
 pub const ZERO_LOAD: u8 = 1 << 0;
@@ -109,6 +110,7 @@ pub struct LoadUnit {
     parameters: Parameters,
     line: Option<(f32, f32)>,
     filter: Filter,
+    recovery: Recovery,
 }
 
 impl LoadUnit {
@@ -116,7 +118,8 @@ impl LoadUnit {
     #[must_use]
     pub fn new(chip: ChipThermometer, parameters: &Parameters) -> LoadUnit {
         let filter = Filter::new(parameters.filter_type, parameters.filter_constant);
-        LoadUnit { chip, parameters: *parameters, line: parameters.line(), filter }
+        let recovery = Recovery::default();
+        LoadUnit { chip, parameters: *parameters, line: parameters.line(), filter, recovery }
     }
 
     /// Takes over parameters, from the next sample on. The filter only starts afresh when it is another one.
@@ -124,17 +127,18 @@ impl LoadUnit {
     pub fn apply(&mut self, parameters: &Parameters) {
         let fresh = LoadUnit::new(self.chip, parameters);
         let filter = if fresh.filter.is_like(&self.filter) { self.filter } else { fresh.filter };
-        *self = LoadUnit { filter, ..fresh };
+        *self = LoadUnit { filter, recovery: self.recovery, ..fresh };
     }
 
     /// Processes the sums of one millisecond.
     pub fn sample(&mut self, raw: &RawSample) -> Snapshot {
         let Some((factor, constant)) = self.line else { return Snapshot::default() };
         let p = &self.parameters;
-        let is_broken = p.transducer.pressure.is_break(raw.ratio()) || raw.is_rail(raw.pressure);
+        let is_bad = p.transducer.pressure.is_break(raw.ratio()) || raw.is_rail(raw.pressure);
+        let is_broken = self.recovery.next(is_bad, &mut self.filter);
+        let kelvin = p.transducer.temperature.temperature(raw, self.chip);
+        let pascal = self.filter.next(p.transducer.pressure.pressure(raw.ratio(), kelvin));
         if is_broken {
-            // What comes after it shall not be mixed with what was before.
-            self.filter = Filter::new(p.filter_type, p.filter_constant);
             let (load, measured) = (u16::MAX, f32::from(u16::MAX));
             return Snapshot {
                 load,
@@ -144,9 +148,7 @@ impl LoadUnit {
                 is_broken,
             };
         }
-        let kelvin = p.transducer.temperature.temperature(raw, self.chip);
-        let pascal = p.transducer.pressure.pressure(raw.ratio(), kelvin);
-        let measured = self.filter.next(pascal) * factor + constant;
+        let measured = pascal * factor + constant;
         let load = rounded(measured);
         Snapshot { load, measured, signals: signals(load, &p.limits), offset: p.offset, is_broken }
     }
@@ -258,7 +260,28 @@ mod tests {
             assert_eq!((snapshot.load, snapshot.signals & OVERLOAD), (u16::MAX, OVERLOAD));
             assert!(snapshot.is_broken);
         }
+        assert!(unit.sample(&raw(2.0e5)).is_broken, "the sample in which it ends does not count");
         assert_eq!(unit.sample(&raw(2.0e5)).load, 0);
+    }
+
+    /// No load that is too small and no signal of it, whatever the sample says in which the fault ends.
+    #[test]
+    fn after_a_fault_the_first_load_is_the_right_one() {
+        for (kind, constant) in [(0, 1), (1, 20), (2, 100)] {
+            let parameters = Parameters { filter_type: kind, filter_constant: constant, ..hydraulic() };
+            let mut unit = LoadUnit::new(ChipThermometer::UNKNOWN, &parameters);
+            unit.sample(&raw(5.5e5));
+            unit.sample(&RawSample { pressure: 0, ..raw(0.0) });
+            let half_over = unit.sample(&raw(2.5e5));
+            let mut held = vec![half_over];
+            held.extend((0..constant - 1).map(|_| unit.sample(&raw(5.5e5))));
+            for snapshot in held {
+                assert_eq!((snapshot.load, snapshot.is_broken), (u16::MAX, true), "{kind}");
+                assert_eq!(snapshot.signals & OVERLOAD, OVERLOAD);
+            }
+            let snapshot = unit.sample(&raw(5.5e5));
+            assert_eq!((snapshot.load, snapshot.is_broken), (700, false), "{kind}");
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! One analogue input channel of CiA 404: from the field value to the process value in three formats, and its status.
 
 use super::precise::Precise;
-use super::{Filter, Unit};
+use super::{Filter, Recovery, Unit};
 
 /// 6150h bit 0: clipped or not measured.
 pub const STATUS_INVALID: u8 = 0x01;
@@ -90,6 +90,7 @@ pub struct ChannelValues {
 pub struct Channel {
     parameters: ChannelParameters,
     filter: Filter,
+    recovery: Recovery,
     /// 10 to the power of the decimal digits.
     shift: f32,
 }
@@ -99,14 +100,21 @@ impl Channel {
     #[must_use]
     pub fn new(parameters: &ChannelParameters) -> Channel {
         let filter = Filter::new(parameters.filter_type, parameters.filter_constant);
-        Channel { parameters: *parameters, filter, shift: shift(parameters.digits) }
+        let recovery = Recovery::default();
+        Channel { parameters: *parameters, filter, recovery, shift: shift(parameters.digits) }
     }
 
     /// Takes over parameters. The filter only starts afresh when it is another one.
     pub fn apply(&mut self, parameters: &ChannelParameters) {
         let fresh = Channel::new(parameters);
         let filter = if fresh.filter.is_like(&self.filter) { self.filter } else { fresh.filter };
-        *self = Channel { filter, ..fresh };
+        *self = Channel { filter, recovery: self.recovery, ..fresh };
+    }
+
+    /// Takes note of whether the next field value comes from an intact sensor, and says whether the values are still those of
+    /// a fault: a fault holds until the filter is full of good samples.
+    pub fn is_faulty(&mut self, is_faulty: bool) -> bool {
+        self.recovery.next(is_faulty, &mut self.filter)
     }
 
     /// Processes one field value in Pa or K. `valid` is false when it does not come from an intact sensor.

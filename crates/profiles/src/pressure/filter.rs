@@ -42,6 +42,20 @@ impl Filter {
         (self.kind, self.constant) == (other.kind, other.constant)
     }
 
+    /// How many inputs fill it: the constant, or one where there is no filter.
+    #[must_use]
+    pub fn length(&self) -> u16 {
+        match self.kind {
+            Kind::None => 1,
+            Kind::MovingAverage | Kind::RepeatingAverage => self.constant.into(),
+        }
+    }
+
+    /// Forgets all inputs.
+    pub fn restart(&mut self) {
+        (self.output, self.sum, self.count) = (None, Precise::ZERO, 0);
+    }
+
     /// Takes an input and gives the output. The first input is the first output, so that nothing starts with a step from 0.
     pub fn next(&mut self, input: f32) -> f32 {
         match self.kind {

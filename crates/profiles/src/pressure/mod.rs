@@ -8,6 +8,7 @@ mod calibration;
 mod channel;
 mod filter;
 mod precise;
+mod recovery;
 mod thermometer;
 mod transmitter;
 mod unit;
@@ -20,6 +21,7 @@ pub use channel::{
 };
 pub use filter::Filter;
 pub use objects::{FAULTS, Objects, ROWS, fields, handles};
+pub use recovery::Recovery;
 pub use thermometer::{TemperatureCalibration, Thermistor, Thermometer};
 pub use transmitter::{Calibration, Conditions, Parameters, Snapshot, Transmitter};
 pub use unit::Unit;

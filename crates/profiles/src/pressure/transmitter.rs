@@ -77,6 +77,8 @@ pub struct Transmitter {
     pressure: Channel,
     temperature: Channel,
     sensor_break: bool,
+    pressure_rail: bool,
+    temperature_rail: bool,
     /// Samples until the next look for a sensor break.
     until_check: u16,
 }
@@ -84,6 +86,7 @@ pub struct Transmitter {
 impl Transmitter {
     /// A chain that has not measured yet, in a chip with this temperature sensor.
     #[must_use]
+    #[inline(never)] // Called once, from several places.
     pub fn new(chip: ChipThermometer, parameters: &Parameters) -> Transmitter {
         Transmitter {
             chip,
@@ -91,6 +94,8 @@ impl Transmitter {
             pressure: Channel::new(&parameters.pressure),
             temperature: Channel::new(&parameters.temperature),
             sensor_break: false,
+            pressure_rail: false,
+            temperature_rail: false,
             until_check: 0,
         }
     }
@@ -104,13 +109,8 @@ impl Transmitter {
 
     fn measure(&mut self, raw: &RawSample, snapshot: &mut Snapshot) {
         let ratio = raw.ratio();
-        self.check_break(ratio);
         let kelvin = self.calibration.temperature.temperature(raw, self.chip);
-        let conditions = Conditions {
-            sensor_break: self.sensor_break,
-            pressure_rail: raw.is_rail(raw.pressure),
-            temperature_rail: kelvin.is_none(),
-        };
+        let conditions = self.check(raw, ratio, kelvin.is_none());
         let pressure = self.calibration.pressure.pressure(ratio, kelvin);
         let is_valid = !conditions.sensor_break && !conditions.pressure_rail;
         snapshot.pressure = self.pressure.sample(pressure, is_valid);
@@ -119,10 +119,22 @@ impl Transmitter {
         snapshot.conditions = conditions;
     }
 
-    fn check_break(&mut self, ratio: f32) {
+    /// What is wrong with the sensors. A condition that is there holds until the filter behind it is full of good samples.
+    fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
+        let (is_break, is_rail) = (self.calibration.pressure.is_break(ratio), raw.is_rail(raw.pressure));
+        let holds = self.pressure.is_faulty(is_break || is_rail);
+        self.pressure_rail = is_rail || self.pressure_rail && holds;
+        self.check_break(is_break, holds);
+        let holds = self.temperature.is_faulty(has_no_temperature);
+        self.temperature_rail = has_no_temperature || self.temperature_rail && holds;
+        let Transmitter { sensor_break, pressure_rail, temperature_rail, .. } = *self;
+        Conditions { sensor_break, pressure_rail, temperature_rail }
+    }
+
+    fn check_break(&mut self, is_break: bool, holds: bool) {
         if self.until_check == 0 {
             self.until_check = SAMPLES_PER_SECOND;
-            self.sensor_break = self.calibration.pressure.is_break(ratio);
+            self.sensor_break = is_break || self.sensor_break && holds;
         }
         self.until_check -= 1;
     }
@@ -189,6 +201,44 @@ mod tests {
             assert!(transmitter.sample(&GOOD).conditions.sensor_break);
         }
         assert!(!transmitter.sample(&GOOD).conditions.sensor_break);
+    }
+
+    /// The first valid value after a fault is right, whatever the sample says in which the fault ends.
+    #[test]
+    fn a_fault_holds_until_the_filter_is_full_of_good_samples() {
+        let rail = RawSample { pressure: 0, ..GOOD };
+        let half_over = RawSample { pressure: 16 * 500, ..GOOD };
+        let mut parameters = Parameters::default();
+        (parameters.pressure.filter_type, parameters.pressure.filter_constant) = (2, 100);
+        let mut transmitter = Transmitter::new(CHIP, &parameters);
+        transmitter.sample(&GOOD);
+        for _ in 0..50 {
+            transmitter.sample(&rail);
+        }
+        let after = |sample: &RawSample, transmitter: &mut Transmitter| {
+            let snapshot = transmitter.sample(sample);
+            (snapshot.pressure.status & STATUS_INVALID != 0, snapshot.conditions.pressure_rail)
+        };
+        assert_eq!(after(&half_over, &mut transmitter), (true, true));
+        for sample in 1..100 {
+            assert_eq!(after(&GOOD, &mut transmitter), (true, true), "{sample}");
+        }
+        let snapshot = transmitter.sample(&GOOD);
+        assert_eq!((snapshot.pressure.status, snapshot.conditions), (0, Conditions::default()));
+        assert!((snapshot.pressure.process_value - 5.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_temperature_that_comes_back_holds_its_fault_too() {
+        let none = RawSample { temperature: 0, ..GOOD };
+        let half_over = RawSample { temperature: 16 * 470, ..GOOD };
+        let mut transmitter = Transmitter::new(CHIP, &Parameters::default());
+        transmitter.sample(&none);
+        let snapshot = transmitter.sample(&half_over);
+        assert!(snapshot.conditions.temperature_rail && snapshot.temperature.status & STATUS_INVALID != 0);
+        assert_eq!(snapshot.pressure.status, 0);
+        let snapshot = transmitter.sample(&GOOD);
+        assert_eq!((snapshot.conditions, snapshot.temperature.status), (Conditions::default(), 0));
     }
 
     #[test]

@@ -289,12 +289,14 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Whether the node has the new program. A forced update finds it there after it has downloaded it.
+    /// Whether the node has the new program. A forced update finds it there after it has downloaded it; a loader that does not
+    /// say which program it has (1F56h reads 0) is believed to have what it was given.
     fn is_there(&self, now: &State) -> bool {
         let is_complete = self.progress == Progress::Complete;
         match &self.image.info {
             Some(info) => {
-                let is_it = now.is_valid && now.identification == Some(info.identification);
+                let is_it = now.is_valid
+                    && now.identification.map_or(is_complete, |found| found == info.identification);
                 is_it && (is_complete || !self.options.force)
             }
             None => is_complete,

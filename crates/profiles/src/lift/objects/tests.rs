@@ -267,7 +267,7 @@ fn what_is_not_weighed_is_no_reference() {
 fn the_transducer_is_calibrated_as_that_of_the_pressure_transmitter() {
     let mut node = Node::new();
     let key = u32::from_le_bytes(*b"cali").into();
-    assert_eq!(node.write(0x2200, 2, 0x4A74_2400), Err(Abort::Access), "locked");
+    assert_eq!(node.write(0x2200, 2, 0x4A74_2400), Err(Abort::DeviceState), "locked");
     node.write(0x2203, 0, key).unwrap();
     // 0 to 40 bar.
     node.write_real(0x2200, 2, 4.0e6);

@@ -1,7 +1,7 @@
 //! Calibration, 2200h to 2204h: manufacturer objects that are written in production and locked after it.
 //!
 //! The formulas are those of [`PressureCalibration`] and [`Thermistor`]. A write needs the key in 2203h, else it is
-//! refused with 0601 0000h; a value that would leave a calibration which is not valid is refused with 0604 0043h. What is
+//! refused with 0800 0022h; a value that would leave a calibration which is not valid is refused with 0604 0043h. What is
 //! written acts from the next sample on, and is kept when 2204h gets "save". 1010h and 1011h do not touch it.
 
 use crate::pressure::{
@@ -147,7 +147,7 @@ impl Places {
         match rule {
             Rule::Lock if bytes == KEY || bytes == [0; 4] => Ok(()),
             Rule::Lock => Err(Abort::NotStored),
-            Rule::Value | Rule::Record if self.lock.load(image) != KEY => Err(Abort::Access),
+            Rule::Value | Rule::Record if self.lock.load(image) != KEY => Err(Abort::DeviceState),
             Rule::Value if !self.admits(entry.field(), bytes, image) => Err(Abort::Parameter),
             Rule::Value | Rule::Record => Ok(()),
         }

@@ -35,6 +35,7 @@ pub(super) struct FlagFields {
     internal: Field,
     system: Field,
     summary: Field,
+    register: Field,
 }
 
 impl FlagFields {
@@ -44,13 +45,15 @@ impl FlagFields {
             internal: d.field(0x3000, 2),
             system: d.field(0x3000, 3),
             summary: d.field(0x1002, 0),
+            register: d.field(0x1001, 0),
         }
     }
 
-    /// Writes the flags and their summary: bit 0 any sensor error, bit 1 any internal protocol error (there is none),
-    /// bit 2 any system error.
+    /// Writes the flags and their summary: bit 0 any error of a sensor, bit 1 any error of the internal protocol (there is none),
+    /// bit 2 any error at all, those of the communication too, which have no flags.
     pub(super) fn show(&self, flags: Flags, image: &mut [u8]) {
-        let summary = u32::from(flags.sensor != 0) | u32::from(flags.system != 0) << 2;
+        let is_error = flags != Flags::NONE || self.register.u8(image) != 0;
+        let summary = u32::from(flags.sensor != 0) | u32::from(is_error) << 2;
         self.sensor.store(image, flags.sensor.to_le_bytes());
         self.internal.store(image, [0; 4]);
         self.system.store(image, flags.system.to_le_bytes());

@@ -68,6 +68,9 @@ impl Profile for Objects {
     type Chain = Transmitter;
     type Fields = Fields;
 
+    /// Bit 0 for every fault. The other bits are always 0 in a transmitter (CMP 8271, object 1001h).
+    const REGISTER_BITS: u8 = 1;
+
     fn new(fields: &'static Fields) -> Objects {
         Objects { fields }
     }

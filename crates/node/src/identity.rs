@@ -1,0 +1,31 @@
+//! What the parameter store knows of the device itself, and whether that can be trusted.
+
+use embedded_storage::nor_flash::ReadNorFlash;
+use storage::{DeviceRecord, Group, Health, View};
+
+use crate::Fault;
+use crate::fault::{BOOT_DATA, OLDER_BOOT_DATA};
+
+/// The device record as the node starts with it.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity {
+    /// Node-ID, bit rate and personality; `None` where nothing is stored or nothing can be read.
+    pub record: Option<DeviceRecord>,
+    /// The fault to be told once the node has booted up (EMCY 6301h); `None` where the record is what was stored last.
+    pub fault: Option<Fault>,
+}
+
+impl Identity {
+    /// Reads the device record.
+    pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Identity {
+        let record = view.device().ok().flatten();
+        let is_stored = !matches!(view.load(Group::Device, &mut [0; DeviceRecord::LEN]), Ok(None));
+        let fault = match (view.health(Group::Device), record) {
+            (Health::Good, Some(_)) => None,
+            (Health::Good, None) => is_stored.then_some(BOOT_DATA),
+            (_, None) => Some(BOOT_DATA),
+            (_, Some(_)) => Some(OLDER_BOOT_DATA),
+        };
+        Identity { record, fault }
+    }
+}
