@@ -18,6 +18,7 @@ mod replacement;
 mod scan;
 mod session;
 mod store;
+mod trace;
 mod update;
 mod write;
 
@@ -56,6 +57,7 @@ enum Command {
     Apply(dump::Apply),
     Monitor(monitor::Monitor),
     Record(record::Record),
+    Trace(trace::Trace),
     Save(store::Save),
     Restore(store::Restore),
     Nmt(nmt::Nmt),
@@ -69,8 +71,21 @@ impl Cli {
     /// # Errors
     /// Why it failed.
     pub fn run(&self, output: Output) -> Result<(), Failure> {
-        let mut session = Session::open(&self.options, output)?;
+        let mut session = if self.needs_a_bus() {
+            Session::open(&self.options, output)?
+        } else {
+            Session::without_a_bus(&self.options, output)?
+        };
         self.run_in(&mut session)
+    }
+
+    /// Whether the command is about more than files.
+    fn needs_a_bus(&self) -> bool {
+        match &self.command {
+            Command::Diff(diff) => diff.needs_a_bus(),
+            Command::Trace(trace) => trace.needs_a_bus(),
+            _ => true,
+        }
     }
 
     /// Does the command in a session that is open.
@@ -91,6 +106,7 @@ impl Cli {
             Command::Apply(apply) => apply.run(session),
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
+            Command::Trace(trace) => trace.run(session),
             Command::Save(save) => save.run(session),
             Command::Restore(restore) => restore.run(session),
             Command::Nmt(nmt) => nmt.run(session),

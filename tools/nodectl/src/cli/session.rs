@@ -13,6 +13,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{Failure, Options, Output};
+use crate::bus::NoBus;
 use crate::configuration::Configuration;
 use crate::object::at;
 use crate::sdo::{self, Client};
@@ -44,6 +45,16 @@ impl Session {
         let sheet = options.eds.as_deref().map(sheet).transpose()?;
         let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
         let network = Network::open(move || address.open(bit_rate))?;
+        Ok(Session { sheet, ..Session::with(network, options, output) })
+    }
+
+    /// For a command that is about files: nobody is on its bus.
+    ///
+    /// # Errors
+    /// The data sheet of the options cannot be used.
+    pub fn without_a_bus(options: &Options, output: Output) -> Result<Session, Failure> {
+        let sheet = options.eds.as_deref().map(sheet).transpose()?;
+        let network = Network::open(|| Ok(Box::new(NoBus)))?;
         Ok(Session { sheet, ..Session::with(network, options, output) })
     }
 
