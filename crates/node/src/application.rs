@@ -77,6 +77,7 @@ impl Application for NodeApplication {
         self.profile.register_bits()
     }
 
+    #[inline(never)]
     fn initialise(&mut self, image: &mut [u8]) {
         let setup = &self.setup;
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);

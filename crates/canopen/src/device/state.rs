@@ -241,6 +241,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Takes the values of what is to be reset: the defaults, then what is stored.
+    // Called from two places, and much code.
+    #[inline(never)]
     fn load(&mut self) {
         if A::SERVICES_ONLY {
             // Nothing of it is stored, and nothing depends on the node-ID.

@@ -24,27 +24,28 @@ impl Devices {
         self.0 & device.0 == device.0
     }
 
-    /// Their types as 6000h lists them, in the order of their bits: bits 16 to 31 of 1000h in a device that is one of them only.
-    pub fn types(self) -> impl Iterator<Item = u16> {
-        let mut rest = self.0 & Devices::ALL.0;
-        core::iter::from_fn(move || {
-            let place = (rest != 0).then_some(rest.trailing_zeros())?;
-            rest &= rest - 1;
-            Some(u16::from_be_bytes([CODES.to_le_bytes()[place as usize & 3], 0]))
-        })
+    /// Their types as 6000h lists them, in the order of their bits, and how many there are; 0 behind the last. A type is what bits 16
+    /// to 31 of 1000h are in a device that is one of them only.
+    #[must_use]
+    #[inline(never)] // This crate is compiled for speed, and a choice is in no hurry.
+    pub fn types(self) -> ([u16; Devices::KINDS], usize) {
+        let (mut types, mut count) = ([0; Devices::KINDS], 0);
+        for (bit, code) in [0x0600, 0x0A00, 0x0200, 0x0300].into_iter().enumerate() {
+            if let Some(place) = types.get_mut(count).filter(|_| self.0 >> bit & 1 != 0) {
+                *place = code;
+                count += 1;
+            }
+        }
+        (types, count)
     }
 
     /// Device type (1000h): the virtual device that the node is, or 0 in the upper half for several or none.
     #[must_use]
     pub fn device_type(self) -> u32 {
-        let is_one = (self.0 & Devices::ALL.0).count_ones() == 1;
-        let code = self.types().next().filter(|_| is_one).unwrap_or(0);
-        u32::from(code) << 16 | PROFILE
+        let ([first, ..], count) = self.types();
+        PROFILE | if count == 1 { u32::from(first) << 16 } else { 0 }
     }
 }
-
-/// The upper bytes of the types, in the order of the bits: car position, load measuring, input panel, output panel.
-const CODES: u32 = 0x0302_0A06;
 
 /// The number of the profile.
 pub const PROFILE: u32 = 417;
@@ -61,7 +62,8 @@ mod tests {
 
     #[test]
     fn the_list_has_them_in_the_order_of_the_bits() {
-        assert_eq!(Devices::ALL.types().collect::<Vec<_>>(), [0x0600, 0x0A00, 0x0200, 0x0300]);
-        assert_eq!(Devices(0).types().count(), 0);
+        assert_eq!(Devices::ALL.types(), ([0x0600, 0x0A00, 0x0200, 0x0300], 4));
+        assert_eq!(Devices(0b1010).types(), ([0x0A00, 0x0300, 0, 0], 2));
+        assert_eq!(Devices(0).types(), ([0; 4], 0));
     }
 }

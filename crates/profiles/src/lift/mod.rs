@@ -55,6 +55,8 @@ impl Chain for Lift {
     type Parameters = Parameters;
     type Snapshot = Snapshot;
 
+    // Made in its place: what the compiler makes of it where it is called is three times as long.
+    #[inline(never)]
     fn new(power_on: &PowerOn) -> Lift {
         Lift {
             position: position::PositionUnits::new(Start::from(power_on.retained)),

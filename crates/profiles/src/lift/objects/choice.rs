@@ -60,11 +60,11 @@ impl Choice {
 
     /// Device type and list of virtual devices.
     fn show(&self, devices: Devices, image: &mut [u8]) {
+        let (types, count) = devices.types();
         put(self.device_type, devices.device_type(), image);
-        put(self.count, devices.types().count() as u32, image);
-        let mut types = devices.types();
-        for at in &self.types {
-            put(*at, types.next().unwrap_or(0).into(), image);
+        put(self.count, u32::try_from(count).unwrap_or(0), image);
+        for (at, code) in self.types.iter().zip(types) {
+            put(*at, code.into(), image);
         }
     }
 }
