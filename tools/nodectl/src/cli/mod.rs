@@ -56,6 +56,7 @@ enum Command {
     Dump(dump::Dump),
     Diff(dump::Diff),
     Apply(dump::Apply),
+    #[command(visible_alias = "watch")]
     Monitor(monitor::Monitor),
     Record(record::Record),
     Trace(trace::Trace),

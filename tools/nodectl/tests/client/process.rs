@@ -107,6 +107,18 @@ fn a_socketcand_daemon_is_a_bus() {
     assert_eq!((code, error.contains("no such bus")), (4, true), "{error}");
 }
 
+/// A wrong scheme in front of the right port is told with the right one.
+#[test]
+fn slcan_at_a_socketcand_daemon_is_told() {
+    let address = daemon().replace("socketcand", "slcan").replace("/vcan0", "");
+    let (code, _, error) = nodectl(&address, &["scan"]);
+    assert_eq!(code, 4);
+    assert!(
+        error.contains("a socketcand answers there: the address is socketcand://HOST:PORT/BUS"),
+        "{error}"
+    );
+}
+
 /// A daemon with a node behind it, for as long as the test runs. Its address.
 fn daemon() -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
