@@ -5,6 +5,7 @@ mod failure;
 mod info;
 mod list;
 mod lss;
+mod manual;
 mod map;
 mod monitor;
 mod nmt;
@@ -55,6 +56,7 @@ enum Command {
     Dump(dump::Dump),
     Diff(dump::Diff),
     Apply(dump::Apply),
+    #[command(visible_alias = "watch")]
     Monitor(monitor::Monitor),
     Record(record::Record),
     Trace(trace::Trace),
@@ -63,6 +65,8 @@ enum Command {
     Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Update(update::Update),
+    Completions(manual::Completions),
+    Man(manual::Man),
 }
 
 impl Cli {
@@ -84,6 +88,7 @@ impl Cli {
         match &self.command {
             Command::Diff(diff) => diff.needs_a_bus(),
             Command::Trace(trace) => trace.needs_a_bus(),
+            Command::Completions(_) | Command::Man(_) => false,
             _ => true,
         }
     }
@@ -112,6 +117,8 @@ impl Cli {
             Command::Nmt(nmt) => nmt.run(session),
             Command::Lss(lss) => lss.run(session),
             Command::Update(update) => update.run(session),
+            Command::Completions(completions) => completions.run(session),
+            Command::Man(man) => man.run(session),
         }
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use canopen::nmt::State;
 use canopen::sdo::Multiplexer;
-use canopen::{Instant, NodeId};
+use canopen::{Duration, Instant, NodeId};
 use eds::Eds;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -22,6 +22,9 @@ use crate::{Catalogue, Network};
 
 /// The data sheets of the largest devices have a quarter of this.
 const LARGEST_SHEET: u64 = 4 << 20;
+
+/// A slow bus needs 20 s for the 400 objects of a large dictionary: three times as much is enough for any.
+const MANY: u64 = 6;
 
 /// An open bus, and what is known about the nodes on it.
 pub struct Session {
@@ -83,6 +86,12 @@ impl Session {
         self.deadline = self.network.now() + self.options.sdo().limit;
     }
 
+    /// The next transfers are for all objects of a node: together they may take as long as [`MANY`] of one.
+    pub(super) fn begin_all(&mut self) {
+        let limit = Duration(self.options.sdo().limit.0.saturating_mul(MANY));
+        self.deadline = self.network.now() + limit;
+    }
+
     /// What is known about a node: from the file of the options, else by its identity.
     pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Catalogue, Failure> {
         if let Some(known) = self.catalogues.get(&node) {
@@ -113,6 +122,7 @@ impl Session {
     /// The values of all parameters of a node.
     pub(super) fn configuration(&mut self, node: NodeId, sheet: &Eds) -> Result<Configuration, Failure> {
         self.catalogue(node)?;
+        self.begin_all();
         let bar = ProgressBar::new(0).with_message(format!("reading node {}", node.get()));
         let values = Configuration::of_node(
             |at| self.client(node).upload(at),

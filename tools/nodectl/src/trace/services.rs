@@ -9,7 +9,7 @@ use canopen::{Frame, NodeId};
 
 use super::{Said, hex};
 use crate::heartbeat::words;
-use crate::meaning::error_code;
+use crate::meaning::emergency;
 
 /// NMT commands (CiA 301, 7.2.8.2.1).
 pub(super) fn nmt(frame: &Frame) -> Said {
@@ -45,23 +45,10 @@ pub(super) fn time(frame: &Frame) -> Said {
     Said::text(format!("{hours:02}:{minutes:02}:{seconds:02}.{millis:03}, {days} days after 1984-01-01"))
 }
 
-/// Bits of the error register (1001h; CiA 301, 7.5.2.2).
-const REGISTER: [&str; 8] =
-    ["generic", "current", "voltage", "temperature", "communication", "profile", "reserved", "manufacturer"];
-
 /// Emergencies (CiA 301, 7.2.7).
 pub(super) fn emcy(frame: &Frame) -> Said {
     let Ok(data) = frame.data().try_into() else { return odd(frame, "no EMCY") };
-    let Message { code, register, detail } = Message::parse(data);
-    let bits = REGISTER.iter().enumerate().filter(|(bit, _)| register >> bit & 1 == 1);
-    let bits: Vec<&str> = bits.map(|(_, name)| *name).collect();
-    let bits = if bits.is_empty() { String::new() } else { format!(" ({})", bits.join(", ")) };
-    let mut text = format!("{code:04X}h {}, error register {register:02X}h{bits}", error_code(code));
-    if detail != [0; 5] {
-        let detail: Vec<String> = detail.iter().map(|byte| format!("{byte:02X}")).collect();
-        text = format!("{text}, manufacturer {}", detail.join(" "));
-    }
-    Said::text(text)
+    Said::text(emergency(Message::parse(data)))
 }
 
 /// The states that nodes have told.
