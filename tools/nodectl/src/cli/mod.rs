@@ -5,6 +5,7 @@ mod failure;
 mod info;
 mod list;
 mod lss;
+mod manual;
 mod map;
 mod monitor;
 mod nmt;
@@ -64,6 +65,8 @@ enum Command {
     Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Update(update::Update),
+    Completions(manual::Completions),
+    Man(manual::Man),
 }
 
 impl Cli {
@@ -85,6 +88,7 @@ impl Cli {
         match &self.command {
             Command::Diff(diff) => diff.needs_a_bus(),
             Command::Trace(trace) => trace.needs_a_bus(),
+            Command::Completions(_) | Command::Man(_) => false,
             _ => true,
         }
     }
@@ -113,6 +117,8 @@ impl Cli {
             Command::Nmt(nmt) => nmt.run(session),
             Command::Lss(lss) => lss.run(session),
             Command::Update(update) => update.run(session),
+            Command::Completions(completions) => completions.run(session),
+            Command::Man(man) => man.run(session),
         }
     }
 }
