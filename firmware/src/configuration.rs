@@ -20,7 +20,7 @@ pub(crate) struct Loaded {
     pub(crate) parameters: Parameters,
     pub(crate) setup: Setup,
     /// What is wrong with the device record.
-    pub(crate) boot_data: Option<Fault>,
+    pub(crate) boot_data: Option<&'static Fault>,
     /// Ready to store; `None` where nothing can be stored.
     pub(crate) store: Option<Store<ParameterFlash>>,
     /// What is stored of what the measurement retains.

@@ -52,13 +52,13 @@ pub(crate) struct StartUpFaults {
     /// Nothing can be stored.
     pub(crate) no_store: bool,
     /// What is wrong with the device record.
-    pub(crate) boot_data: Option<Fault>,
+    pub(crate) boot_data: Option<&'static Fault>,
 }
 
 impl StartUpFaults {
-    fn all(&self) -> impl Iterator<Item = Fault> {
-        let crashed = self.crashed.then_some(UNEXPECTED_RESET);
-        let no_store = self.no_store.then_some(PARAMETER_STORE);
+    fn all(&self) -> impl Iterator<Item = &'static Fault> {
+        let crashed = self.crashed.then_some(&UNEXPECTED_RESET);
+        let no_store = self.no_store.then_some(&PARAMETER_STORE);
         [crashed, no_store, self.boot_data].into_iter().flatten()
     }
 }
@@ -229,7 +229,7 @@ impl Services {
             let next = protocol.start(now, out);
             // The messages go out with the next poll.
             for fault in faults.all() {
-                let _ = protocol.set_fault(&fault, true, now);
+                let _ = protocol.set_fault(fault, true, now);
             }
             next
         });
@@ -261,7 +261,8 @@ impl Services {
     }
 
     fn filter(&mut self, node: &mut impl Shared) {
-        let banks = node.call(|protocol, _| filters::pack(protocol.process_ids(), protocol.service_ids()));
+        let banks =
+            node.call(|protocol, _| filters::pack(protocol.process_filters(), protocol.service_ids()));
         self.can.set_filters(&banks);
     }
 }

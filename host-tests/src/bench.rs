@@ -49,7 +49,7 @@ pub struct Bench {
     actions: VecDeque<Action>,
     has_parameters: bool,
     /// What is wrong with the device record.
-    boot_data: Option<Fault>,
+    boot_data: Option<&'static Fault>,
 }
 
 /// The parameter store in RAM.
@@ -208,7 +208,7 @@ impl Bench {
     pub fn restart(&mut self) {
         let next = self.protocol.start(self.now, &mut self.out);
         if let Some(fault) = self.boot_data {
-            let _ = self.protocol.set_fault(&fault, true, self.now);
+            let _ = self.protocol.set_fault(fault, true, self.now);
         }
         self.keep(next);
     }

@@ -55,7 +55,8 @@ pub enum Command {
 }
 
 impl Command {
-    const ALL: [Command; 5] = [
+    /// All commands.
+    pub const ALL: [Command; 5] = [
         Command::Start,
         Command::Stop,
         Command::EnterPreOperational,

@@ -120,6 +120,10 @@ pub struct Node {
     pub auto: bool,
 }
 
+/// What the boards are called, for messages.
+pub(crate) const BOARD_NUMBERS: &str =
+    "a node-ID is a number from 1 to 127, and boards without a node-ID have 201 to 254";
+
 /// The first number of boards without a node-ID.
 pub const UNCONFIGURED: u8 = 201;
 
@@ -128,8 +132,7 @@ impl FromStr for Node {
 
     fn from_str(text: &str) -> Result<Node, String> {
         let (id, personality) = text.split_once(':').unwrap_or((text, "pressure"));
-        let id = board_number(id)
-            .ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"))?;
+        let id = board_number(id).ok_or_else(|| format!("{id:?} is no board: {BOARD_NUMBERS}"))?;
         let (personality, auto) = match personality.split_once('@') {
             Some((personality, "auto")) => (personality, true),
             Some((_, other)) => return Err(format!("{other:?} is no way to get a bit rate; auto is")),
@@ -230,7 +233,8 @@ mod tests {
             ("--node 0:pressure", "0"),
             ("--node 128:pressure", "128"),
             ("--node 1:pressure@fast", "auto"),
-            ("--node 255:pressure", "255"),
+            ("--node 255:pressure", "boards without a node-ID have 201 to 254"),
+            ("--pressure 200=const:1", "boards without a node-ID have 201 to 254"),
             ("--node 1:toaster", "it has: pressure"),
             ("--bitrate 251", "250"),
             ("--for -1", "-1"),

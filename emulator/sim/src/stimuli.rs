@@ -6,7 +6,7 @@ use std::str::FromStr;
 use canbus::Time;
 use chip::plant::{Fault, Motion, Plant, Push, Signal};
 
-use crate::cli::board_number;
+use crate::cli::{BOARD_NUMBERS, board_number};
 
 /// A change of what a board's sensors see.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,8 +104,7 @@ where
         let target = text.split_once('=').filter(|(id, _)| id.bytes().all(|byte| byte.is_ascii_digit()));
         let (node, spec) = match target {
             Some((id, spec)) => {
-                let id = board_number(id)
-                    .ok_or_else(|| format!("{id:?} is not a node-ID; it is a number from 1 to 127"));
+                let id = board_number(id).ok_or_else(|| format!("{id:?} is no board: {BOARD_NUMBERS}"));
                 (Some(id?), spec)
             }
             None => (None, text),

@@ -20,6 +20,7 @@ mod running;
 mod saves;
 mod sensor_faults;
 mod stack;
+mod start_up;
 mod support;
 mod timing;
 mod update;

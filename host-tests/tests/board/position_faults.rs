@@ -17,6 +17,8 @@ const OPERATING: (u16, u8) = (0x6000, 0);
 const PRESET: (u16, u8) = (0x6003, 0);
 const OFFSET: (u16, u8) = (0x6509, 0);
 const DIAGNOSTIC: (u16, u8) = (0x210C, 1);
+/// The car position unit is chosen.
+const DEVICES: (u16, u8) = (0x2305, 0);
 const EMCY: u16 = 0x081;
 const TPDO2: u16 = 0x281;
 /// EMCY of a position that is not right: that of a broken sensor, the generic bit of the error register, and 2 in the detail.
@@ -179,6 +181,7 @@ fn a_position_unit_of_a_lift_keeps_its_preset_and_says_when_its_count_is_lost() 
             crate::support::world("--node 1:lift --bitrate 1000 --shaft const:10.5 --fault battery-empty@0");
         let master = Master::join(&mut world);
         world.run_until(crate::support::SECOND);
+        write(&mut world, &master, DEVICES, 1, 1);
         write(&mut world, &master, SENSOR_TYPE, 1, kind);
         wait(&mut world, 10);
         write(&mut world, &master, UNIT_PRESET, 4, 5000);
@@ -207,6 +210,7 @@ fn a_jump_of_a_lift_s_sensor_is_told_and_not_taken_over() {
         crate::support::world("--node 1:lift --bitrate 1000 --shaft const:2.25 --fault wrong-code@3..100");
     let master = Master::join(&mut world);
     world.run_until(crate::support::SECOND);
+    write(&mut world, &master, DEVICES, 1, 1);
     write(&mut world, &master, SENSOR_TYPE, 1, 2);
     wait(&mut world, 10);
     assert_eq!((read(&mut world, &master, (0x6383, 1)), read(&mut world, &master, STATE)), (450, 0));
@@ -225,6 +229,10 @@ fn cams_are_switched_by_rpdo_and_objects_say_what_the_board_can_do() {
     let (mut world, master) = start("--shaft const:0.5");
     write(&mut world, &master, PRESET, 4, 2000);
     write(&mut world, &master, (0x6320, 1), 4, 3000);
+    // One that is switched on by SDO works.
+    write(&mut world, &master, (0x6301, 1), 1, 1);
+    wait(&mut world, 25);
+    assert_eq!(read(&mut world, &master, (0x6300, 1)), 1);
     write(&mut world, &master, (0x1400, 1), 4, 0x8000_0201);
     write(&mut world, &master, (0x1600, 0), 1, 0);
     write(&mut world, &master, (0x1600, 1), 4, 0x6301_0108);

@@ -208,6 +208,20 @@ fn bus_off_applies_the_communication_error_behaviour_and_is_told_afterwards() {
     assert_eq!(emergencies(&mut bench), [(0x8140, 1), (0, 0)]);
 }
 
+/// The manual of the CMP 8271 has bit 0 alone; "overall error" of 1002h counts the communication in.
+#[test]
+fn a_missing_heartbeat_sets_bit_0_of_the_error_register_only() {
+    let mut bench = operational();
+    bench.write(0x1016, 1, &0x0005_0005_u32.to_le_bytes()).unwrap();
+    bench.receive(&Frame::new(0x705, &[5]).unwrap());
+    (0..10).for_each(|_| bench.sample(&raw(100_000.0, 298.15)));
+    assert_eq!(emergencies(&mut bench), [(0x8130, 1)]);
+    assert_eq!(bench.read(0x1001, 0), Ok(vec![1]));
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![4, 0, 0, 0]));
+    bench.receive(&Frame::new(0x705, &[5]).unwrap());
+    assert_eq!(bench.read(0x1002, 0), Ok(vec![0; 4]));
+}
+
 #[test]
 fn a_warning_says_nothing_and_an_overrun_is_an_event() {
     let mut bench = operational();

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use canopen::emcy::Message;
 use canopen::nmt::{Command, State};
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
@@ -15,7 +16,7 @@ use crate::quantity::Quantity;
 use crate::sdo::{self, Client, Options};
 use crate::tpdo::{self, Tpdo};
 use crate::value::{Value, guess};
-use crate::{Catalogue, Network, nmt};
+use crate::{Catalogue, Network, meaning, nmt};
 
 /// Something whose value is followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -80,6 +81,10 @@ pub struct Acquisition<'n> {
     due: Instant,
     /// Of the node, once a heartbeat has told it.
     state: Option<State>,
+    /// The newest emergency of the node, in words.
+    emergency: Option<String>,
+    /// Of anybody.
+    frames: u64,
 }
 
 impl<'n> Acquisition<'n> {
@@ -106,7 +111,17 @@ impl<'n> Acquisition<'n> {
             nmt::send(network, Command::Start, Some(setup.node))?;
         }
         let due = network.now();
-        Ok(Acquisition { network, setup, tpdos, signals, ready: VecDeque::new(), due, state: None })
+        Ok(Acquisition {
+            network,
+            setup,
+            tpdos,
+            signals,
+            ready: VecDeque::new(),
+            due,
+            state: None,
+            emergency: None,
+            frames: 0,
+        })
     }
 
     /// What is followed.
@@ -122,6 +137,30 @@ impl<'n> Acquisition<'n> {
         let has_mapped = self.signals.iter().any(|signal| signal.tpdo.is_some());
         let (node, state) = (self.setup.node.get(), heartbeat::words(state));
         has_mapped.then(|| format!("node {node} is {state} and sends no TPDOs; --start starts it"))
+    }
+
+    /// The node that is followed.
+    #[must_use]
+    pub fn node(&self) -> NodeId {
+        self.setup.node
+    }
+
+    /// The NMT state of the node; `None` before its first heartbeat.
+    #[must_use]
+    pub fn state(&self) -> Option<State> {
+        self.state
+    }
+
+    /// The newest emergency of the node, in words; `None` before the first.
+    #[must_use]
+    pub fn emergency(&self) -> Option<&str> {
+        self.emergency.as_deref()
+    }
+
+    /// How many frames of anybody have been heard.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames
     }
 
     /// The time of this side, for [`next`](Acquisition::next).
@@ -160,6 +199,12 @@ impl<'n> Acquisition<'n> {
     /// Takes the values that a frame has.
     fn take(&mut self, received: &Received) {
         let frame = &received.frame;
+        self.frames += 1;
+        if frame.id() == 0x80 + u16::from(self.setup.node.get())
+            && let Ok(data) = frame.data().try_into()
+        {
+            self.emergency = Some(meaning::emergency(Message::parse(data)));
+        }
         if let Some(heard) = Heartbeat::parse(frame).filter(|heard| heard.node == self.setup.node) {
             self.state = Some(heard.state);
         }

@@ -15,9 +15,17 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Of a device with a data sheet.
+    /// Of a device with a data sheet. A file has no place for units (CiA 306): those of a device of this project come from the data
+    /// sheet that is built in.
     #[must_use]
-    pub fn new(sheet: Eds) -> Catalogue {
+    pub fn new(mut sheet: Eds) -> Catalogue {
+        let DeviceInfo { vendor_number, product_number, .. } = sheet.device;
+        if let Some(own) = built_in(vendor_number, product_number) {
+            let entries = sheet.objects.values_mut().flat_map(|object| object.entries.values_mut());
+            for entry in entries.filter(|entry| entry.unit.is_empty()) {
+                entry.unit = own.get(entry.index, entry.sub).map_or_else(String::new, |own| own.unit.clone());
+            }
+        }
         Catalogue { sheet, common: common() }
     }
 
@@ -30,9 +38,7 @@ impl Catalogue {
     /// The data sheet of a device of this project with this identity (1018h:1 and 2).
     #[must_use]
     pub fn built_in(vendor: u32, product: u32) -> Option<Catalogue> {
-        let is_it =
-            |sheet: &Eds| (sheet.device.vendor_number, sheet.device.product_number) == (vendor, product);
-        DEVICES.iter().map(eds::Device::eds).find(is_it).map(Catalogue::new)
+        built_in(vendor, product).map(Catalogue::new)
     }
 
     /// The data sheet of a device of this project, by its file name.
@@ -51,6 +57,17 @@ impl Catalogue {
             Err(LookupError::Address(at)) => Ok(at),
             Err(error) => Err(error),
         }
+    }
+
+    /// Whether there is a data sheet of the device, not only what all devices have in common.
+    #[must_use]
+    pub fn is_of_a_device(&self) -> bool {
+        self.sheet.device != DeviceInfo::default()
+    }
+
+    /// The objects of the data sheet; none where there is none of the device.
+    pub fn indices(&self) -> impl Iterator<Item = u16> {
+        self.sheet.objects.keys().copied().filter(|_| self.is_of_a_device())
     }
 
     /// The data sheet.
@@ -112,6 +129,11 @@ impl Catalogue {
     pub fn unit(&self, at: Multiplexer) -> &str {
         self.entry(at).map_or("", |entry| &entry.unit)
     }
+}
+
+fn built_in(vendor: u32, product: u32) -> Option<Eds> {
+    let is_it = |sheet: &Eds| (sheet.device.vendor_number, sheet.device.product_number) == (vendor, product);
+    DEVICES.iter().map(eds::Device::eds).find(is_it)
 }
 
 fn common() -> Eds {

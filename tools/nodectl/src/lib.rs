@@ -32,6 +32,7 @@ pub mod scan;
 pub mod sdo;
 pub mod text;
 pub mod tpdo;
+pub mod trace;
 pub mod unit;
 pub mod update;
 pub mod value;

@@ -1,5 +1,6 @@
 //! Numbers that stand for something: units, emergency error codes, status bits.
 
+use canopen::emcy::Message;
 use canopen::sdo::Multiplexer;
 
 use crate::Catalogue;
@@ -29,6 +30,25 @@ fn status(bits: i128) -> String {
     let words = [(1, "not valid"), (2, "positive overload"), (4, "negative overload")];
     let set: Vec<&str> = words.into_iter().filter(|(bit, _)| bits & bit != 0).map(|(_, word)| word).collect();
     if set.is_empty() { "valid".to_owned() } else { set.join(", ") }
+}
+
+/// Bits of the error register (1001h; CiA 301, 7.5.2.2).
+const REGISTER: [&str; 8] =
+    ["generic", "current", "voltage", "temperature", "communication", "profile", "reserved", "manufacturer"];
+
+/// An emergency in words: code, error register, and what the manufacturer adds.
+#[must_use]
+pub fn emergency(message: Message) -> String {
+    let Message { code, register, detail } = message;
+    let bits = REGISTER.iter().enumerate().filter(|(bit, _)| register >> bit & 1 == 1);
+    let bits: Vec<&str> = bits.map(|(_, name)| *name).collect();
+    let bits = if bits.is_empty() { String::new() } else { format!(" ({})", bits.join(", ")) };
+    let text = format!("{code:04X}h {}, error register {register:02X}h{bits}", error_code(code));
+    if detail == [0; 5] {
+        return text;
+    }
+    let detail: Vec<String> = detail.iter().map(|byte| format!("{byte:02X}")).collect();
+    format!("{text}, manufacturer {}", detail.join(" "))
 }
 
 /// Emergency error codes (CiA 301, table 26): those with a name of their own, then the classes.

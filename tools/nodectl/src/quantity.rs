@@ -38,16 +38,28 @@ impl Quantity {
     /// # Errors
     /// Those of SDO, but for a node that has no such object.
     pub fn of(client: &mut Client, catalogue: &Catalogue, of: Multiplexer) -> Result<Quantity, Error> {
+        Quantity::by(catalogue, of, |at| word(client, at))
+    }
+
+    /// The same, where `word` reads the numbers of those objects; `None` for an object that the node does not have.
+    ///
+    /// # Errors
+    /// Those of `word`.
+    pub fn by<E>(
+        catalogue: &Catalogue,
+        of: Multiplexer,
+        mut word: impl FnMut(Multiplexer) -> Result<Option<u32>, E>,
+    ) -> Result<Quantity, E> {
         let unit = catalogue.unit(of);
         let Some(told_by) = eds::address(unit) else { return Ok(Quantity::plain(unit)) };
         let step = catalogue.unit(told_by);
         if !step.is_empty() {
-            let steps = word(client, told_by)?.unwrap_or(1);
+            let steps = word(told_by)?.unwrap_or(1);
             return Ok(Quantity::of_steps(steps, step));
         }
-        let Some(code) = word(client, at(told_by.index, of.sub))? else { return Ok(Quantity::default()) };
+        let Some(code) = word(at(told_by.index, of.sub))? else { return Ok(Quantity::default()) };
         let digits = match digits_object(catalogue, told_by.index, of) {
-            Some(object) => word(client, object)?.unwrap_or(0),
+            Some(object) => word(object)?.unwrap_or(0),
             None => 0,
         };
         Ok(Quantity { unit: symbol(code), scale: Scale::new(1, digits) })

@@ -338,7 +338,10 @@ impl Input {
         } else {
             nearest(&index, self.sensor.resolution)
         };
-        tracker.correct(self.reference.index(error, ahead.wrapping_neg()));
+        let correction = self.reference.index(error, ahead.wrapping_neg());
+        if correction != 0 {
+            tracker.correct(correction);
+        }
     }
 }
 

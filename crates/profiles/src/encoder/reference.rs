@@ -147,8 +147,19 @@ impl Reference {
 
     /// An index has come so many steps from its place, and the sensor has moved `since` then. The steps by which the count is to be
     /// put right.
-    #[inline(never)]
+    #[inline]
     pub(super) fn index(&mut self, error: i64, since: i32) -> i64 {
+        let is_right = error.unsigned_abs() <= TOLERANCE;
+        if is_right && self.kept == Trust::REFERENCED && self.index == Index::Right {
+            self.since = since;
+            return 0;
+        }
+        self.doubtful_index(error, since)
+    }
+
+    /// One that is the first, or wrong, or comes after something was.
+    #[inline(never)]
+    fn doubtful_index(&mut self, error: i64, since: i32) -> i64 {
         let apart = self.since.wrapping_sub(since).unsigned_abs();
         self.since = since;
         let is_first = !core::mem::replace(&mut self.trust.referenced, true);

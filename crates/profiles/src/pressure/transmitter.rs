@@ -76,9 +76,9 @@ pub struct Transmitter {
     calibration: Calibration,
     pressure: Channel,
     temperature: Channel,
-    sensor_break: bool,
-    pressure_rail: bool,
-    temperature_rail: bool,
+    conditions: Conditions,
+    /// There is no condition, and no filter has a sample of one in it.
+    is_well: bool,
     /// Samples until the next look for a sensor break.
     until_check: u16,
 }
@@ -93,9 +93,8 @@ impl Transmitter {
             calibration: parameters.calibration,
             pressure: Channel::new(&parameters.pressure),
             temperature: Channel::new(&parameters.temperature),
-            sensor_break: false,
-            pressure_rail: false,
-            temperature_rail: false,
+            conditions: Conditions::default(),
+            is_well: true,
             until_check: 0,
         }
     }
@@ -121,22 +120,29 @@ impl Transmitter {
 
     /// What is wrong with the sensors. A condition that is there holds until the filter behind it is full of good samples.
     fn check(&mut self, raw: &RawSample, ratio: f32, has_no_temperature: bool) -> Conditions {
-        let (is_break, is_rail) = (self.calibration.pressure.is_break(ratio), raw.is_rail(raw.pressure));
-        let holds = self.pressure.is_faulty(is_break || is_rail);
-        self.pressure_rail = is_rail || self.pressure_rail && holds;
-        self.check_break(is_break, holds);
-        let holds = self.temperature.is_faulty(has_no_temperature);
-        self.temperature_rail = has_no_temperature || self.temperature_rail && holds;
-        let Transmitter { sensor_break, pressure_rail, temperature_rail, .. } = *self;
-        Conditions { sensor_break, pressure_rail, temperature_rail }
+        let is_check = self.until_check == 0;
+        self.until_check = if is_check { SAMPLES_PER_SECOND } else { self.until_check } - 1;
+        let is_rail = raw.is_rail(raw.pressure);
+        if is_check || !self.is_well || is_rail || has_no_temperature {
+            self.judge(is_check, ratio, is_rail, has_no_temperature);
+        }
+        self.conditions
     }
 
-    fn check_break(&mut self, is_break: bool, holds: bool) {
-        if self.until_check == 0 {
-            self.until_check = SAMPLES_PER_SECOND;
-            self.sensor_break = is_break || self.sensor_break && holds;
+    // Most samples are good ones, and their time is short.
+    #[cold]
+    #[inline(never)]
+    fn judge(&mut self, is_check: bool, ratio: f32, is_rail: bool, has_no_temperature: bool) {
+        let is_break = self.calibration.pressure.is_break(ratio);
+        let pressure_holds = self.pressure.is_faulty(is_break || is_rail);
+        let temperature_holds = self.temperature.is_faulty(has_no_temperature);
+        let before = self.conditions;
+        if is_check {
+            self.conditions.sensor_break = is_break || before.sensor_break && pressure_holds;
         }
-        self.until_check -= 1;
+        self.conditions.pressure_rail = is_rail || before.pressure_rail && pressure_holds;
+        self.conditions.temperature_rail = has_no_temperature || before.temperature_rail && temperature_holds;
+        self.is_well = self.conditions == Conditions::default() && !pressure_holds && !temperature_holds;
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod address;
 mod clock;
+mod none;
 mod simulated;
 mod slcan;
 #[cfg(target_os = "linux")]
@@ -15,6 +16,7 @@ use canopen::{Frame, Instant};
 use thiserror::Error;
 
 pub use address::{Address, AddressError};
+pub use none::NoBus;
 pub use simulated::{Simulated, Station};
 
 /// Access to a CAN bus.

@@ -110,6 +110,11 @@ impl Dump {
 }
 
 impl Diff {
+    /// Two files are compared without one.
+    pub(super) fn needs_a_bus(&self) -> bool {
+        self.second.is_none()
+    }
+
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let node = session.options.node.one()?;
         let sheet = super::session::sheet(&self.first)?;

@@ -44,6 +44,7 @@ impl List {
         let node = session.options.node.one()?;
         let sheet = session.sheet_of(node)?;
         let catalogue = session.catalogue(node)?;
+        session.begin_all();
         let mut count = 0;
         for entry in sheet.entries() {
             let object = at(entry.index, entry.sub);

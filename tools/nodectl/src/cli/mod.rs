@@ -5,6 +5,7 @@ mod failure;
 mod info;
 mod list;
 mod lss;
+mod manual;
 mod map;
 mod monitor;
 mod nmt;
@@ -18,6 +19,7 @@ mod replacement;
 mod scan;
 mod session;
 mod store;
+mod trace;
 mod update;
 mod write;
 
@@ -54,13 +56,17 @@ enum Command {
     Dump(dump::Dump),
     Diff(dump::Diff),
     Apply(dump::Apply),
+    #[command(visible_alias = "watch")]
     Monitor(monitor::Monitor),
     Record(record::Record),
+    Trace(trace::Trace),
     Save(store::Save),
     Restore(store::Restore),
     Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Update(update::Update),
+    Completions(manual::Completions),
+    Man(manual::Man),
 }
 
 impl Cli {
@@ -69,8 +75,22 @@ impl Cli {
     /// # Errors
     /// Why it failed.
     pub fn run(&self, output: Output) -> Result<(), Failure> {
-        let mut session = Session::open(&self.options, output)?;
+        let mut session = if self.needs_a_bus() {
+            Session::open(&self.options, output)?
+        } else {
+            Session::without_a_bus(&self.options, output)?
+        };
         self.run_in(&mut session)
+    }
+
+    /// Whether the command is about more than files.
+    fn needs_a_bus(&self) -> bool {
+        match &self.command {
+            Command::Diff(diff) => diff.needs_a_bus(),
+            Command::Trace(trace) => trace.needs_a_bus(),
+            Command::Completions(_) | Command::Man(_) => false,
+            _ => true,
+        }
     }
 
     /// Does the command in a session that is open.
@@ -91,11 +111,14 @@ impl Cli {
             Command::Apply(apply) => apply.run(session),
             Command::Monitor(monitor) => monitor.run(session),
             Command::Record(record) => record.run(session),
+            Command::Trace(trace) => trace.run(session),
             Command::Save(save) => save.run(session),
             Command::Restore(restore) => restore.run(session),
             Command::Nmt(nmt) => nmt.run(session),
             Command::Lss(lss) => lss.run(session),
             Command::Update(update) => update.run(session),
+            Command::Completions(completions) => completions.run(session),
+            Command::Man(man) => man.run(session),
         }
     }
 }

@@ -7,12 +7,13 @@ use std::path::Path;
 
 use canopen::nmt::State;
 use canopen::sdo::Multiplexer;
-use canopen::{Instant, NodeId};
+use canopen::{Duration, Instant, NodeId};
 use eds::Eds;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{Failure, Options, Output};
+use crate::bus::NoBus;
 use crate::configuration::Configuration;
 use crate::object::at;
 use crate::sdo::{self, Client};
@@ -21,6 +22,9 @@ use crate::{Catalogue, Network};
 
 /// The data sheets of the largest devices have a quarter of this.
 const LARGEST_SHEET: u64 = 4 << 20;
+
+/// A slow bus needs 20 s for the 400 objects of a large dictionary: three times as much is enough for any.
+const MANY: u64 = 6;
 
 /// An open bus, and what is known about the nodes on it.
 pub struct Session {
@@ -47,6 +51,16 @@ impl Session {
         Ok(Session { sheet, ..Session::with(network, options, output) })
     }
 
+    /// For a command that is about files: nobody is on its bus.
+    ///
+    /// # Errors
+    /// The data sheet of the options cannot be used.
+    pub fn without_a_bus(options: &Options, output: Output) -> Result<Session, Failure> {
+        let sheet = options.eds.as_deref().map(sheet).transpose()?;
+        let network = Network::open(|| Ok(Box::new(NoBus)))?;
+        Ok(Session { sheet, ..Session::with(network, options, output) })
+    }
+
     /// On a bus that is open.
     #[must_use]
     pub fn with(network: Network, options: &Options, output: Output) -> Session {
@@ -70,6 +84,12 @@ impl Session {
     /// no more, however much it is asked.
     pub(super) fn begin(&mut self) {
         self.deadline = self.network.now() + self.options.sdo().limit;
+    }
+
+    /// The next transfers are for all objects of a node: together they may take as long as [`MANY`] of one.
+    pub(super) fn begin_all(&mut self) {
+        let limit = Duration(self.options.sdo().limit.0.saturating_mul(MANY));
+        self.deadline = self.network.now() + limit;
     }
 
     /// What is known about a node: from the file of the options, else by its identity.
@@ -102,6 +122,7 @@ impl Session {
     /// The values of all parameters of a node.
     pub(super) fn configuration(&mut self, node: NodeId, sheet: &Eds) -> Result<Configuration, Failure> {
         self.catalogue(node)?;
+        self.begin_all();
         let bar = ProgressBar::new(0).with_message(format!("reading node {}", node.get()));
         let values = Configuration::of_node(
             |at| self.client(node).upload(at),

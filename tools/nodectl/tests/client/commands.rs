@@ -244,3 +244,12 @@ fn update_tells_what_was_there_and_what_is() {
         "{lines}"
     );
 }
+
+#[test]
+fn of_a_value_that_stays_there_is_one_line() {
+    let wire = Wire::new(Pressure::new(1));
+    let line = ["watch", "1017", "1001", "--period", "10", "--changes", "--count", "2"];
+    let lines = printed(&wire, &line);
+    let told: Vec<&str> = lines.lines().filter_map(|line| line.split_whitespace().nth(1)).collect();
+    assert_eq!(told, ["1017h:0", "1001h:0"], "{lines}");
+}

@@ -310,15 +310,18 @@ impl Station for Hostile {
     }
 }
 
+/// The data sheet of a device with some hundred objects.
+const SHEET: &str = "../../eds/pressure.eds";
+
 /// Every command, and how long it may take in seconds. An update waits for flashes and restarts.
-fn commands(file: &str) -> Vec<(Vec<&str>, u64)> {
+fn commands<'f>(file: &'f str, dcf: &'f str) -> Vec<(Vec<&'f str>, u64)> {
     vec![
         (vec!["scan"], 25),
         (vec!["info"], 25),
         (vec!["read", "1008"], 45),
         (vec!["read", "1000", "1018:1", "--json"], 65),
         (vec!["read", "1008", "--block"], 45),
-        (vec!["read", "1008", "--eds", "../../eds/pressure.eds"], 25),
+        (vec!["read", "1008", "--eds", SHEET], 25),
         (vec!["write", "1017", "5"], 45),
         (vec!["write", "2F00", "--type", "d", "--file", file], 45),
         (vec!["write", "2F00", "--type", "d", "--file", file, "--block"], 45),
@@ -332,6 +335,13 @@ fn commands(file: &str) -> Vec<(Vec<&str>, u64)> {
         (vec!["lss", "set-id", "5"], 120),
         (vec!["lss", "set-id", "5", "--select", "1:2:3:4"], 60),
         (vec!["record", "--for", "3", "--start"], 60),
+        (vec!["trace", "--for", "3"], 60),
+        (vec!["map", "tpdo", "1", "6130:1", "--eds", SHEET], 120),
+        (vec!["unmap", "tpdo", "1", "--eds", SHEET], 60),
+        (vec!["list", "--eds", SHEET], 150),
+        (vec!["dump", dcf, "--eds", SHEET], 150),
+        (vec!["diff", SHEET, "--eds", SHEET], 150),
+        (vec!["apply", SHEET, "--eds", SHEET, "--force"], 300),
         (vec!["update", "--raw", file, "--patience", "5"], 900),
     ]
 }
@@ -341,7 +351,7 @@ fn every_command_survives_every_manner() {
     let file = format!("{}/hostile.bin", env!("CARGO_TARGET_TMPDIR"));
     std::fs::write(&file, b"1.1.0\nnew").expect("a file");
     for manner in MANNERS {
-        for (line, limit) in commands(&file) {
+        for (line, limit) in commands(&file, &format!("{file}.dcf")) {
             let wire = Wire::new(Hostile::new(manner));
             let before = wire.network().now();
             let (printed, result) = run(&wire, &line);

@@ -11,6 +11,7 @@ mod meanings;
 mod pressure;
 mod process;
 mod safety;
+mod trace;
 mod transfers;
 mod update;
 mod wire;

@@ -21,12 +21,55 @@ fn nodectl(bus: &str, line: &[&str]) -> (i32, String, String) {
 fn the_help_lists_the_exit_codes() {
     let (code, help, _) = nodectl("socketcan:none", &["--help"]);
     assert_eq!(code, 0);
-    for command in
-        ["scan", "info", "read", "write", "monitor", "record", "save", "restore", "nmt", "lss", "update"]
-    {
+    for command in [
+        "scan",
+        "info",
+        "read",
+        "write",
+        "monitor",
+        "record",
+        "trace",
+        "save",
+        "restore",
+        "nmt",
+        "lss",
+        "update",
+        "completions",
+        "man",
+    ] {
         assert!(help.contains(&format!("\n  {command} ")), "{command}");
     }
     assert!(help.contains("Exit codes:\n  0  done\n"));
+}
+
+/// Every command is completed in every shell, and has a manual page.
+#[test]
+fn shells_and_man_know_every_command() {
+    const COMMANDS: [&str; 4] = ["scan", "trace", "lss", "update"];
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let (code, script, error) = nodectl("socketcan:none", &["completions", shell]);
+        assert_eq!((code, error.as_str()), (0, ""), "{shell}");
+        for command in COMMANDS {
+            assert!(script.contains(command), "{shell}: {command}");
+        }
+        assert!(script.contains("--bit-rate") || script.contains("bit-rate"), "{shell}");
+    }
+    assert_eq!(nodectl("socketcan:none", &["completions", "cmd"]).0, 2);
+
+    let (code, page, _) = nodectl("socketcan:none", &["man"]);
+    assert_eq!(code, 0);
+    assert!(page.contains(".TH nodectl 1") && page.contains("nodectl\\-trace(1)"), "{page}");
+    let dir = std::env::temp_dir().join(format!("nodectl-man-{}", std::process::id()));
+    std::fs::create_dir_all(&dir).expect("a directory");
+    let (code, out, error) = nodectl("socketcan:none", &["man", "--dir", dir.to_str().expect("text")]);
+    assert_eq!((code, out.as_str(), error.as_str()), (0, "", ""));
+    for page in ["nodectl.1", "nodectl-read.1", "nodectl-lss-scan.1"] {
+        let text = std::fs::read_to_string(dir.join(page)).expect(page);
+        assert!(text.contains(".SH SYNOPSIS"), "{page}");
+    }
+    std::fs::remove_dir_all(&dir).expect("a directory");
+    let (code, _, error) = nodectl("socketcan:none", &["man", "--dir", "/no/such/directory"]);
+    assert!(code != 0 && error.contains("/no/such/directory"), "{code}: {error}");
 }
 
 #[test]
@@ -62,6 +105,18 @@ fn a_socketcand_daemon_is_a_bus() {
     assert_eq!((code, error.as_str()), (1, expected));
     let (code, _, error) = nodectl(&bus.replace("vcan0", "can7"), &["scan"]);
     assert_eq!((code, error.contains("no such bus")), (4, true), "{error}");
+}
+
+/// A wrong scheme in front of the right port is told with the right one.
+#[test]
+fn slcan_at_a_socketcand_daemon_is_told() {
+    let address = daemon().replace("socketcand", "slcan").replace("/vcan0", "");
+    let (code, _, error) = nodectl(&address, &["scan"]);
+    assert_eq!(code, 4);
+    assert!(
+        error.contains("a socketcand answers there: the address is socketcand://HOST:PORT/BUS"),
+        "{error}"
+    );
 }
 
 /// A daemon with a node behind it, for as long as the test runs. Its address.

@@ -1,7 +1,10 @@
 //! `nodectl monitor`
 
 mod lift;
+mod plot;
 mod screen;
+mod status;
+mod table;
 mod view;
 
 use std::fmt;
@@ -31,6 +34,10 @@ pub(super) struct Monitor {
     /// A line for each value in the pre-defined PDOs of a lift (CiA 417), whoever sends them; no node is asked.
     #[arg(long, conflicts_with_all = ["objects", "start", "window"])]
     lift: bool,
+
+    /// A line for a value that is another than before, none for the others.
+    #[arg(long, conflicts_with = "lift")]
+    changes: bool,
 
     /// End after so many values.
     #[arg(long, value_name = "N")]
@@ -99,7 +106,7 @@ impl Monitor {
         if self.lift {
             return lift::print_lines(session, self.count.unwrap_or(usize::MAX));
         }
-        if session.output.is_interactive() {
+        if session.output.is_interactive() && !self.changes {
             let (mut acquisition, _) = self.source.open(session)?;
             let view = View::new(acquisition.signals(), self.window.max(1).into());
             return screen::run(&mut acquisition, view, self.count);
@@ -112,6 +119,7 @@ impl Monitor {
         let (mut acquisition, output) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
         let (mut start, mut left, mut hinted) = (None, self.count.unwrap_or(usize::MAX), false);
+        let mut told: Vec<Option<Value>> = vec![None; signals.len()];
         while left > 0 {
             let until = acquisition.now() + SILENCE;
             let Some(sample) = acquisition.next(until)? else {
@@ -120,6 +128,10 @@ impl Monitor {
                 continue;
             };
             let start = *start.get_or_insert(sample.at);
+            let before = told[sample.signal].replace(sample.value.clone());
+            if self.changes && before.as_ref() == Some(&sample.value) {
+                continue;
+            }
             output.print(&line(node, &signals[sample.signal], &sample, start))?;
             left -= 1;
         }

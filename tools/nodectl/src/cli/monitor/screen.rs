@@ -7,12 +7,16 @@ use canopen::Instant;
 use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::DefaultTerminal;
 
+use super::status::Status;
 use super::view::View;
 use crate::acquisition::Acquisition;
 use crate::cli::Failure;
 
 /// How often the screen is drawn.
 const REFRESH: canopen::Duration = canopen::Duration::from_millis(100);
+
+/// A second in microseconds: over so long frames are counted.
+const SECOND: u64 = 1_000_000;
 
 /// The terminal, given back when the value is dropped.
 struct Terminal(DefaultTerminal);
@@ -31,11 +35,18 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     let mut terminal = Terminal(ratatui::try_init()?);
     let mut left = count.unwrap_or(usize::MAX);
+    let (mut rate, mut counted) = (None, (acquisition.now(), 0));
     while left > 0 {
         let due = acquisition.now() + REFRESH;
         left = left.saturating_sub(acquire(acquisition, &mut view, due, left)?);
-        let hint = acquisition.hint();
-        terminal.0.draw(|frame| view.draw(frame, hint.as_deref()))?;
+        let (since, frames) = counted;
+        let passed = acquisition.now().0.saturating_sub(since.0);
+        if passed >= SECOND {
+            rate = Some((acquisition.frames() - frames) * SECOND / passed);
+            counted = (acquisition.now(), acquisition.frames());
+        }
+        let status = Status::of(acquisition, rate);
+        terminal.0.draw(|frame| view.draw(frame, &status))?;
         if is_over(&mut view)? {
             break;
         }
@@ -80,6 +91,9 @@ fn on_key(key: KeyEvent, view: &mut View) -> bool {
         KeyCode::Up => view.choose(-1),
         KeyCode::Down => view.choose(1),
         KeyCode::Char(' ') => view.hold(),
+        KeyCode::Char('+' | '=') => view.zoom(true),
+        KeyCode::Char('-') => view.zoom(false),
+        KeyCode::Char('?' | 'h') => view.help(),
         _ => (),
     }
     false

@@ -1,28 +1,42 @@
-//! What is on the screen: a table of all signals, and a plot of the chosen one.
+//! What is on the screen: the node, a table of all signals, plots of as many as there is room for.
 
 use std::collections::VecDeque;
 
 use canopen::Instant;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::{Constraint, Layout};
 use ratatui::style::Stylize;
-use ratatui::symbols::Marker;
 use ratatui::text::Line;
-use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Row, Table};
+use ratatui::widgets::{Block, Paragraph};
 
+use super::status::Status;
+use super::{plot, table};
 use crate::acquisition::{Sample, Signal};
-use crate::cli::record::{range, seconds_between};
-use crate::object::Place;
+use crate::cli::record::seconds_between;
+
+/// What the plots show at least and at most, in seconds. Points are kept for as long.
+const SHORTEST: f64 = 1.0;
+const LONGEST: f64 = 600.0;
+
+/// What the keys do.
+const KEYS: [&str; 6] = [
+    "up, down  choose a signal",
+    "+, -      less or more time in the plots",
+    "space     hold the picture, or let it go on",
+    "?         these lines",
+    "q, Esc    quit",
+    "",
+];
 
 /// A signal and what is known of its values.
-struct Track {
-    signal: Signal,
-    newest: String,
-    count: usize,
-    least: Option<(f64, String)>,
-    greatest: Option<(f64, String)>,
+pub(super) struct Track {
+    pub(super) signal: Signal,
+    pub(super) newest: String,
+    pub(super) count: usize,
+    pub(super) least: Option<(f64, String)>,
+    pub(super) greatest: Option<(f64, String)>,
     /// Seconds since the start, and values.
-    points: VecDeque<(f64, f64)>,
+    pub(super) points: VecDeque<(f64, f64)>,
 }
 
 /// The state of the screen.
@@ -35,6 +49,7 @@ pub(super) struct View {
     /// What the plot shows, in seconds.
     window: f64,
     is_held: bool,
+    has_help: bool,
 }
 
 impl View {
@@ -48,7 +63,7 @@ impl View {
             points: VecDeque::new(),
         };
         let tracks = signals.iter().map(track).collect();
-        View { tracks, chosen: 0, start: None, now: 0.0, window, is_held: false }
+        View { tracks, chosen: 0, start: None, now: 0.0, window, is_held: false, has_help: false }
     }
 
     pub(super) fn take(&mut self, sample: &Sample) {
@@ -57,7 +72,7 @@ impl View {
             return;
         }
         self.now = seconds_between(start, sample.at);
-        let oldest = self.now - self.window;
+        let oldest = self.now - LONGEST;
         if let Some(track) = self.tracks.get_mut(sample.signal) {
             track.take(sample, self.now, oldest);
         }
@@ -73,49 +88,46 @@ impl View {
         self.is_held = !self.is_held;
     }
 
-    /// `hint` says why there may be no values.
-    pub(super) fn draw(&self, frame: &mut Frame, hint: Option<&str>) {
-        let rows = u16::try_from(self.tracks.len()).unwrap_or(u16::MAX).saturating_add(3);
-        let areas = [Constraint::Max(rows), Constraint::Min(8), Constraint::Length(1)];
-        let [table, plot, help] = Layout::vertical(areas).areas(frame.area());
-        frame.render_widget(self.table(), table);
-        self.draw_plot(frame, plot);
-        let held = if self.is_held { "HELD   " } else { "" };
-        let hint = hint.map(|hint| format!("   {hint}")).unwrap_or_default();
-        let keys = format!("{held}up/down: choose   space: hold   q: quit{hint}");
-        frame.render_widget(Paragraph::new(Line::from(keys).dim()), help);
+    /// Shows more time in the plots, or less: twice or half as much.
+    pub(super) fn zoom(&mut self, is_in: bool) {
+        let window = if is_in { self.window / 2.0 } else { self.window * 2.0 };
+        self.window = window.clamp(SHORTEST, LONGEST);
     }
 
-    fn table(&self) -> Table<'_> {
-        let titles = ["object", "name", "value", "unit", "least", "greatest", "values"];
-        let widths = [9, 36, 14, 8, 12, 12, 8].map(Constraint::Length);
-        let rows = self.tracks.iter().enumerate().map(|(number, track)| {
-            let row = track.row();
-            if number == self.chosen { row.bold() } else { row }
-        });
-        Table::new(rows, widths).header(Row::new(titles).dim()).block(Block::bordered().title(" values "))
+    /// Shows what the keys do, or no longer.
+    pub(super) fn help(&mut self) {
+        self.has_help = !self.has_help;
     }
 
-    fn draw_plot(&self, frame: &mut Frame, area: Rect) {
-        let Some(track) = self.tracks.get(self.chosen) else { return };
-        let points: Vec<(f64, f64)> = track.points.iter().copied().collect();
-        let dataset =
-            Dataset::default().data(&points).marker(Marker::Braille).graph_type(GraphType::Line).cyan();
-        let (from, to) = ((self.now - self.window).max(0.0), self.now.max(1.0));
-        let values = range(points.iter().map(|point| point.1), 0.05);
-        let title = format!(" {} {} ", track.signal.name, track.signal.unit);
-        let chart = Chart::new(vec![dataset])
-            .block(Block::bordered().title(title))
-            .x_axis(axis(from, to, 1))
-            .y_axis(axis(values.start, values.end, 3));
-        frame.render_widget(chart, area);
+    pub(super) fn draw(&self, frame: &mut Frame, status: &Status) {
+        let [head, body, foot] =
+            Layout::vertical([Constraint::Length(1), Constraint::Min(0), Constraint::Length(1)])
+                .areas(frame.area());
+        frame.render_widget(Paragraph::new(status.line(head.width)), head);
+        frame.render_widget(Paragraph::new(self.foot(foot.width, status)), foot);
+        if self.has_help {
+            frame.render_widget(
+                Paragraph::new(KEYS.join("\n")).block(Block::bordered().title(" keys ")),
+                body,
+            );
+            return;
+        }
+        // The values come first: plots get what is left.
+        let rows = u16::try_from(self.tracks.len()).unwrap_or(u16::MAX).saturating_add(1);
+        let [values, plots] = Layout::vertical([Constraint::Length(rows), Constraint::Min(0)]).areas(body);
+        table::draw(frame, values, &self.tracks, self.chosen);
+        plot::draw(frame, plots, &self.tracks, self.chosen, self.now, self.window);
     }
-}
 
-/// An axis with labels at its ends and in its middle.
-fn axis(from: f64, to: f64, decimals: usize) -> Axis<'static> {
-    let labels = [from, f64::midpoint(from, to), to].map(|value| format!("{value:.decimals$}"));
-    Axis::default().bounds([from, to]).labels(labels).dim()
+    fn foot(&self, width: u16, status: &Status) -> Line<'static> {
+        let held = if self.is_held { "HELD  " } else { "" };
+        let long = format!("{held}up/down choose   space hold   +/- {} s   ? keys   q quit", self.window);
+        let keys = if long.len() <= width.into() { long } else { format!("{held}? keys  q quit") };
+        match &status.hint {
+            Some(hint) => Line::from(hint.clone()).yellow(),
+            None => Line::from(keys).dim(),
+        }
+    }
 }
 
 impl Track {
@@ -130,21 +142,6 @@ impl Track {
         while self.points.front().is_some_and(|point| point.0 < oldest) {
             self.points.pop_front();
         }
-    }
-
-    fn row(&self) -> Row<'_> {
-        let text = |bound: &Option<(f64, String)>| {
-            bound.as_ref().map_or_else(|| "-".to_owned(), |(_, text)| text.clone())
-        };
-        Row::new([
-            Place(self.signal.at).to_string(),
-            self.signal.name.clone(),
-            self.newest.clone(),
-            self.signal.unit.clone(),
-            text(&self.least),
-            text(&self.greatest),
-            self.count.to_string(),
-        ])
     }
 }
 
@@ -174,11 +171,84 @@ mod tests {
         view.take(&Sample { at: Instant(second * 1_000_000), signal: 0, value: Value::Real32(value) });
     }
 
+    fn status() -> Status {
+        Status { node: 1, state: "operational", emergency: None, rate: Some(51), hint: None }
+    }
+
     fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
+        drawn(view, &status(), width, height)
+    }
+
+    fn drawn(view: &View, status: &Status, width: u16, height: u16) -> Vec<String> {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| view.draw(frame, None)).unwrap();
+        terminal.draw(|frame| view.draw(frame, status)).unwrap();
         let cells = terminal.backend().buffer().content().chunks(usize::from(width));
         cells.map(|row| row.iter().map(ratatui::buffer::Cell::symbol).collect()).collect()
+    }
+
+    /// Two sensors for a minute, one in a unit with a long name.
+    fn two_sensors() -> View {
+        let signals = [
+            Signal::polled(at(0x6130, 1), "Pressure process value", "bar"),
+            Signal::polled(at(0x6130, 2), "Temperature process value", "\u{b0}C"),
+        ];
+        let mut view = View::new(&signals, 30.0);
+        for step in 0..240_u32 {
+            let (at, angle) = (Instant(u64::from(step) * 250_000), f64::from(step) / 8.0);
+            #[allow(clippy::cast_possible_truncation)] // A value with the digits of the sensor.
+            let value = (2.5 + angle.sin()) as f32;
+            view.take(&Sample { at, signal: 0, value: Value::Real32(value) });
+            view.take(&Sample { at, signal: 1, value: Value::Real32(25.125) });
+        }
+        view
+    }
+
+    /// The pictures lie beside the tests; SCREENS=write makes them anew.
+    #[test]
+    fn pictures_from_the_smallest_terminal_to_a_large_one() {
+        let status = Status { emergency: Some("8130h heartbeat or life guarding error".into()), ..status() };
+        for (width, height) in [(40, 10), (80, 24), (120, 40)] {
+            let lines = drawn(&two_sensors(), &status, width, height);
+            let picture: String = lines.iter().map(|line| format!("{}\n", line.trim_end())).collect();
+            let path = format!("{}/tests/screens/monitor-{width}x{height}.txt", env!("CARGO_MANIFEST_DIR"));
+            if std::env::var("SCREENS").is_ok_and(|value| value == "write") {
+                std::fs::write(&path, &picture).unwrap();
+            }
+            assert_eq!(picture, std::fs::read_to_string(&path).unwrap(), "{path}");
+        }
+    }
+
+    #[test]
+    fn no_value_and_no_unit_is_lost_on_any_terminal() {
+        for width in 24..200 {
+            for height in [6, 10, 24, 60] {
+                let picture = drawn(&two_sensors(), &status(), width, height).join("\n");
+                for text in ["bar", "25.125", "\u{b0}C", "q quit"] {
+                    assert!(picture.contains(text), "{width}x{height}: {text}\n{picture}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn keys_zoom_and_explain() {
+        let mut view = two_sensors();
+        view.zoom(true);
+        assert!(screen(&view, 80, 24).join("\n").contains("+/- 15 s"));
+        (0..20).for_each(|_| view.zoom(false));
+        assert!(screen(&view, 80, 24).join("\n").contains("+/- 600 s"));
+        view.help();
+        assert!(screen(&view, 40, 10).join("\n").contains("hold the picture"));
+        view.help();
+        assert!(!screen(&view, 40, 10).join("\n").contains("hold the picture"));
+    }
+
+    #[test]
+    fn the_head_tells_the_node_and_the_foot_what_is_wrong() {
+        let status = Status { state: "stopped", hint: Some("the node is stopped".into()), ..status() };
+        let picture = drawn(&view(), &status, 60, 10);
+        assert!(picture[0].starts_with("node 1  stopped  51 frames/s"), "{picture:?}");
+        assert!(picture[9].starts_with("the node is stopped"), "{picture:?}");
     }
 
     #[test]
@@ -190,20 +260,19 @@ mod tests {
         view.take(&Sample { at: Instant(7), signal: 1, value: Value::Text("node".into()) });
         let screen = screen(&view, 110, 30);
         let row = screen[2].split_whitespace().collect::<Vec<_>>();
-        assert_eq!(row, ["\u{2502}6130h:1", "Pressure", "2.25", "bar", "0.1", "2.25", "3", "\u{2502}"]);
+        assert_eq!(row, ["6130h:1", "Pressure", "2.25", "bar", "0.1", "2.25", "3"]);
         let row = screen[3].split_whitespace().collect::<Vec<_>>();
-        assert_eq!(row, ["\u{2502}1008h:0", "Name", "node", "-", "-", "1", "\u{2502}"]);
+        assert_eq!(row, ["1008h:0", "Name", "node", "-", "-", "1"]);
     }
 
     #[test]
-    fn the_plot_shows_the_window_and_forgets_the_rest() {
+    fn the_plot_shows_the_window_with_its_unit() {
         let mut view = view();
         for second in 0..100 {
             take(&mut view, second, second as f32);
         }
-        assert_eq!(view.tracks[0].points.len(), 11);
         let screen = screen(&view, 110, 30).join("\n");
-        for label in ["89.0", "94.0", "99.0"] {
+        for label in ["89.0", "94.0", "99.0 s"] {
             assert!(screen.contains(label), "{screen}");
         }
     }

@@ -1,0 +1,247 @@
+//! `nodectl trace`
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use canopen::sdo::Multiplexer;
+use canopen::{Duration, Frame, Instant, NodeId};
+use clap::Args;
+use serde::Serialize;
+
+use super::node_set::NodeSet;
+use super::read::place;
+use super::record::seconds_between;
+use super::{Failure, Session};
+use crate::scan::scan;
+use crate::text::visible;
+use crate::trace::{Decoder, Kind, Knowledge, Line, Shown, parse_candump};
+use crate::value::Value;
+
+/// How long a wait for a frame lasts before the end of the trace is looked for.
+const PATIENCE: Duration = Duration::from_millis(200);
+/// How long nodes are listened for before they are asked.
+const LISTEN: Duration = Duration::from_millis(300);
+/// A line of candump has a tenth of this.
+const LONGEST_LINE: u64 = 1024;
+
+/// Shows what is said on the bus: every frame decoded, with names, values and units; a transfer of several frames is a line.
+///
+/// Nodes are asked first for the mapping of their PDOs and the units. What the trace itself shows of them counts from then on.
+#[derive(Debug, Args)]
+pub(super) struct Trace {
+    /// Decode a file of candump instead of the bus ("-" for the standard input). `--eds` is for the nodes of `--of`, or all.
+    #[arg(long, value_name = "FILE")]
+    file: Option<PathBuf>,
+
+    /// Only what these nodes send or are sent (1,2,5-8).
+    #[arg(long, value_name = "NODES", default_value = "all")]
+    of: NodeSet,
+
+    /// Only these services.
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    kind: Vec<Kind>,
+
+    /// All services but these.
+    #[arg(long, value_name = "KIND", value_delimiter = ',', conflicts_with = "kind")]
+    without: Vec<Kind>,
+
+    /// Send nothing: PDOs are decoded by the data sheet of `--eds` only.
+    #[arg(long)]
+    silent: bool,
+
+    /// End after so many lines.
+    #[arg(long, value_name = "N")]
+    count: Option<usize>,
+
+    /// End after so many seconds.
+    #[arg(long = "for", value_name = "SECONDS")]
+    seconds: Option<u32>,
+}
+
+/// A line, for scripts.
+#[derive(Serialize)]
+struct Row {
+    time: f64,
+    can_id: u16,
+    kind: Kind,
+    node: Option<u8>,
+    text: String,
+    values: Vec<Cell>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    abort: Option<u32>,
+    data: String,
+}
+
+#[derive(Serialize)]
+struct Cell {
+    #[serde(rename = "object", serialize_with = "place")]
+    at: Multiplexer,
+    name: String,
+    value: Option<Value>,
+    unit: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    meaning: Option<String>,
+}
+
+/// What is decoded, and how many lines may come.
+struct Printer<'t> {
+    trace: &'t Trace,
+    decoder: Decoder,
+    start: Option<Instant>,
+    left: usize,
+}
+
+impl Trace {
+    /// A file is decoded without one.
+    pub(super) fn needs_a_bus(&self) -> bool {
+        self.file.is_none()
+    }
+
+    pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
+        let decoder = self.decoder(session)?;
+        let mut printer =
+            Printer { trace: self, decoder, start: None, left: self.count.unwrap_or(usize::MAX) };
+        match &self.file {
+            Some(path) => printer.file(session, path),
+            None => printer.bus(session),
+        }
+    }
+
+    /// A decoder that knows the nodes.
+    fn decoder(&self, session: &mut Session) -> Result<Decoder, Failure> {
+        let mut decoder = Decoder::default();
+        if session.options.eds.is_some() {
+            for node in self.named() {
+                let catalogue = session.catalogue(node)?;
+                decoder.know(node, Knowledge::new(catalogue));
+            }
+        }
+        if self.file.is_none() && !self.silent {
+            for node in self.present(session)? {
+                session.begin();
+                let catalogue = session.catalogue(node)?;
+                match Knowledge::ask(&mut session.client(node), catalogue) {
+                    Ok(knowledge) => decoder.know(node, knowledge),
+                    Err(error) if error.is_silence() => return Err(session.named(error)),
+                    Err(error) => {
+                        let failure = session.named(error);
+                        session.tell(&failure)?;
+                    }
+                }
+            }
+        }
+        Ok(decoder)
+    }
+
+    /// The nodes of the filter.
+    fn named(&self) -> BTreeSet<NodeId> {
+        match &self.of {
+            NodeSet::All => (1..=127).filter_map(NodeId::new).collect(),
+            NodeSet::These(nodes) => nodes.clone(),
+        }
+    }
+
+    /// Those of them that answer.
+    fn present(&self, session: &mut Session) -> Result<Vec<NodeId>, Failure> {
+        let found = scan(&mut session.network, LISTEN)?;
+        session.network.forget();
+        let answers = found.into_iter().filter(|(_, presence)| presence.device_type.is_some());
+        let named = self.named();
+        Ok(answers.map(|(node, _)| node).filter(|node| named.contains(node)).collect())
+    }
+
+    fn is_wanted(&self, line: &Line) -> bool {
+        let is_kind =
+            (self.kind.is_empty() || self.kind.contains(&line.kind)) && !self.without.contains(&line.kind);
+        let is_node = match &self.of {
+            NodeSet::All => true,
+            NodeSet::These(nodes) => line.node.is_some_and(|node| nodes.contains(&node)),
+        };
+        is_kind && is_node
+    }
+}
+
+impl Printer<'_> {
+    fn bus(&mut self, session: &mut Session) -> Result<(), Failure> {
+        let time = self.trace.seconds.map(|seconds| Duration::from_millis(u64::from(seconds) * 1000));
+        let begin = session.network.now();
+        while self.left > 0 {
+            let until = session.network.now() + PATIENCE;
+            if let Some(received) = session.network.receive(until)? {
+                self.frame(session, &received.frame, received.at)?;
+            }
+            // By the clock of the bus once there is one: virtual time may be faster, or slower.
+            let (start, now) =
+                self.start.zip(session.network.bus_time()).unwrap_or((begin, session.network.now()));
+            if time.is_some_and(|time| now.0.saturating_sub(start.0) >= time.0) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn file(&mut self, session: &mut Session, path: &Path) -> Result<(), Failure> {
+        let input: Box<dyn Read> = if path.as_os_str() == "-" {
+            Box::new(io::stdin())
+        } else {
+            Box::new(File::open(path).map_err(|error| Failure::file(path, error))?)
+        };
+        let mut input = BufReader::new(input);
+        let mut bytes = Vec::new();
+        for number in 1_u64.. {
+            bytes.clear();
+            let read = (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+            if read.map_err(|error| Failure::file(path, error))? == 0 || self.left == 0 {
+                break;
+            }
+            let line = String::from_utf8_lossy(&bytes);
+            if line.trim().is_empty() {
+                continue;
+            }
+            let record = parse_candump(line.trim())
+                .map_err(|error| Failure::file(path, format!("line {number}: {error}")))?;
+            if let Some((at, frame)) = record {
+                self.frame(session, &frame, at)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self, session: &mut Session, frame: &Frame, at: Instant) -> Result<(), Failure> {
+        let start = *self.start.get_or_insert(at);
+        for line in self.decoder.on_frame(frame, at) {
+            if self.left > 0 && self.trace.is_wanted(&line) {
+                self.left -= 1;
+                session.print(&row(line, start))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn row(line: Line, start: Instant) -> Row {
+    let Line { at, id, kind, node, text, values, abort, data } = line;
+    let cell = |Shown { at, name, value, unit, meaning }| Cell { at, name, value, unit, meaning };
+    Row {
+        time: seconds_between(start, at),
+        can_id: id,
+        kind,
+        node: node.map(NodeId::get),
+        text,
+        values: values.into_iter().map(cell).collect(),
+        abort,
+        data: data.iter().map(|byte| format!("{byte:02X}")).collect(),
+    }
+}
+
+/// `  0.020012  181h  pdo          1  TPDO 1: Pressure process value = 3.25 bar`
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Row { time, can_id, kind, node, text, .. } = self;
+        let node = node.map_or_else(|| "-".to_owned(), |node| node.to_string());
+        write!(f, "{time:10.6} {can_id:03X}h {:<9} {node:>3}  {}", kind.name(), visible(text))
+    }
+}

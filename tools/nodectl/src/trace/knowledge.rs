@@ -1,0 +1,150 @@
+//! What is known of a node before its frames are read: its data sheet, and what it was asked or seen to answer.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::convert::Infallible;
+
+use canopen::NodeId;
+use canopen::sdo::Multiplexer;
+
+use crate::Catalogue;
+use crate::object::at;
+use crate::quantity::Quantity;
+use crate::sdo::{Client, Error};
+
+/// So many PDOs in a row that do not exist, and there are no more but those of the data sheet.
+const GAP: u16 = 4;
+/// As many as there can be (CiA 301, 7.5.2.35 and 7.5.2.37).
+const PDOS: u16 = 512;
+/// More mapped objects than this are no mapping but a kind of MPDO (CiA 301, 7.5.2.36).
+const SLOTS: u32 = 64;
+/// The first communication parameters of RPDOs and of TPDOs.
+const COMMUNICATION: [u16; 2] = [0x1400, 0x1800];
+
+/// The data sheet of a node and the numbers that it has told.
+#[derive(Clone, Debug)]
+pub struct Knowledge {
+    catalogue: Catalogue,
+    /// Numbers of up to four bytes.
+    numbers: BTreeMap<(u16, u8), u32>,
+}
+
+impl Default for Knowledge {
+    /// Of a node of which nothing is known.
+    fn default() -> Knowledge {
+        Knowledge::new(Catalogue::unknown())
+    }
+}
+
+impl Knowledge {
+    /// Of a node with a data sheet: what the node has not told is as after a reset with nothing saved.
+    #[must_use]
+    pub fn new(catalogue: Catalogue) -> Knowledge {
+        Knowledge { catalogue, numbers: BTreeMap::new() }
+    }
+
+    /// Asks a node for the PDOs in force and the units of what they carry.
+    ///
+    /// # Errors
+    /// Those of SDO.
+    pub fn ask(client: &mut Client, catalogue: Catalogue) -> Result<Knowledge, Error> {
+        let mut known = Knowledge::new(catalogue);
+        for first in COMMUNICATION {
+            known.ask_pdos(client, first)?;
+        }
+        for object in known.mapped() {
+            known.ask_quantity(client, object)?;
+        }
+        Ok(known)
+    }
+
+    fn ask_pdos(&mut self, client: &mut Client, first: u16) -> Result<(), Error> {
+        let mut missing = 0;
+        for number in 0..PDOS {
+            let (communication, mapping) = (first + number, first + 0x200 + number);
+            if missing >= GAP && self.catalogue.entry(at(communication, 1)).is_none() {
+                continue;
+            }
+            if self.fetch(client, at(communication, 1))?.is_none() {
+                missing += 1;
+                continue;
+            }
+            missing = 0;
+            let count = self.fetch(client, at(mapping, 0))?.unwrap_or(0);
+            for slot in 1..=if count <= SLOTS { count } else { 0 } {
+                self.fetch(client, at(mapping, u8::try_from(slot).unwrap_or(0)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The objects that [`Quantity::of`] asks for.
+    fn ask_quantity(&mut self, client: &mut Client, of: Multiplexer) -> Result<(), Error> {
+        let catalogue = self.catalogue.clone();
+        Quantity::by(&catalogue, of, |at| self.fetch(client, at)).map(drop)
+    }
+
+    fn fetch(&mut self, client: &mut Client, at: Multiplexer) -> Result<Option<u32>, Error> {
+        match client.upload(at) {
+            Ok(bytes) => {
+                self.tell(at, &bytes);
+                Ok(self.told(at))
+            }
+            Err(error) if error.abort().is_some() => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// A value that the node has. What is no number, or of no object that is known, is forgotten: a trace of any length
+    /// takes so much memory and no more.
+    pub(super) fn tell(&mut self, at: Multiplexer, bytes: &[u8]) {
+        let is_pdo = (0x1400..0x1C00).contains(&at.index);
+        if bytes.len() <= 4 && (is_pdo || self.catalogue.entry(at).is_some()) {
+            let mut word = [0; 4];
+            word[..bytes.len()].copy_from_slice(bytes);
+            self.numbers.insert((at.index, at.sub), u32::from_le_bytes(word));
+        }
+    }
+
+    fn told(&self, at: Multiplexer) -> Option<u32> {
+        self.numbers.get(&(at.index, at.sub)).copied()
+    }
+
+    /// The number that the node has told, else the default of its data sheet.
+    pub(super) fn number(&self, at: Multiplexer, node: NodeId) -> Option<u32> {
+        self.told(at).or_else(|| {
+            // Of a device without a data sheet only what is the same in all devices is known: no value.
+            let entry = self.catalogue.entry(at).filter(|_| self.catalogue.is_of_a_device())?;
+            match entry.default.as_ref()?.evaluate(node) {
+                eds::Value::Integer(number) => u32::try_from(number).ok(),
+                _ => None,
+            }
+        })
+    }
+
+    /// The unit and the decimal point of an object.
+    pub(super) fn quantity(&self, of: Multiplexer, node: NodeId) -> Quantity {
+        let asked = Quantity::by(&self.catalogue, of, |at| Ok::<_, Infallible>(self.number(at, node)));
+        asked.unwrap_or_default()
+    }
+
+    pub(super) fn catalogue(&self) -> &Catalogue {
+        &self.catalogue
+    }
+
+    /// The PDO parameters that are known, of the data sheet or told: index of the communication parameter.
+    pub(super) fn pdos(&self) -> BTreeSet<u16> {
+        let is_one = |index: &u16| COMMUNICATION.iter().any(|first| (*first..first + PDOS).contains(index));
+        let told = self.numbers.keys().filter(|(_, sub)| *sub == 1).map(|(index, _)| *index);
+        told.chain(self.catalogue.indices()).filter(is_one).collect()
+    }
+
+    /// The objects in the mappings that the node has told.
+    fn mapped(&self) -> Vec<Multiplexer> {
+        let is_slot = |index: u16, sub: u8| sub > 0 && matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF);
+        let slots = self.numbers.iter().filter(|((index, sub), _)| is_slot(*index, *sub));
+        slots
+            .map(|(_, &slot)| canopen::pdo::MappedObject::parse(slot))
+            .map(|object| at(object.index, object.sub))
+            .collect()
+    }
+}

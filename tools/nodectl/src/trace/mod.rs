@@ -1,0 +1,206 @@
+//! What the frames on a bus mean: service by service, with the names, values and units of the objects.
+//!
+//! A [`Decoder`] takes the frames in their order and says what each is. A transfer of several frames is one [`Line`], made when the
+//! transfer ends; a heartbeat is one when its state is new. Nothing is sent.
+
+mod candump;
+mod knowledge;
+mod pdo;
+mod sdo;
+mod services;
+
+use std::collections::BTreeMap;
+
+use canopen::sdo::Multiplexer;
+use canopen::{Frame, Instant, NodeId};
+
+pub use candump::{NotARecord, parse as parse_candump};
+pub use knowledge::Knowledge;
+
+use crate::Catalogue;
+use crate::value::Value;
+use pdo::Pdos;
+use sdo::Transfers;
+use services::States;
+
+/// The service that a frame belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Commands of the NMT master.
+    Nmt,
+    /// SYNC.
+    Sync,
+    /// TIME.
+    Time,
+    /// Emergencies.
+    Emcy,
+    /// Process data.
+    Pdo,
+    /// Transfers of objects.
+    Sdo,
+    /// Boot-up, heartbeat, node guarding.
+    Heartbeat,
+    /// Layer setting services.
+    Lss,
+    /// Anything else.
+    Other,
+}
+
+impl Kind {
+    /// As on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Kind::Nmt => "nmt",
+            Kind::Sync => "sync",
+            Kind::Time => "time",
+            Kind::Emcy => "emcy",
+            Kind::Pdo => "pdo",
+            Kind::Sdo => "sdo",
+            Kind::Heartbeat => "heartbeat",
+            Kind::Lss => "lss",
+            Kind::Other => "other",
+        }
+    }
+}
+
+/// A value that was on the bus.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// The object.
+    pub at: Multiplexer,
+    /// Its name; empty where none is known.
+    pub name: String,
+    /// The value as it is meant; `None` for an object that was asked for and not answered.
+    pub value: Option<Value>,
+    /// Its unit; empty where none is known.
+    pub unit: String,
+    /// What the number stands for.
+    pub meaning: Option<String>,
+}
+
+/// What a frame, or a transfer of several, says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// When the frame was on the bus; of a transfer, its last frame.
+    pub at: Instant,
+    /// The CAN-ID of the frame.
+    pub id: u16,
+    /// The service.
+    pub kind: Kind,
+    /// The node that the frame is of or for; `None` where the CAN-ID tells none.
+    pub node: Option<NodeId>,
+    /// In words.
+    pub text: String,
+    /// The values in it.
+    pub values: Vec<Shown>,
+    /// The abort code of a transfer that was refused or given up.
+    pub abort: Option<u32>,
+    /// The data of the frame.
+    pub data: Vec<u8>,
+}
+
+/// What the decoded part of a line consists of.
+#[derive(Debug, Default)]
+struct Said {
+    text: String,
+    values: Vec<Shown>,
+    abort: Option<u32>,
+}
+
+impl Said {
+    fn text(text: impl Into<String>) -> Said {
+        Said { text: text.into(), ..Said::default() }
+    }
+}
+
+/// Takes frames, says what they mean.
+#[derive(Debug, Default)]
+pub struct Decoder {
+    nodes: BTreeMap<NodeId, Knowledge>,
+    pdos: Pdos,
+    transfers: Transfers,
+    states: States,
+}
+
+impl Decoder {
+    /// Tells what is known of a node.
+    pub fn know(&mut self, node: NodeId, knowledge: Knowledge) {
+        self.nodes.insert(node, knowledge);
+        self.pdos.forget(node);
+    }
+
+    /// What a frame says. Nothing for a part of a transfer that goes on, and for a heartbeat that brings nothing new; two lines where a
+    /// transfer begins before the one before has ended.
+    pub fn on_frame(&mut self, frame: &Frame, at: Instant) -> Vec<Line> {
+        let id = frame.id();
+        let said = |kind, node, said: Said| Line {
+            at,
+            id,
+            kind,
+            node,
+            text: said.text,
+            values: said.values,
+            abort: said.abort,
+            data: frame.data().to_vec(),
+        };
+        let one =
+            |kind, node, text: Option<Said>| text.map(|text| said(kind, node, text)).into_iter().collect();
+        let node = NodeId::new(u8::try_from(id & 0x7F).unwrap_or(0));
+        match (id, node) {
+            (0x000, _) => one(Kind::Nmt, None, Some(services::nmt(frame))),
+            (0x080, _) => one(Kind::Sync, None, Some(services::sync(frame))),
+            (0x100, _) => one(Kind::Time, None, Some(services::time(frame))),
+            (0x7E4 | 0x7E5, _) => one(Kind::Lss, None, Some(services::lss(frame))),
+            (0x701..=0x77F, node) => one(Kind::Heartbeat, node, self.states.on_frame(frame, node)),
+            _ if self.pdos.has(id, &self.nodes) => {
+                let (node, text) = self.pdos.on_frame(frame, &self.nodes);
+                one(Kind::Pdo, node, Some(text))
+            }
+            (0x081..=0x0FF, node) => one(Kind::Emcy, node, Some(services::emcy(frame))),
+            (0x581..=0x5FF | 0x601..=0x67F, Some(node)) => {
+                let known = self.nodes.entry(node).or_default();
+                let events = self.transfers.on_frame(node, frame, at);
+                let lines = events.into_iter().map(|event| {
+                    self.pdos.note(node, known, &event);
+                    said(Kind::Sdo, Some(node), event.say(known, node))
+                });
+                lines.collect()
+            }
+            (0x181..=0x57F, Some(node)) => one(Kind::Pdo, Some(node), Some(pdo::unknown(frame))),
+            _ => one(Kind::Other, None, Some(Said::text(hex(frame)))),
+        }
+    }
+}
+
+/// A value as people read it: ` = 3.25 bar`; nothing where there is none.
+fn equals(shown: &Shown) -> String {
+    let Some(value) = &shown.value else { return String::new() };
+    let unit = if shown.unit.is_empty() { String::new() } else { format!(" {}", shown.unit) };
+    let meaning = shown.meaning.as_ref().map(|meaning| format!(" [{meaning}]")).unwrap_or_default();
+    format!(" = {value}{unit}{meaning}")
+}
+
+/// The data of a frame as pairs of digits.
+fn hex(frame: &Frame) -> String {
+    if frame.is_remote() {
+        return format!("remote frame of {} bytes", frame.len());
+    }
+    let pairs: Vec<String> = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
+    pairs.join(" ")
+}
+
+/// The value in these bytes of an object, with what is known about the object.
+fn value(known: &Knowledge, catalogue: &Catalogue, node: NodeId, at: Multiplexer, bytes: &[u8]) -> Shown {
+    let data_type = catalogue.data_type(at).unwrap_or_else(|| crate::value::guess(bytes));
+    let quantity = known.quantity(at, node);
+    let raw = Value::decode(bytes, data_type);
+    Shown {
+        at,
+        name: catalogue.name(at).unwrap_or_default(),
+        meaning: crate::meaning::of(catalogue, at, &raw),
+        value: Some(quantity.apply(raw)),
+        unit: quantity.unit,
+    }
+}
