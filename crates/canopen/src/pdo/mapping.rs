@@ -78,7 +78,9 @@ pub(crate) fn locate(
                 Direction::Transmit => mapping.allows_tpdo(),
                 Direction::Receive => mapping.allows_rpdo(),
             };
-            (Located { field: entry.field, takes_any: entry.takes_any() }, fits)
+            // A parameter is more than bytes in the image: whoever measures with it has to be told.
+            let takes_any = entry.takes_any() && !entry.is_parameter();
+            (Located { field: entry.field, takes_any }, fits)
         }
     };
     let same_length = u16::from(mapped.bits) == u16::from(located.field.size) * 8;
