@@ -261,7 +261,8 @@ impl Services {
     }
 
     fn filter(&mut self, node: &mut impl Shared) {
-        let banks = node.call(|protocol, _| filters::pack(protocol.process_ids(), protocol.service_ids()));
+        let banks =
+            node.call(|protocol, _| filters::pack(protocol.process_filters(), protocol.service_ids()));
         self.can.set_filters(&banks);
     }
 }

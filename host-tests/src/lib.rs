@@ -2,6 +2,7 @@
 
 pub mod asked;
 pub mod bench;
+pub mod calls;
 pub mod domain;
 pub mod lift417;
 pub mod lss;

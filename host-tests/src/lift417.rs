@@ -46,12 +46,12 @@ impl Pdo {
     }
 
     /// The flags of its COB-ID by default in that node: producers forbid remote frames, but for the multiplexed PDO, and
-    /// units 2 to 4 are off.
+    /// what has one CAN-ID for all nodes is off until the node is chosen to be such a virtual device.
     #[must_use]
     pub fn flags(&self) -> u32 {
         match (self.is_produced, self.number) {
             (false, _) | (true, 2) => 0,
-            (true, 264 | 385 | 386) => 0xC000_0000,
+            (true, 258 | 263 | 264 | 385 | 386) => 0xC000_0000,
             (true, _) => 0x4000_0000,
         }
     }

@@ -48,11 +48,13 @@ pub struct Bank {
 /// The banks in order. Of two that accept a frame the first decides (RM0390, 30.7.4, filter priority rules).
 pub type Banks = Vec<Bank, BANKS>;
 
-/// Packs identifiers into banks. When there are more than fit, the last bank passes every base frame to FIFO 1 and the
-/// protocol sorts them out; none is lost.
-pub fn pack(process: impl Iterator<Item = u16>, services: impl Iterator<Item = u16>) -> Banks {
+/// Packs identifiers into banks; those of process data with the bits of them that count. When there are more than fit, the last bank
+/// passes every base frame to FIFO 1 and the protocol sorts them out; none is lost.
+pub fn pack(process: impl Iterator<Item = (u16, u16)>, services: impl Iterator<Item = u16>) -> Banks {
     let mut banks = Banks::new();
-    let complete = fill(&mut banks, Fifo::Process, process) && fill(&mut banks, Fifo::Services, services);
+    let process = process.map(|(id, mask)| Pair { id, mask });
+    let complete = fill(&mut banks, Fifo::Process, process)
+        && fill(&mut banks, Fifo::Services, services.map(Pair::exactly));
     if !complete {
         banks.pop();
         let _ = banks.push(EVERYTHING);
@@ -68,11 +70,10 @@ pub fn everything() -> Banks {
 
 const EVERYTHING: Bank = Bank { fifo: Fifo::Services, pairs: [Pair::ANY; 2] };
 
-/// Adds banks for `ids`; false when there is no bank left.
-fn fill(banks: &mut Banks, fifo: Fifo, mut ids: impl Iterator<Item = u16>) -> bool {
-    while let Some(first) = ids.next() {
-        let second = ids.next().unwrap_or(first);
-        let pairs = [Pair::exactly(first), Pair::exactly(second)];
+/// Adds banks for `pairs`; false when there is no bank left.
+fn fill(banks: &mut Banks, fifo: Fifo, mut pairs: impl Iterator<Item = Pair>) -> bool {
+    while let Some(first) = pairs.next() {
+        let pairs = [first, pairs.next().unwrap_or(first)];
         if banks.push(Bank { fifo, pairs }).is_err() {
             return false;
         }
@@ -84,6 +85,10 @@ fn fill(banks: &mut Banks, fifo: Fifo, mut ids: impl Iterator<Item = u16>) -> bo
 mod tests {
     use super::*;
 
+    fn exactly(ids: impl IntoIterator<Item = u16>) -> impl Iterator<Item = (u16, u16)> {
+        ids.into_iter().map(|id| (id, 0x7FF))
+    }
+
     /// What the hardware does with a frame.
     fn route(banks: &Banks, id: u16) -> Option<Fifo> {
         let passes = |pair: &Pair| (id ^ pair.id) & pair.mask == 0;
@@ -94,7 +99,7 @@ mod tests {
     fn each_identifier_reaches_its_fifo_and_no_other_passes() {
         let process = [0x000, 0x080, 0x201];
         let services = [0x601, 0x7E5];
-        let banks = pack(process.into_iter(), services.into_iter());
+        let banks = pack(exactly(process), services.into_iter());
         for id in 0..=0x7FF {
             let wanted = match id {
                 id if process.contains(&id) => Some(Fifo::Process),
@@ -106,14 +111,22 @@ mod tests {
     }
 
     #[test]
+    fn a_service_of_all_nodes_is_one_pair() {
+        let banks = pack(exactly([0x000, 0x400]).chain([(0x501, 0x780)]), [0x601].into_iter());
+        assert!((0x501..=0x57F).chain([0x000, 0x400]).all(|id| route(&banks, id) == Some(Fifo::Process)));
+        assert_eq!([0x601, 0x481, 0x580].map(|id| route(&banks, id)), [Some(Fifo::Services), None, None]);
+        assert_eq!(banks.len(), 3);
+    }
+
+    #[test]
     fn an_identifier_in_both_lists_is_process_data() {
-        let banks = pack([0x200].into_iter(), [0x200].into_iter());
+        let banks = pack(exactly([0x200]), [0x200].into_iter());
         assert_eq!(route(&banks, 0x200), Some(Fifo::Process));
     }
 
     #[test]
     fn all_banks_can_be_used() {
-        let banks = pack(0..4, 0x700..0x700 + 52);
+        let banks = pack(exactly(0..4), 0x700..0x700 + 52);
         assert_eq!(banks.len(), BANKS);
         assert_eq!(route(&banks, 0x700 + 51), Some(Fifo::Services));
         assert_eq!(route(&banks, 0x700 + 52), None);
@@ -121,7 +134,7 @@ mod tests {
 
     #[test]
     fn with_too_many_identifiers_none_is_lost() {
-        let banks = pack(0..4, 0x700..0x700 + 54);
+        let banks = pack(exactly(0..4), 0x700..0x700 + 54);
         assert_eq!(banks.len(), BANKS);
         assert!((0..4).all(|id| route(&banks, id) == Some(Fifo::Process)));
         assert!((0x700..0x700 + 54).all(|id| route(&banks, id) == Some(Fifo::Services)));
@@ -129,6 +142,6 @@ mod tests {
 
     #[test]
     fn no_identifiers_need_no_bank() {
-        assert!(pack([].into_iter(), [].into_iter()).is_empty());
+        assert!(pack(exactly([]), [].into_iter()).is_empty());
     }
 }

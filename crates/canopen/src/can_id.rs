@@ -9,6 +9,9 @@ impl CanId {
     /// NMT commands (CiA 301, 7.3.5).
     pub const NMT: CanId = CanId(0x000);
 
+    /// The function code in an identifier of the pre-defined connection set.
+    pub(crate) const FUNCTION: u16 = 0x780;
+
     /// `None` above 7FFh.
     #[must_use]
     pub const fn new(id: u16) -> Option<CanId> {
@@ -24,6 +27,16 @@ impl CanId {
     /// An identifier of the pre-defined connection set: a function code in bits 7..10, a node-ID below.
     pub(crate) const fn of_service(function: u16, node: u8) -> CanId {
         CanId((function & 0x780) | (node & 0x7F) as u16)
+    }
+
+    /// Whether a CAN-ID has the same function code, with the node-ID of any node.
+    pub(crate) const fn is_of_same_service(self, id: u16) -> bool {
+        (id ^ self.0) & Self::FUNCTION == 0 && id & 0x7F != 0
+    }
+
+    /// The identifiers with this function code, one for each node.
+    pub(crate) fn of_all_nodes(self) -> impl Iterator<Item = CanId> {
+        (1..=0x7F).map(move |node| CanId::of_service(self.0, node))
     }
 
     /// One of the two identifiers of LSS (CiA 305): 0 for the responses, 1 for the requests.

@@ -49,7 +49,7 @@ impl NodeApplication {
     }
 
     /// Shows what was measured.
-    pub(crate) fn show_values(&self, image: &mut [u8]) {
+    pub(crate) fn show_values(&mut self, image: &mut [u8]) {
         self.profile.publish(&self.snapshot, image);
     }
 
@@ -77,6 +77,7 @@ impl Application for NodeApplication {
         self.profile.register_bits()
     }
 
+    #[inline(never)]
     fn initialise(&mut self, image: &mut [u8]) {
         let setup = &self.setup;
         let mut show = |index, sub, bytes: &[u8]| self.show(index, sub, bytes, image);
@@ -99,12 +100,12 @@ impl Application for NodeApplication {
         self.profile.write(entry, bytes, image)
     }
 
-    fn written(&mut self, _: &Entry, image: &mut [u8]) {
-        self.profile.received(image);
+    fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        self.profile.written(entry, image);
     }
 
-    fn received(&mut self, _: u16, image: &mut [u8]) {
-        self.profile.received(image);
+    fn received(&mut self, rpdo: u16, image: &mut [u8]) {
+        self.profile.received(rpdo, image);
     }
 
     fn state(&mut self, state: State, image: &mut [u8]) {
@@ -117,6 +118,22 @@ impl Application for NodeApplication {
 
     fn sends_events(&self, tpdo: u16) -> bool {
         self.profile.sends_events(tpdo)
+    }
+
+    fn begin_events(&mut self, tpdo: u16, image: &mut [u8]) {
+        self.profile.begin_events(tpdo, image);
+    }
+
+    fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool {
+        self.profile.next_event(tpdo, image)
+    }
+
+    fn takes_all_nodes(&self, rpdo: u16) -> bool {
+        self.profile.takes_all_nodes(rpdo)
+    }
+
+    fn broadcasts(&self, at: Multiplexer, image: &[u8]) -> bool {
+        self.profile.broadcasts(at, image)
     }
 
     fn stored(&self, group: Group) -> canopen::Stored<'_> {

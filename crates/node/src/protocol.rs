@@ -118,6 +118,11 @@ impl Protocol {
         self.device.process_ids().map(CanId::get)
     }
 
+    /// The same for its filters: identifiers, and the bits of them that count.
+    pub fn process_filters(&self) -> impl Iterator<Item = (u16, u16)> {
+        self.device.process_filters().map(|(id, mask)| (id.get(), mask))
+    }
+
     /// Identifiers for FIFO 1.
     pub fn service_ids(&self) -> impl Iterator<Item = u16> {
         self.device.service_ids().map(CanId::get)

@@ -311,7 +311,7 @@ macro_rules! personalities {
 
             /// As [`Profile::publish`]($crate::profile::Profile::publish); what another personality has measured is
             /// left alone.
-            pub fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+            pub fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
                 use $crate::profile::Profile;
                 match (self, snapshot) {
                     $((AnyProfile::$Name(own), Snapshot::$Name(values)) => own.publish(values, image),)+
@@ -336,10 +336,18 @@ macro_rules! personalities {
             }
 
             /// As [`Profile::received`]($crate::profile::Profile::received).
-            pub fn received(&mut self, image: &mut [u8]) {
+            pub fn received(&mut self, rpdo: u16, image: &mut [u8]) {
                 use $crate::profile::Profile;
                 match self {
-                    $(AnyProfile::$Name(own) => own.received(image),)+
+                    $(AnyProfile::$Name(own) => own.received(rpdo, image),)+
+                }
+            }
+
+            /// As [`Profile::written`]($crate::profile::Profile::written).
+            pub fn written(&mut self, entry: &canopen::dictionary::Entry, image: &mut [u8]) {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.written(entry, image),)+
                 }
             }
 
@@ -365,6 +373,40 @@ macro_rules! personalities {
                 use $crate::profile::Profile;
                 match self {
                     $(AnyProfile::$Name(own) => own.sends_events(tpdo),)+
+                }
+            }
+
+            /// As [`Profile::begin_events`]($crate::profile::Profile::begin_events).
+            pub fn begin_events(&mut self, tpdo: u16, image: &mut [u8]) {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.begin_events(tpdo, image),)+
+                }
+            }
+
+            /// As [`Profile::next_event`]($crate::profile::Profile::next_event).
+            pub fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.next_event(tpdo, image),)+
+                }
+            }
+
+            /// As [`Profile::takes_all_nodes`]($crate::profile::Profile::takes_all_nodes).
+            #[must_use]
+            pub fn takes_all_nodes(&self, rpdo: u16) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.takes_all_nodes(rpdo),)+
+                }
+            }
+
+            /// As [`Profile::broadcasts`]($crate::profile::Profile::broadcasts).
+            #[must_use]
+            pub fn broadcasts(&self, at: canopen::sdo::Multiplexer, image: &[u8]) -> bool {
+                use $crate::profile::Profile;
+                match self {
+                    $(AnyProfile::$Name(own) => own.broadcasts(at, image),)+
                 }
             }
 

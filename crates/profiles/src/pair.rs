@@ -2,7 +2,7 @@
 
 use canopen::dictionary::Entry;
 use canopen::nmt::State;
-use canopen::sdo::Abort;
+use canopen::sdo::{Abort, Multiplexer};
 
 use crate::board::{DIGITAL_OUTPUTS, Inputs, Outputs, PositionInputs, PowerOn, RETAINED_WORDS};
 use crate::fault::{Fault, Flags};
@@ -65,7 +65,7 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         (self.0.parameters(image), self.1.parameters(image))
     }
 
-    fn publish(&self, (first, second): &Snapshot<Self>, image: &mut [u8]) {
+    fn publish(&mut self, (first, second): &Snapshot<Self>, image: &mut [u8]) {
         self.0.publish(first, image);
         self.1.publish(second, image);
     }
@@ -82,9 +82,14 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
         }
     }
 
-    fn received(&mut self, image: &mut [u8]) {
-        self.0.received(image);
-        self.1.received(image);
+    fn received(&mut self, rpdo: u16, image: &mut [u8]) {
+        self.0.received(rpdo, image);
+        self.1.received(rpdo, image);
+    }
+
+    fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        self.0.written(entry, image);
+        self.1.written(entry, image);
     }
 
     fn state(&mut self, state: State, image: &mut [u8]) {
@@ -104,6 +109,30 @@ impl<A: Profile, B: Profile> Profile for Pair<A, B> {
 
     fn sends_events(&self, tpdo: u16) -> bool {
         self.0.sends_events(tpdo) || self.1.sends_events(tpdo)
+    }
+
+    fn begin_events(&mut self, tpdo: u16, image: &mut [u8]) {
+        if self.0.sends_events(tpdo) {
+            self.0.begin_events(tpdo, image);
+        } else {
+            self.1.begin_events(tpdo, image);
+        }
+    }
+
+    fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool {
+        if self.0.sends_events(tpdo) {
+            self.0.next_event(tpdo, image)
+        } else {
+            self.1.next_event(tpdo, image)
+        }
+    }
+
+    fn takes_all_nodes(&self, rpdo: u16) -> bool {
+        self.0.takes_all_nodes(rpdo) || self.1.takes_all_nodes(rpdo)
+    }
+
+    fn broadcasts(&self, at: Multiplexer, image: &[u8]) -> bool {
+        self.0.broadcasts(at, image) && self.1.broadcasts(at, image)
     }
 
     /// A digital output is on when one of them wants it on.

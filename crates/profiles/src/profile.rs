@@ -8,7 +8,7 @@
 
 use canopen::dictionary::Entry;
 use canopen::nmt::State;
-use canopen::sdo::Abort;
+use canopen::sdo::{Abort, Multiplexer};
 
 use crate::board::{Inputs, Outputs, PositionInputs, PowerOn, RETAINED_WORDS};
 use crate::fault::{Fault, Flags};
@@ -60,8 +60,8 @@ pub trait Profile: Sized {
     /// The parameters in the image. A value that no write could have put there acts as a valid one.
     fn parameters(&self, image: &[u8]) -> Parameters<Self>;
 
-    /// Takes what was measured into the image.
-    fn publish(&self, snapshot: &Snapshot<Self>, image: &mut [u8]);
+    /// Takes what was measured into the image, once a millisecond and after every reset.
+    fn publish(&mut self, snapshot: &Snapshot<Self>, image: &mut [u8]);
 
     /// Whether it decides on writes to this object. Of the profiles in one dictionary at most one does.
     fn handles(&self, index: u16, sub: u8) -> bool;
@@ -73,8 +73,11 @@ pub trait Profile: Sized {
     /// The reason to refuse it; nothing is stored then.
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort>;
 
-    /// An RPDO was received, or an object written: other outputs may follow.
-    fn received(&mut self, _image: &mut [u8]) {}
+    /// An RPDO was received, by its number from 1: other outputs may follow.
+    fn received(&mut self, _rpdo: u16, _image: &mut [u8]) {}
+
+    /// An SDO client has written an object: other outputs may follow.
+    fn written(&mut self, _entry: &Entry, _image: &mut [u8]) {}
 
     /// The NMT state is another one now.
     fn state(&mut self, _state: State, _image: &mut [u8]) {}
@@ -85,9 +88,27 @@ pub trait Profile: Sized {
     /// Shows which faults of the device are active, in a profile that has objects for them.
     fn show_flags(&self, _flags: Flags, _image: &mut [u8]) {}
 
-    /// Whether this TPDO, by its number from 1, sends events: a frame of it that waits for the bus gives way to no newer one.
+    /// Whether this TPDO, by its number from 1, tells events (`canopen::Application`).
     fn sends_events(&self, _tpdo: u16) -> bool {
         false
+    }
+
+    /// This TPDO can be sent from now on: how things are is to be told.
+    fn begin_events(&mut self, _tpdo: u16, _image: &mut [u8]) {}
+
+    /// Puts the next event of this TPDO into the image; whether there was one.
+    fn next_event(&mut self, _tpdo: u16, _image: &mut [u8]) -> bool {
+        false
+    }
+
+    /// Whether this RPDO, a multiplexed one, takes the frames of all nodes.
+    fn takes_all_nodes(&self, _rpdo: u16) -> bool {
+        false
+    }
+
+    /// Whether a multiplexed PDO tells this object to all nodes.
+    fn broadcasts(&self, _at: Multiplexer, _image: &[u8]) -> bool {
+        true
     }
 
     /// What the board has to show.

@@ -1,5 +1,7 @@
-//! What the installer of the lift does, over SDO: each node is one of the two units, a PDO of the other is off; then both
-//! are saved and reset.
+//! What the installer of the lift does, over SDO: each node is told which virtual devices it is, and described; then both are
+//! saved and reset.
+
+use profiles::lift::devices::Devices;
 
 use crate::controller::{LAMP_OFF, LAMP_ON, LANDINGS, call};
 use crate::table::{LOAD, POSITION};
@@ -13,13 +15,12 @@ pub(crate) trait Site {
 
     /// The node at the tape in the shaft: 0.1 mm a mark, no index.
     fn describe_position_unit(&mut self) {
-        self.write(POSITION, 0x2311, 3, &0_f32.to_le_bytes());
+        self.write(POSITION, 0x2305, 0, &[Devices::POSITION.0]);
         self.write(POSITION, 0x2100, 1, &[6]);
         self.write(POSITION, 0x2101, 1, &100_000_u32.to_le_bytes());
         self.write(POSITION, 0x2105, 0, &[0]);
         self.write(POSITION, 0x63B8, 1, &20_100_i32.to_le_bytes());
         self.write(POSITION, 0x63B4, 1, &9_900_i32.to_le_bytes());
-        self.write(POSITION, 0x1901, 1, &0xC000_0188_u32.to_le_bytes());
     }
 
     /// The car is at the lowest landing. The description must have reached the measurement.
@@ -29,7 +30,8 @@ pub(crate) trait Site {
 
     /// The node at the cylinder and the panel.
     fn describe_load_and_panel(&mut self) {
-        self.write(LOAD, 0x2301, 1, &[0]);
+        let panel = Devices::INPUT_PANEL.0 | Devices::OUTPUT_PANEL.0;
+        self.write(LOAD, 0x2305, 0, &[Devices::LOAD.0 | panel]);
         for (sub, value) in [(1, 2.0e5_f32), (2, 0.0), (3, 6.0e5), (4, 800.0)] {
             self.write(LOAD, 0x2311, sub, &value.to_le_bytes());
         }
@@ -39,7 +41,6 @@ pub(crate) trait Site {
         self.write(LOAD, 0x2320, 2, &call(4).to_le_bytes()[..6]);
         self.write(LOAD, 0x2321, 1, &LAMP_OFF.to_le_bytes()[..6]);
         self.write(LOAD, 0x2321, 2, &LAMP_ON.to_le_bytes()[..6]);
-        self.write(LOAD, 0x1906, 1, &0xC000_018C_u32.to_le_bytes());
     }
 
     /// All of it is there after a reset.

@@ -10,6 +10,7 @@ use host_tests::lift417::pdos;
 use host_tests::tables::table;
 use node::Personality;
 use profiles::board::RawSample;
+use profiles::lift::devices::Devices;
 use profiles::lift::load::OVERLOAD;
 
 const NO_OBJECT: u32 = 0x0602_0000;
@@ -19,9 +20,10 @@ fn lift() -> Bench {
     Bench::booted_as(Personality::Lift)
 }
 
-/// In Operational, with a first sample and nothing left of what it has sent on the way.
+/// In Operational as all virtual devices, with a first sample and nothing left of what it has sent on the way.
 fn operational() -> Bench {
     let mut bench = lift();
+    bench.write(0x2305, 0, &[Devices::ALL.0]).unwrap();
     bench.sample(&empty_car());
     bench.nmt(1);
     (0..200).for_each(|_| bench.sample(&empty_car()));
@@ -90,10 +92,13 @@ fn can_ids_do_not_change_but_flags_do() {
     }
 }
 
-/// Each of them in its TPDO, and what is in none in a multiplexed one. A TPDO that is off keeps what is its.
+/// Each of them in its TPDO, and what is in none in a multiplexed one. A TPDO that is off keeps what is its, and a unit that
+/// is not there has nothing to send.
 #[test]
 fn every_object_that_can_be_mapped_is_sent_on_entering_operational() {
     let mut bench = lift();
+    bench.write(0x2305, 0, &[Devices::ALL.0]).unwrap();
+    bench.write(0x2320, 1, &[1; 6]).unwrap();
     bench.sample(&empty_car());
     bench.take();
     bench.nmt(1);
@@ -107,7 +112,10 @@ fn every_object_that_can_be_mapped_is_sent_on_entering_operational() {
     let on =
         pdos().filter(|pdo| pdo.is_produced && frames.iter().any(|(id, _)| u32::from(*id) == pdo.cob_id(ID)));
     sent.extend(on.flat_map(|pdo| pdo.objects).map(|(index, sub, _)| (index, sub)));
-    let off = [(0x6383, 2), (0x6383, 3), (0x6383, 4)];
+    let off: Vec<_> = [0x2303, 0x6383, 0x63C0, 0x63C5]
+        .into_iter()
+        .flat_map(|index| (2..=4).map(move |sub| (index, sub)))
+        .collect();
     let rows = table(Personality::Lift).into_iter().filter(|row| row.mapping == "tpdo");
     let expected: BTreeSet<_> = rows.map(|row| (row.index, row.sub)).filter(|at| !off.contains(at)).collect();
     assert_eq!(sent, expected);
@@ -146,13 +154,15 @@ fn each_button_sends_its_words() {
     for (sub, word) in (1..).zip([0x11_u8, 0x12, 0x21, 0x22]) {
         bench.write(0x2320, sub, &[word, 0, 0, 0, 0, 1]).unwrap();
     }
+    bench.nmt(0x80);
+    bench.nmt(1);
     let mut press = |buttons| {
         bench.buttons = buttons;
         (0..3).for_each(|_| bench.sample(&empty_car()));
         let frames = bench.take().into_iter().filter(|(id, _)| *id == 0x480 + u16::from(ID));
         frames.map(|(_, data)| (data.len(), data[0])).collect::<Vec<_>>()
     };
-    assert_eq!(press([false, false]), [(6, 0x11)]);
+    assert_eq!(press([false, false]), [(6, 0x11), (6, 0x21)], "all of them at the start");
     assert_eq!(press([true, true]), [(6, 0x12), (6, 0x22)], "one after the other");
     assert_eq!(press([false, true]), [(6, 0x11)]);
     assert_eq!(press([false, false]), [(6, 0x21)]);
@@ -178,6 +188,167 @@ fn lamps_follow_the_virtual_output_a_multiplexed_pdo_and_a_client() {
     assert_eq!(bench.protocol.outputs().digital, [true, true]);
     bench.write(0x6011, 0, &[0x20, 0, 0, 0, 0, 1]).unwrap();
     assert_eq!(bench.protocol.outputs().digital, [true, false]);
+}
+
+/// Two of them can be on one bus: what has the same CAN-ID in both is not sent, whatever they measure.
+#[test]
+fn a_node_as_delivered_sends_no_pdo() {
+    let mut bench = lift();
+    bench.sample(&empty_car());
+    bench.take();
+    bench.nmt(1);
+    for step in 0..100 {
+        bench.buttons = [step % 20 == 0, step % 30 == 0];
+        bench.encoder.counter = step * 41;
+        bench.sample(&raw(f64::from(step) * 1000.0, 298.15));
+    }
+    bench.sample(&RawSample { pressure: 0, ..empty_car() });
+    let sent: BTreeSet<u16> = bench.take().into_iter().map(|(id, _)| id).collect();
+    assert_eq!(sent, [].into(), "no fault either: there may be no sensor");
+    assert_eq!(number(&mut bench, 0x1000, 0), 0x1A1);
+}
+
+/// What is saved with the choice is there after the next start; the choice is in force at once.
+#[test]
+fn the_choice_of_virtual_devices_is_stored() {
+    let mut bench = lift();
+    bench.sample(&empty_car());
+    bench.nmt(1);
+    bench.take();
+    bench.write(0x2305, 0, &[Devices::POSITION.0]).unwrap();
+    bench.sample(&empty_car());
+    assert!(bench.take().iter().any(|(id, _)| *id == 0x18C), "valid now: the first is sent");
+    bench.write(0x1010, 1, b"save").unwrap();
+    let mut bench = bench.power_cycled();
+    bench.sample(&empty_car());
+    bench.nmt(1);
+    let sent: BTreeSet<u16> = bench.take().into_iter().map(|(id, _)| id).collect();
+    assert_eq!(sent, [0x18C, 0x500 + u16::from(ID)].into());
+    assert_eq!(number(&mut bench, 0x1000, 0), 0x0600_01A1);
+    assert_eq!([0, 1].map(|sub| number(&mut bench, 0x6000, sub)), [1, 0x0600]);
+}
+
+/// Position 2 is not there, and its TPDO is switched on and off: nothing is sent for that.
+#[test]
+fn a_write_to_a_cob_id_sends_no_multiplexed_pdo() {
+    let mut bench = operational();
+    for cob_id in [0x4000_018D_u32, 0xC000_018D] {
+        bench.write(0x1907, 1, &cob_id.to_le_bytes()).unwrap();
+        bench.sample(&empty_car());
+    }
+    let multiplexed = bench.take().into_iter().filter(|(id, _)| *id == 0x500 + u16::from(ID));
+    assert_eq!(multiplexed.count(), 0);
+}
+
+#[test]
+fn a_lamp_follows_a_word_that_comes_again() {
+    let mut bench = operational();
+    bench.write(0x2321, 2, &[0x11, 0, 0, 0, 0, 1]).unwrap();
+    let output = Frame::new(0x400, &[0x11, 0, 0, 0, 0, 1]).unwrap();
+    for _ in 0..2 {
+        bench.receive(&output);
+        assert_eq!(bench.protocol.outputs().digital, [true, false]);
+        bench.write(0x2322, 1, &[0]).unwrap();
+        assert_eq!(bench.protocol.outputs().digital, [false, false]);
+    }
+}
+
+/// The sequences in which calls were lost, on a bus that is fast: buttons 1 and 2 with their words.
+fn panel(inhibit: u16, event_timer: u16) -> Bench {
+    let mut bench = lift();
+    bench.write(0x2305, 0, &[Devices::INPUT_PANEL.0]).unwrap();
+    bench.write(0x6100, 1, &[5, 4, 1, 0, 1, 0]).unwrap();
+    bench.write(0x6100, 2, &[2, 1, 1, 4, 1, 0]).unwrap();
+    bench.write(0x1881, 1, &(0xC000_0480 | u32::from(ID)).to_le_bytes()).unwrap();
+    bench.write(0x1881, 3, &inhibit.to_le_bytes()).unwrap();
+    bench.write(0x1881, 5, &event_timer.to_le_bytes()).unwrap();
+    bench.write(0x1881, 1, &(0x4000_0480 | u32::from(ID)).to_le_bytes()).unwrap();
+    bench.sample(&empty_car());
+    bench.take();
+    bench
+}
+
+/// Lets so many milliseconds pass with these buttons; what the panel says in them: basic function and state.
+fn hold(bench: &mut Bench, buttons: [bool; 2], millis: u32) -> Vec<(u8, u8)> {
+    bench.buttons = buttons;
+    (0..millis).for_each(|_| bench.sample(&empty_car()));
+    let frames = bench.take().into_iter().filter(|(id, _)| *id == 0x480 + u16::from(ID));
+    frames.map(|(_, data)| (data[0], data[5])).collect()
+}
+
+#[test]
+fn no_call_is_lost_within_the_inhibit_time() {
+    let mut bench = panel(2000, 0);
+    bench.nmt(1);
+    assert_eq!(hold(&mut bench, [false, false], 1000), [(5, 0), (2, 0)], "all inputs at the start");
+    let mut told = vec![];
+    for buttons in [[true, false], [true, true], [false, true], [false, false]] {
+        told.extend(hold(&mut bench, buttons, 30));
+    }
+    told.extend(hold(&mut bench, [false, false], 1000));
+    assert_eq!(told, [(5, 1), (2, 1), (5, 0), (2, 0)]);
+}
+
+#[test]
+fn a_press_between_two_events_of_the_timer_is_sent() {
+    let mut bench = panel(0, 500);
+    bench.nmt(1);
+    hold(&mut bench, [false, false], 720);
+    let mut told = hold(&mut bench, [true, false], 150);
+    told.extend(hold(&mut bench, [false, false], 250));
+    assert_eq!(told, [(5, 1), (5, 0)]);
+}
+
+#[test]
+fn what_is_held_before_the_start_is_told_with_it() {
+    let mut bench = panel(0, 0);
+    assert_eq!(hold(&mut bench, [true, true], 50), []);
+    bench.nmt(1);
+    assert_eq!(hold(&mut bench, [true, true], 50), [(5, 1), (2, 1)]);
+}
+
+#[test]
+fn the_call_controller_asks_for_all_inputs() {
+    let mut bench = panel(0, 0);
+    bench.nmt(1);
+    hold(&mut bench, [true, false], 50);
+    bench.receive(&Frame::new(0x400, &[0, 0, 1, 0xFF, 0xFF, 1]).unwrap());
+    assert_eq!(hold(&mut bench, [true, false], 5), [(5, 1), (2, 0)]);
+}
+
+/// The multiplexed PDO with which this node sets an object of the others.
+fn set(bench: &mut Bench, producer: u16, (index, sub): (u16, u8), value: u32) {
+    let at = Multiplexer { index, sub };
+    let mpdo = Mpdo { address: Address::Destination(None), at, data: value.to_le_bytes() };
+    bench.receive(&Frame::new(0x500 + producer, &mpdo.encode()).unwrap());
+}
+
+#[test]
+fn multiplexed_pdos_of_all_nodes_are_taken() {
+    let mut bench = operational();
+    for producer in 1..=127 {
+        set(&mut bench, producer, (0x2322, 1), producer.into());
+        assert_eq!(number(&mut bench, 0x2322, 1), producer.into());
+    }
+    bench.write(0x1401, 1, &0x8000_0501_u32.to_le_bytes()).unwrap();
+    for (producer, lamp) in [(8, 127), (127, 127), (1, 127), (2, 2)] {
+        set(&mut bench, producer, (0x2322, 1), producer.into());
+        assert_eq!(number(&mut bench, 0x2322, 1), lamp, "node {producer}: 1401h is off, 1402h has its own");
+    }
+}
+
+/// Limits of the load, a preset: a controller need not ask by SDO.
+#[test]
+fn objects_of_the_profile_are_set_by_a_multiplexed_pdo() {
+    let mut bench = operational();
+    set(&mut bench, 20, (0x6483, 4), 650);
+    assert_eq!(number(&mut bench, 0x6483, 4), 650);
+    set(&mut bench, 20, (0x6382, 1), 5000);
+    bench.poll();
+    position(&mut bench, 0);
+    assert_eq!(number(&mut bench, 0x6383, 1), 5000);
+    set(&mut bench, 20, (0x6382, 2), 5000);
+    assert_eq!(number(&mut bench, 0x6383, 2), 0, "there is no unit 2: left out");
 }
 
 #[test]

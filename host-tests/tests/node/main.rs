@@ -9,6 +9,7 @@ mod combined_node;
 mod emergencies;
 mod encoder_node;
 mod full_bus;
+mod lift_calls;
 mod lift_catalogue;
 mod lift_node;
 mod lift_pdos;

@@ -29,7 +29,8 @@ pub trait Application {
     fn initialise(&mut self, _image: &mut [u8]) {}
 
     /// Decides on a write to an entry that is [`handled`](crate::dictionary::Object::handled), by SDO or by an RPDO; type
-    /// and limits are checked already. The method may change other values. The device stores the bytes.
+    /// and limits are checked already. The method may change other values, and bit 31 of the COB-ID of a PDO: after a write by SDO
+    /// the device follows it. The device stores the bytes.
     ///
     /// # Errors
     /// The reason to refuse the write; nothing is stored then.
@@ -58,11 +59,39 @@ pub trait Application {
     /// then changes its NMT state as object 1029h says.
     fn error(&mut self, _class: ErrorClass, _image: &mut [u8]) {}
 
-    /// Whether each frame of a TPDO is an event of its own, such as a call of a lift: no newer frame may take the place of
-    /// one that waits for the bus. The frames of other TPDOs tell how things are, and only the newest needs to wait. `tpdo` is
-    /// the number of the TPDO, 1 to 512. Asked whenever the communication parameters or the mapping of the TPDO change.
+    /// Whether a TPDO tells events, such as the calls of a lift, and not how things are. `tpdo` is the number of the TPDO, 1 to
+    /// 512. Asked whenever the communication parameters or the mapping of the TPDO change.
+    ///
+    /// Such a TPDO is sent once for each event that [`next_event`](Application::next_event) gives, in the order of the events.
+    /// No newer frame takes the place of one that waits for the bus. A value that changes sends nothing by itself. With an
+    /// event timer, all events that wait are sent when the timer elapses; where none waits, the last one is sent again. With
+    /// a synchronous type, a SYNC sends one event.
     fn sends_events(&self, _tpdo: u16) -> bool {
         false
+    }
+
+    /// A TPDO that tells events can be sent from now on: the device has become operational, or the TPDO valid. Events of
+    /// the time before are old; the application tells how things are now, with the events that it gives next.
+    fn begin_events(&mut self, _tpdo: u16, _image: &mut [u8]) {}
+
+    /// Puts the next event of a TPDO that tells events into the image; whether there was one. Asked when the TPDO may be
+    /// sent: after [`publish`](super::Device::publish), and when the inhibit time is over. Until then, the event waits with
+    /// the application.
+    fn next_event(&mut self, _tpdo: u16, _image: &mut [u8]) -> bool {
+        false
+    }
+
+    /// Whether a multiplexed RPDO takes the frames of all nodes with the function code of its CAN-ID, and not only those of one
+    /// node: CiA 417 has one such RPDO for each of 127 producers. Nodes that have an RPDO of their own are left to that one.
+    fn takes_all_nodes(&self, _rpdo: u16) -> bool {
+        false
+    }
+
+    /// Whether a multiplexed TPDO in destination address mode tells this object to all nodes. An application says no for the
+    /// objects of a part of the device that is not there. Asked whenever the TPDO is configured, and after a write to an entry
+    /// that is [`handled`](crate::dictionary::Object::handled).
+    fn broadcasts(&self, _at: Multiplexer, _image: &[u8]) -> bool {
+        true
     }
 
     /// What is stored of a group, for every reset that covers it.

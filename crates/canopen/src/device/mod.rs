@@ -6,6 +6,7 @@
 //! priorities share the device by its halves, one for process data and one for services.
 
 mod application;
+mod events;
 mod faults;
 mod lss;
 mod multiplexed;
@@ -30,7 +31,7 @@ use crate::lss::{BitRate, Configuration, Slave};
 use crate::nmt::State;
 use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
 use crate::sdo::Server;
-use crate::{Instant, NodeId, emcy, heartbeat, sync};
+use crate::{CanId, Instant, NodeId, emcy, heartbeat, sync};
 
 /// A CANopen device with an application `A`, and room for what its dictionary has: an image of `N` bytes, `T` TPDOs, `R`
 /// RPDOs, `W` heartbeats to watch, and `M` objects that a multiplexed TPDO sends.
@@ -80,6 +81,10 @@ struct Core<A, const N: usize, const T: usize, const R: usize, const W: usize, c
     /// the set, and need no further look.
     rpdo_filter: u32,
     scanner: Scanner<M>,
+    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and place.
+    all_nodes: Option<(CanId, u16)>,
+    /// One of the TPDOs tells events.
+    tells_events: bool,
     /// Where the chains of PDOs begin.
     first_tpdos: Links,
     first_rpdos: Links,
@@ -133,6 +138,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 rpdos: [const { Rpdo::new() }; R],
                 rpdo_filter: 0,
                 scanner: Scanner::new(),
+                all_nodes: None,
+                tells_events: false,
                 first_tpdos: Links::END,
                 first_rpdos: Links::END,
                 process_due: Instant::NEVER,

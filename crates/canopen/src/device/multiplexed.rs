@@ -17,26 +17,41 @@ const LONGEST: u8 = 4;
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
     Core<A, N, T, R, W, M>
 {
-    /// Gives the producer its settings and its objects, after any change that may concern it.
+    /// Gives the producer its settings and its objects, after any change that may concern it. A change of another PDO sends
+    /// nothing: what was sent is still so.
     pub(super) fn configure_scanner(&mut self, settings: Option<ScannerSettings>) {
-        self.scanner.configure(settings);
-        match settings.map(|settings| settings.addressing) {
-            Some(Addressing::Source) => self.watch_listed(),
-            Some(Addressing::Destination) => self.watch_unmapped(),
-            None => return,
+        let addressing = settings.map(|settings| settings.addressing);
+        let is_new = !self.scanner.has(settings);
+        if is_new {
+            self.scanner.configure(settings);
+            match addressing {
+                Some(Addressing::Source) => self.watch_listed(),
+                Some(Addressing::Destination) => self.watch_all(),
+                None => return,
+            }
         }
-        if self.state.has_pdos() {
+        if addressing == Some(Addressing::Destination) {
+            self.choose_watched();
+        }
+        if is_new && self.state.has_pdos() {
             self.scanner.start();
         }
     }
 
-    /// All that can be sent and that is mapped into no TPDO. One that is switched off counts too: who does not want its
-    /// content sent does not want it in another way.
-    fn watch_unmapped(&mut self) {
+    /// All that can be sent.
+    fn watch_all(&mut self) {
         for entry in self.dictionary.entries() {
             self.watch_entry(&entry);
         }
+    }
+
+    /// Of these, what the application tells and what is mapped into no TPDO. One that is switched off counts too: who does not
+    /// want its content sent does not want it in another way.
+    fn choose_watched(&mut self) {
+        let (application, image) = (&self.application, &self.image);
+        self.scanner.choose(|at| application.broadcasts(at, image));
         self.leave_out_mapped();
+        self.scanner.forget_others();
     }
 
     /// What the scanner list names: blocks of sub-indexes of one object.

@@ -143,7 +143,12 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// What follows from a new value.
     fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
-            Rule::Application => self.pending.parameters_changed(),
+            Rule::Application => {
+                self.pending.parameters_changed();
+                if !A::SERVICES_ONLY {
+                    self.follow_application(now);
+                }
+            }
             Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
             _ if A::SERVICES_ONLY => (),
             Rule::ErrorCount => self.emcy.clear_history(),

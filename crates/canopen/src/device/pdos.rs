@@ -62,6 +62,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         self.link_pdos();
+        self.configure_scanner(None);
         self.configure_scanner(self.scanner_settings());
     }
 
@@ -73,6 +74,41 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
         self.link_pdos();
         self.configure_scanner(self.scanner_settings());
+    }
+
+    /// Gives the PDOs their settings that the application has switched on or off.
+    pub(super) fn follow_application(&mut self, now: Instant) {
+        let mut has_changed = false;
+        for direction in [Direction::Transmit, Direction::Receive] {
+            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
+                if self.is_valid(pdo) != self.is_used(pdo, place) {
+                    self.apply(pdo, place, now);
+                    has_changed = true;
+                }
+            }
+        }
+        if has_changed {
+            self.link_pdos();
+            self.pending.identifiers_changed();
+        }
+        self.configure_scanner(self.scanner_settings());
+    }
+
+    /// Whether the objects say that the PDO is valid.
+    fn is_valid(&self, pdo: Pdo) -> bool {
+        match pdo.direction() {
+            Direction::Transmit => self.tpdo_settings(pdo).is_some(),
+            Direction::Receive => self.rpdo_settings(pdo).is_some(),
+        }
+    }
+
+    /// Whether the device has it as a valid one.
+    fn is_used(&self, pdo: Pdo, place: u16) -> bool {
+        let place = usize::from(place);
+        match pdo.direction() {
+            Direction::Transmit => self.tpdos.get(place).is_some_and(|tpdo| tpdo.settings().is_some()),
+            Direction::Receive => self.rpdos.get(place).is_some_and(|rpdo| rpdo.id().is_some()),
+        }
     }
 
     /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
@@ -100,6 +136,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             if self.state.has_pdos() {
                 tpdo.start();
             }
+            self.begin_events(usize::from(place));
         }
     }
 
@@ -115,6 +152,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Chains the PDOs that are valid, after a change of their settings.
     fn link_pdos(&mut self) {
         (self.first_tpdos, self.first_rpdos) = (Links::END, Links::END);
+        self.tells_events = self.tpdos.iter().any(|tpdo| tpdo.events_of().is_some());
         for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
@@ -124,11 +162,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 self.first_tpdos.prepend(Chain::Synchronous, place);
             }
         }
-        self.rpdo_filter = 0;
+        (self.rpdo_filter, self.all_nodes) = (0, None);
         for (place, rpdo) in self.rpdos.iter_mut().enumerate().rev() {
             rpdo.links = self.first_rpdos;
             let Some(id) = rpdo.id() else { continue };
             self.rpdo_filter |= filter_bit(id.get());
+            if rpdo.is_multiplexed() && self.application.takes_all_nodes((rpdo.index & 0x1FF) + 1) {
+                self.rpdo_filter = u32::MAX;
+                self.all_nodes = u16::try_from(place).ok().map(|place| (id, place));
+            }
             self.first_rpdos.prepend(Chain::Valid, place);
             if rpdo.is_synchronous() {
                 self.first_rpdos.prepend(Chain::Synchronous, place);
@@ -146,7 +188,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             inhibit: low_half(self.parameter(pdo, 3)),
             event: low_half(self.parameter(pdo, 5)),
             sync_start: low_byte(self.parameter(pdo, 6)),
-            sends_events: self.application.sends_events(pdo.number()),
+            events_of: Some(pdo.number()).filter(|number| self.application.sends_events(*number)),
             layout,
         })
     }

@@ -80,6 +80,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             tpdo.poll(image, turn);
             due = due.min(tpdo.due());
         });
+        due = due.min(core.send_events(turn));
         core.scanner.poll(&core.image, turn);
         core.process_due = due.min(core.scanner.due()).min(core.sync.due());
     }
@@ -117,14 +118,27 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.start_by_itself(turn);
         if self.core.state.has_pdos() && !A::SERVICES_ONLY {
             self.core.each_tpdo(Chain::Valid, |tpdo, image| tpdo.on_change(image, turn));
+            let events_due = self.core.send_events(turn);
             self.core.scanner.on_change(&self.core.image, turn);
-            self.core.process_due = self.core.process_due.min(self.core.scanner.due());
+            self.core.process_due = self.core.process_due.min(self.core.scanner.due()).min(events_due);
         }
         self.send_process(turn);
     }
 
     /// Identifiers of frames for [`on_process_frame`](Device::on_process_frame), data and remote.
     pub fn process_ids(&self) -> impl Iterator<Item = CanId> {
+        let all_nodes = self.core.all_nodes.into_iter().flat_map(|(id, _)| id.of_all_nodes());
+        self.own_process_ids().chain(all_nodes)
+    }
+
+    /// The same for acceptance filters: identifiers, and the bits of them that count. With an RPDO for all nodes
+    /// ([`Application::takes_all_nodes`]) they are fewer by far.
+    pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
+        let all_nodes = self.core.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));
+        self.own_process_ids().map(|id| (id, 0x7FF)).chain(all_nodes)
+    }
+
+    fn own_process_ids(&self) -> impl Iterator<Item = CanId> {
         let received = self.core.rpdos.iter().filter_map(Rpdo::id);
         let requests = self.core.tpdos.iter().filter_map(Tpdo::settings).filter(|tpdo| tpdo.answers_remote);
         [CanId::NMT, self.core.sync.id()].into_iter().chain(received).chain(requests.map(|tpdo| tpdo.id))

@@ -14,11 +14,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if self.rpdo_filter & filter_bit(frame.id()) == 0 {
             return;
         }
+        let stands_in = self.all_nodes.filter(|(id, _)| id.is_of_same_service(frame.id()));
+        let is_own = |rpdo: &crate::pdo::Rpdo| rpdo.id().is_some_and(|id| id.get() == frame.id());
+        let stands_in =
+            stands_in.filter(|_| !self.rpdos.iter().any(is_own)).map(|(_, place)| usize::from(place));
         let mut links = self.first_rpdos;
         while let Some(rpdo) = self.rpdos.get(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
-            if rpdo.id().is_some_and(|id| id.get() == frame.id()) {
+            if is_own(rpdo) || stands_in == Some(place) {
                 self.take_rpdo(place, frame, now);
             }
         }

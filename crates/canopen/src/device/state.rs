@@ -225,8 +225,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     fn enter_process(&mut self, state: State) {
         self.sync.stop();
-        for tpdo in &mut self.tpdos {
-            if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
+        for place in 0..T {
+            if let Some(tpdo) = self.tpdos.get_mut(place) {
+                if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
+            }
+            self.begin_events(place);
         }
         self.rpdos.iter_mut().for_each(crate::pdo::Rpdo::stop);
         if state.has_pdos() {
@@ -238,6 +241,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     /// Takes the values of what is to be reset: the defaults, then what is stored.
+    // Called from two places, and much code.
+    #[inline(never)]
     fn load(&mut self) {
         if A::SERVICES_ONLY {
             // Nothing of it is stored, and nothing depends on the node-ID.

@@ -39,7 +39,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         self.application.synchronised(sync.counter, &mut self.image);
-        self.each_tpdo(Chain::Synchronous, |tpdo, image| tpdo.on_sync(sync, image, turn));
+        self.each_tpdo(Chain::Synchronous, |tpdo, image| {
+            if tpdo.events_of().is_none() {
+                tpdo.on_sync(sync, image, turn);
+            }
+        });
+        if self.tells_events {
+            self.send_events_with_sync(turn);
+        }
         self.process_due = self.process_due.min(self.sync.due());
     }
 

@@ -87,6 +87,11 @@ impl Rpdo {
         self.settings.as_ref().is_some_and(|settings| settings.is_synchronous)
     }
 
+    /// Whether it carries a multiplexed PDO.
+    pub(crate) fn is_multiplexed(&self) -> bool {
+        self.settings.as_ref().is_some_and(|settings| matches!(settings.content, Content::Multiplexed(_)))
+    }
+
     /// Takes new settings and starts afresh.
     pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
         self.settings = settings;

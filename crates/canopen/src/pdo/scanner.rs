@@ -12,7 +12,7 @@ use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
 /// What the dictionary says about the PDO.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ScannerSettings {
     pub(crate) id: CanId,
     pub(crate) addressing: Addressing,
@@ -38,8 +38,9 @@ impl ScannerSettings {
 pub(crate) struct Watched {
     at: Multiplexer,
     field: Field,
-    sent: [u8; 4],
-    /// No other TPDO carries it.
+    /// What was sent last; `None` before.
+    sent: Option<[u8; 4]>,
+    /// No other TPDO carries it, and its part of the device is there.
     is_own: bool,
     /// It is to be sent.
     is_pending: bool,
@@ -47,7 +48,7 @@ pub(crate) struct Watched {
 
 impl Watched {
     pub(crate) fn new(at: Multiplexer, field: Field) -> Watched {
-        Watched { at, field, sent: [0; 4], is_own: true, is_pending: false }
+        Watched { at, field, sent: None, is_own: true, is_pending: false }
     }
 
     fn value(&self, image: &[u8]) -> [u8; 4] {
@@ -81,6 +82,11 @@ impl<const M: usize> Scanner<M> {
         }
     }
 
+    /// Whether it has these settings already.
+    pub(crate) fn has(&self, settings: Option<ScannerSettings>) -> bool {
+        self.settings == settings
+    }
+
     /// Takes new settings. It watches nothing then.
     pub(crate) fn configure(&mut self, settings: Option<ScannerSettings>) {
         self.settings = settings;
@@ -91,6 +97,18 @@ impl<const M: usize> Scanner<M> {
     /// Watches one more object; what is beyond its room is left out.
     pub(crate) fn watch(&mut self, watched: Watched) {
         let _ = self.watched.push(watched);
+    }
+
+    /// Watches of its objects those that are to be told; one that is told for the first time is sent.
+    pub(crate) fn choose(&mut self, is_told: impl Fn(Multiplexer) -> bool) {
+        self.watched.iter_mut().for_each(|watched| watched.is_own = is_told(watched.at));
+    }
+
+    /// What is no longer told is new when it is told again.
+    pub(crate) fn forget_others(&mut self) {
+        for watched in self.watched.iter_mut().filter(|watched| !watched.is_own) {
+            (watched.sent, watched.is_pending) = (None, false);
+        }
     }
 
     /// No longer watches what a TPDO carries.
@@ -132,7 +150,7 @@ impl<const M: usize> Scanner<M> {
         let Some(settings) = &self.settings else { return };
         if settings.event == 0 {
             for watched in self.watched.iter_mut().filter(|watched| watched.is_own) {
-                watched.is_pending |= watched.value(image) != watched.sent;
+                watched.is_pending |= watched.sent != Some(watched.value(image));
                 self.is_pending |= watched.is_pending;
             }
         }
@@ -162,7 +180,7 @@ impl<const M: usize> Scanner<M> {
                 self.inhibited_until = turn.now + RETRY;
                 return;
             }
-            (watched.sent, watched.is_pending) = (data, false);
+            (watched.sent, watched.is_pending) = (Some(data), false);
             if settings.inhibit != 0 {
                 self.inhibited_until = turn.now + Duration::from_inhibit(settings.inhibit);
             }

@@ -3,6 +3,9 @@
 //! The types 254 and 255 are sent on entering Operational and when the event timer elapses. Without an event timer, a PDO of
 //! type 255 is sent with every change of a mapped value, at most once per inhibit time. With one, the timer alone sends: a
 //! measured value changes a thousand times a second.
+//!
+//! A TPDO that tells events is sent when the application has an event, and never because a value has changed. The inhibit time and
+//! the timer say when the application is asked for the events that wait with it.
 
 use super::{Layout, Links, Transmission};
 use crate::sync::Sync;
@@ -22,14 +25,14 @@ pub(crate) struct Settings {
     pub(crate) event: u16,
     /// SYNC counter with which the count of SYNCs begins; 0 for any.
     pub(crate) sync_start: u8,
-    /// A frame that waits for the bus gives way to no newer one.
-    pub(crate) sends_events: bool,
+    /// The number of a TPDO that tells events.
+    pub(crate) events_of: Option<u16>,
     pub(crate) layout: Layout,
 }
 
 impl Settings {
     fn sends_on_change(&self) -> bool {
-        self.transmission == Transmission::Event && self.event == 0
+        self.transmission == Transmission::Event && self.event == 0 && self.events_of.is_none()
     }
 }
 
@@ -51,7 +54,29 @@ pub(crate) struct Tpdo {
     event_due: Instant,
     /// Before this, an event waits.
     inhibited_until: Instant,
+    /// Of a TPDO that tells events.
+    events: Events,
 }
+
+/// When the application is asked for events.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::struct_excessive_bools)] // Each says something of its own.
+struct Events {
+    /// The last answer was an event: more may wait.
+    may_wait: bool,
+    /// The event timer has elapsed, and not all that waited is sent.
+    is_open: bool,
+    /// The event timer has elapsed, and nothing is sent since then.
+    is_silent: bool,
+}
+
+impl Events {
+    const NONE: Events = Events { may_wait: false, is_open: false, is_silent: false };
+    const BEGIN: Events = Events { may_wait: true, is_open: true, is_silent: false };
+}
+
+/// Room that events leave in the transmit queue: the bus may be full for minutes, and the events can wait with the application.
+const ROOM_FOR_OTHERS: usize = 8;
 
 impl Tpdo {
     pub(crate) const fn new() -> Tpdo {
@@ -64,6 +89,7 @@ impl Tpdo {
             data: None,
             event_due: Instant::NEVER,
             inhibited_until: Instant(0),
+            events: Events::NONE,
         }
     }
 
@@ -85,13 +111,60 @@ impl Tpdo {
     /// Entering Operational, or becoming valid in it.
     pub(crate) fn start(&mut self) {
         self.stop();
-        self.pending = self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
+        let events = self.events_of().is_some();
+        self.pending =
+            !events && self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
+        self.events = if events { Events::BEGIN } else { Events::NONE };
+    }
+
+    /// The number of a TPDO that tells events.
+    pub(crate) fn events_of(&self) -> Option<u16> {
+        self.settings.as_ref()?.events_of
+    }
+
+    /// The same, if the application may be asked for an event now.
+    pub(crate) fn asks_for_event(&mut self, turn: &Turn<'_, impl Transmit>) -> Option<u16> {
+        let settings = self.settings.as_ref()?;
+        let is_asked_now = settings.transmission.is_event_driven()
+            && (settings.event == 0 || self.events.is_open)
+            && !self.pending
+            && turn.now >= self.inhibited_until;
+        if is_asked_now && turn.room() <= ROOM_FOR_OTHERS {
+            (self.events.may_wait, self.inhibited_until) = (true, turn.now + RETRY);
+            return None;
+        }
+        settings.events_of.filter(|_| is_asked_now)
+    }
+
+    /// The answer of the application: an event, which is in the image, or none.
+    pub(crate) fn take_event(&mut self, is_event: bool, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
+        if is_event || self.events.is_silent && self.data.is_some() {
+            self.send(image, turn);
+        }
+        self.events.is_silent = false;
+        self.events.may_wait = is_event;
+        self.events.is_open &= is_event;
+    }
+
+    /// When the application is to be asked again.
+    pub(crate) fn event_due(&self) -> Instant {
+        match &self.settings {
+            Some(settings)
+                if self.events.may_wait
+                    && settings.transmission.is_event_driven()
+                    && (settings.event == 0 || self.events.is_open) =>
+            {
+                self.inhibited_until
+            }
+            _ => Instant::NEVER,
+        }
     }
 
     /// Leaving Operational: nothing is due, a PDO that waits is dropped.
     pub(crate) fn stop(&mut self) {
         (self.pending, self.syncs, self.is_counting, self.data) = (false, 0, false, None);
         (self.event_due, self.inhibited_until) = (Instant::NEVER, Instant(0));
+        self.events = Events::NONE;
     }
 
     /// The next instant at which something is due.
@@ -101,24 +174,36 @@ impl Tpdo {
 
     /// A SYNC arrived.
     pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let Some(settings) = &self.settings else { return };
-        match settings.transmission {
-            Transmission::SyncCyclic(every) => {
-                self.is_counting |=
-                    sync.counter.is_none_or(|counter| [0, counter].contains(&settings.sync_start));
-                if !self.is_counting {
-                    return;
-                }
-                self.syncs = self.syncs.saturating_add(1);
-                if self.syncs >= every.get() {
-                    self.syncs = 0;
-                    self.send(image, turn);
-                }
-            }
+        let Some(Settings { transmission, layout, .. }) = self.settings else { return };
+        match transmission {
+            Transmission::SyncCyclic(_) if self.is_sent_with(sync) => self.send(image, turn),
             Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, turn),
-            Transmission::SyncRemote => self.data = Some(settings.layout.gather(image)),
+            Transmission::SyncRemote => self.data = Some(layout.gather(image)),
             _ => (),
         }
+    }
+
+    /// The same of a TPDO that tells events: its number. A SYNC sends one event, whatever the type counts.
+    pub(crate) fn asks_with_sync(&self) -> Option<u16> {
+        let settings = self.settings.as_ref().filter(|_| !self.pending)?;
+        settings.events_of
+    }
+
+    /// Whether it is the turn of a cyclic synchronous PDO.
+    fn is_sent_with(&mut self, sync: Sync) -> bool {
+        let Some(Settings { transmission: Transmission::SyncCyclic(every), sync_start, .. }) = self.settings
+        else {
+            return false;
+        };
+        self.is_counting |= sync.counter.is_none_or(|counter| [0, counter].contains(&sync_start));
+        if self.is_counting {
+            self.syncs = self.syncs.saturating_add(1);
+        }
+        let is_turn = self.syncs >= every.get();
+        if is_turn {
+            self.syncs = 0;
+        }
+        is_turn
     }
 
     /// A remote frame asks for it. The synchronous types 0 to 240 belong to the SYNC and do not answer.
@@ -131,6 +216,8 @@ impl Tpdo {
                 // The client asks again if the queue is full: a sample of the past need not be kept for it.
                 turn.send_state(Frame::data_frame(settings.id, settings.layout.len(), sampled));
             }
+            // Before the first event there is nothing to tell.
+            _ if settings.events_of.is_some() && self.data.is_none() => (),
             (Transmission::Remote | Transmission::Timer | Transmission::Event, _) => {
                 self.send(image, turn);
             }
@@ -155,7 +242,9 @@ impl Tpdo {
     /// The synchronous window is over: a synchronous PDO that still waits for room would be taken for one of the next.
     pub(crate) fn drop_synchronous(&mut self) {
         let kind = self.settings.as_ref().map(|settings| settings.transmission);
-        self.pending &= !matches!(kind, Some(Transmission::SyncAcyclic | Transmission::SyncCyclic(_)));
+        // An event is not told again, so it is kept.
+        self.pending &= self.events_of().is_some()
+            || !matches!(kind, Some(Transmission::SyncAcyclic | Transmission::SyncCyclic(_)));
     }
 
     fn has_changed(&self, image: &[u8]) -> bool {
@@ -165,9 +254,14 @@ impl Tpdo {
     /// Sends what is due.
     pub(crate) fn poll(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
         let elapsed = turn.now >= self.event_due;
-        self.pending |= elapsed;
-        if elapsed {
+        let tells_events = self.events_of().is_some();
+        if elapsed || tells_events && self.event_due == Instant::NEVER {
             self.event_due = self.following_event(turn.now);
+        }
+        if !tells_events {
+            self.pending |= elapsed;
+        } else if elapsed {
+            self.events = Events { may_wait: true, is_open: true, is_silent: true };
         }
         if self.pending && turn.now >= self.inhibited_until {
             self.send(image, turn);
@@ -189,7 +283,7 @@ impl Tpdo {
         let Some(settings) = &self.settings else { return };
         let data = settings.layout.gather(image);
         let frame = Frame::data_frame(settings.id, settings.layout.len(), data);
-        let sent = if settings.sends_events { turn.send(frame) } else { turn.send_state(frame) };
+        let sent = if settings.events_of.is_some() { turn.send(frame) } else { turn.send_state(frame) };
         self.pending = !sent;
         self.inhibited_until = turn.now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
         if sent {

@@ -152,6 +152,12 @@ pub(crate) struct Numbers {
     pub(crate) told: Vec<Told>,
     /// The TPDO whose frames are events; 0 for none.
     pub(crate) event_tpdo: u16,
+    /// The value of the event that was told last: each change of 6000h:1 is one.
+    pub(crate) last_event: Option<[u8; 4]>,
+    /// Events that wait, instead: the values of 6000h:1 to tell.
+    pub(crate) events: VecDeque<[u8; 4]>,
+    /// An object that no multiplexed TPDO tells to all nodes.
+    pub(crate) not_told: Option<Multiplexer>,
 }
 
 impl Application for Numbers {
@@ -162,8 +168,14 @@ impl Application for Numbers {
         DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);
     }
 
-    fn write(&mut self, entry: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
         if entry.index() == 0x6201 {
+            // Switches TPDO 1 and RPDO 1 off and on.
+            if let [14 | 15] = bytes {
+                let valid = if bytes == [14] { 0x80 } else { 0 };
+                DICTIONARY.field(0x1800, 1).store(image, [0x85, 0x01, 0, valid]);
+                DICTIONARY.field(0x1400, 1).store(image, [0x05, 0x02, 0, valid]);
+            }
             return if bytes == [13] { Err(Abort::InvalidValue) } else { Ok(()) };
         }
         assert_eq!((entry.index(), entry.sub()), (0x6102, 0));
@@ -172,6 +184,27 @@ impl Application for Numbers {
 
     fn sends_events(&self, tpdo: u16) -> bool {
         tpdo == self.event_tpdo
+    }
+
+    fn begin_events(&mut self, tpdo: u16, _: &mut [u8]) {
+        assert_eq!(tpdo, self.event_tpdo);
+        self.last_event = None;
+    }
+
+    fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool {
+        assert_eq!(tpdo, self.event_tpdo);
+        let field = DICTIONARY.field(0x6000, 1);
+        if let Some(event) = self.events.pop_front() {
+            field.set(image, &event);
+            self.last_event = Some(event);
+            return true;
+        }
+        let now = field.load(image);
+        self.last_event.replace(now) != Some(now)
+    }
+
+    fn broadcasts(&self, at: Multiplexer, _: &[u8]) -> bool {
+        self.not_told != Some(at)
     }
 
     fn stored(&self, group: Group) -> Stored<'_> {

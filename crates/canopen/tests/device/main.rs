@@ -4,6 +4,7 @@ mod bench;
 mod block;
 mod dictionary;
 mod emcy;
+mod events;
 mod heartbeat;
 mod hooks;
 mod lss;

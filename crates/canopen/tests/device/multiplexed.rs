@@ -3,6 +3,7 @@
 use crate::bench::{Bench, DICTIONARY, ID};
 use canopen::Duration;
 use canopen::Frame;
+use canopen::sdo::Multiplexer;
 
 const TPDO: u16 = 0x500 + ID as u16;
 const RPDO: u16 = 0x205;
@@ -196,4 +197,38 @@ fn a_count_between_the_slots_and_the_modes_is_too_high() {
     for count in [5, 8, 64, 200, 253] {
         assert_eq!(bench.write(0x1A00, 0, &[count]), Err(0x0609_0031));
     }
+}
+
+/// What was sent is still so when another PDO is configured.
+#[test]
+fn a_write_to_another_pdo_sends_nothing() {
+    let mut bench = sender(DESTINATION);
+    bench.nmt(1);
+    mpdos(&mut bench);
+    bench.write32(0x1600, 1, 0x6200_0010).unwrap();
+    bench.write(0x1600, 0, &[1]).unwrap();
+    for cob_id in [u32::from(RPDO), 0x8000_0000 | u32::from(RPDO)] {
+        bench.write32(0x1400, 1, cob_id).unwrap();
+        bench.write(0x1400, 5, &[100, 0]).unwrap();
+    }
+    assert_eq!(mpdos(&mut bench), [[0; 8]; 0]);
+    bench.set_value(3, &[1, 0, 0, 0]);
+    assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 3, 1, 0, 0, 0]]);
+}
+
+/// The parts of a device that are there may change: what is told anew is sent, whatever its value.
+#[test]
+fn the_application_leaves_out_what_is_not_there() {
+    let mut bench = sender(DESTINATION);
+    bench.device.application_mut().not_told = Some(Multiplexer { index: 0x6000, sub: 2 });
+    bench.write(0x6201, 0, &[1]).unwrap();
+    bench.nmt(1);
+    assert_eq!(mpdos(&mut bench), [1, 3].map(|sub| vec![0x80, 0x00, 0x60, sub, 0, 0, 0, 0]));
+    bench.set_value(2, &[1, 0]);
+    assert_eq!(mpdos(&mut bench), [[0; 8]; 0]);
+    bench.set_value(2, &[0, 0]);
+    bench.device.application_mut().not_told = None;
+    bench.write(0x6201, 0, &[1]).unwrap();
+    bench.set_value(1, &[0; 4]);
+    assert_eq!(mpdos(&mut bench), [[0x80, 0x00, 0x60, 2, 0, 0, 0, 0]]);
 }

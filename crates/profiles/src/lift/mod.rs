@@ -5,16 +5,19 @@
 //! lift send each other.
 
 pub mod catalogue;
+pub mod devices;
 pub mod load;
 pub mod objects;
 pub mod panel;
 pub mod position;
+pub mod word;
 
 pub use objects::{FAULTS, Objects, ROWS, fields, handles};
 
 use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS};
 use crate::encoder::Start;
 use crate::profile::Chain;
+use devices::Devices;
 
 /// All parameters of the virtual devices.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,6 +26,8 @@ pub struct Parameters {
     pub position: position::Parameters,
     /// Of the load measuring unit.
     pub load: load::Parameters,
+    /// The virtual devices that the node is.
+    pub devices: Devices,
 }
 
 /// What the virtual devices give for one sample.
@@ -32,8 +37,10 @@ pub struct Snapshot {
     pub position: position::Snapshot,
     /// Of the load measuring unit.
     pub load: load::Snapshot,
-    /// The button that has changed last.
-    pub button: panel::Contact,
+    /// The virtual devices that the node is: what the others measure is of no interest.
+    pub devices: Devices,
+    /// Which buttons are pressed.
+    pub buttons: [bool; panel::BUTTONS],
 }
 
 /// All virtual devices with their state.
@@ -41,31 +48,35 @@ pub struct Snapshot {
 pub struct Lift {
     position: position::PositionUnits,
     load: load::LoadUnit,
-    buttons: panel::Buttons,
+    devices: Devices,
 }
 
 impl Chain for Lift {
     type Parameters = Parameters;
     type Snapshot = Snapshot;
 
+    // Made in its place: what the compiler makes of it where it is called is three times as long.
+    #[inline(never)]
     fn new(power_on: &PowerOn) -> Lift {
         Lift {
             position: position::PositionUnits::new(Start::from(power_on.retained)),
             load: load::LoadUnit::new(power_on.thermometer, &load::Parameters::default()),
-            buttons: panel::Buttons::default(),
+            devices: Devices::default(),
         }
     }
 
     fn apply(&mut self, parameters: &Parameters) {
         self.position.apply(&parameters.position);
         self.load.apply(&parameters.load);
+        self.devices = parameters.devices;
     }
 
     fn update(&mut self, inputs: &Inputs, snapshot: &mut Snapshot) {
         *snapshot = Snapshot {
             position: self.position.sample(&inputs.position),
             load: self.load.sample(&inputs.analogue),
-            button: self.buttons.sample(inputs.digital),
+            devices: self.devices,
+            buttons: inputs.digital,
         };
     }
 
@@ -115,7 +126,7 @@ mod tests {
         let snapshot = sample(&mut lift, 4096);
         assert_eq!(snapshot.position.units[0].position, 200, "a turn of 200 mm");
         assert_eq!(snapshot.load.load, 507);
-        assert_eq!(snapshot.button, panel::Contact { button: 0, is_pressed: true });
+        assert_eq!(snapshot.buttons, [true, false]);
     }
 
     #[test]

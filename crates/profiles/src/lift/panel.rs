@@ -1,63 +1,80 @@
 //! Input and output panel units: two buttons and two lamps.
 //!
-//! Virtual inputs (6010h) and outputs (6011h) are words of 48 bits whose structure is not public. So the node does not
-//! look into them: each button has one word for when it is pressed and another one for when it is released, each lamp one
-//! that lights it and another one that puts it out. Every other word is for somebody else.
+//! What a button tells is an event: a call that is not told is lost for ever. So each change waits here until the bus takes it.
 
 use crate::board::{DIGITAL_INPUTS, DIGITAL_OUTPUTS};
+use heapless::Deque;
 
 /// Buttons of a panel.
 pub const BUTTONS: usize = DIGITAL_INPUTS;
 /// Lamps of a panel.
 pub const LAMPS: usize = DIGITAL_OUTPUTS;
+/// Changes that can wait: a button that is pressed ten times a second fills the queue in more than a second.
+const WAITING: usize = 32;
 
 /// A button and what has happened to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Contact {
     /// Which one, from 0.
-    pub button: usize,
+    pub button: u8,
     /// Whether it is pressed.
     pub is_pressed: bool,
 }
 
-/// The buttons. The virtual input says one thing at a time: of buttons that change in the same millisecond, the second is
-/// told in the next.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Buttons {
-    told: [bool; BUTTONS],
-    last: Contact,
+/// What is to be told of the buttons: changes in their order, and then states that somebody wants to know.
+///
+/// When more changes wait than there is room for, the newest are left out, and the states of all buttons follow behind
+/// those that wait.
+#[derive(Debug, Default)]
+pub struct Calls {
+    pressed: [bool; BUTTONS],
+    changes: Deque<Contact, WAITING>,
+    /// A change was left out.
+    has_lost: bool,
+    /// The buttons whose states are to be told.
+    asked: [bool; BUTTONS],
 }
 
-impl Buttons {
-    /// Takes which buttons are pressed, once a millisecond and debounced; returns the last change.
-    pub fn sample(&mut self, pressed: [bool; BUTTONS]) -> Contact {
-        let changed = (0..).zip(self.told.iter_mut().zip(pressed)).find(|(_, (told, now))| **told != *now);
-        if let Some((button, (told, is_pressed))) = changed {
-            *told = is_pressed;
-            self.last = Contact { button, is_pressed };
+impl Calls {
+    /// Takes which buttons are pressed, debounced.
+    pub fn observe(&mut self, pressed: [bool; BUTTONS]) {
+        for (button, (before, now)) in (0..).zip(self.pressed.iter_mut().zip(pressed)) {
+            if core::mem::replace(before, now) != now {
+                let change = Contact { button, is_pressed: now };
+                self.has_lost = self.has_lost || self.changes.push_back(change).is_err();
+            }
         }
-        self.last
     }
-}
 
-/// Listens to virtual outputs.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Lamp {
-    last: [u8; 6],
-}
+    /// Forgets what has happened: the states of all buttons are to be told.
+    pub fn begin(&mut self) {
+        self.changes.clear();
+        (self.has_lost, self.asked) = (false, [true; BUTTONS]);
+    }
 
-impl Lamp {
-    /// What a virtual output does to the lamp when it is another one than before: lights it, puts it out, or nothing. Two
-    /// equal words are for no lamp.
-    pub fn follow(&mut self, output: [u8; 6], on: [u8; 6], off: [u8; 6]) -> Option<bool> {
-        if core::mem::replace(&mut self.last, output) == output {
-            return None;
+    /// The state of this button is to be told.
+    pub fn ask(&mut self, button: usize) {
+        if let Some(asked) = self.asked.get_mut(button) {
+            *asked = true;
         }
-        match (output == on, output == off) {
-            (true, false) => Some(true),
-            (false, true) => Some(false),
-            _ => None,
+    }
+
+    /// What to tell next.
+    #[inline(never)]
+    pub fn next(&mut self) -> Option<Contact> {
+        if let Some(change) = self.changes.pop_front() {
+            return Some(change);
         }
+        if core::mem::take(&mut self.has_lost) {
+            self.asked = [true; BUTTONS];
+        }
+        let states = (0..).zip(self.asked.iter_mut().zip(self.pressed));
+        for (button, (asked, is_pressed)) in states {
+            if core::mem::take(asked) {
+                return Some(Contact { button, is_pressed });
+            }
+        }
+        None
     }
 }
 
@@ -65,30 +82,44 @@ impl Lamp {
 mod tests {
     use super::*;
 
-    #[test]
-    fn buttons_are_told_one_after_the_other() {
-        let contact = |button, is_pressed| Contact { button, is_pressed };
-        let mut buttons = Buttons::default();
-        let pressed =
-            [[false, false], [true, true], [true, true], [true, true], [false, true], [false, false]];
-        let told = pressed.map(|pressed| buttons.sample(pressed));
-        let expected = [
-            contact(0, false),
-            contact(0, true),
-            contact(1, true),
-            contact(1, true),
-            contact(0, false),
-            contact(1, false),
-        ];
-        assert_eq!(told, expected);
+    fn contact(button: u8, is_pressed: bool) -> Contact {
+        Contact { button, is_pressed }
+    }
+
+    fn all(calls: &mut Calls) -> Vec<Contact> {
+        std::iter::from_fn(|| calls.next()).collect()
     }
 
     #[test]
-    fn a_lamp_follows_its_own_words() {
-        let (on, off) = ([1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 7]);
-        let mut lamp = Lamp::default();
-        let followed = [on, on, off, [0; 6], on].map(|output| lamp.follow(output, on, off));
-        assert_eq!(followed, [Some(true), None, Some(false), None, Some(true)]);
-        assert_eq!(lamp.follow(off, off, off), None);
+    fn every_change_is_told_in_its_order() {
+        let mut calls = Calls::default();
+        for pressed in [[true, false], [true, true], [true, true], [false, true], [false, false]] {
+            calls.observe(pressed);
+        }
+        let expected = [contact(0, true), contact(1, true), contact(0, false), contact(1, false)];
+        assert_eq!(all(&mut calls), expected);
+    }
+
+    #[test]
+    fn states_follow_behind_changes() {
+        let mut calls = Calls::default();
+        calls.observe([true, false]);
+        calls.ask(0);
+        assert_eq!(all(&mut calls), [contact(0, true); 2]);
+        calls.begin();
+        assert_eq!(all(&mut calls), [contact(0, true), contact(1, false)]);
+    }
+
+    #[test]
+    fn what_finds_no_room_is_covered_by_the_states() {
+        let mut calls = Calls::default();
+        for change in 0..WAITING + 3 {
+            calls.observe([change % 2 == 0, false]);
+        }
+        let told = all(&mut calls);
+        assert_eq!(told.len(), WAITING + BUTTONS);
+        assert_eq!(told[WAITING..], [contact(0, true), contact(1, false)]);
+        calls.observe([false, false]);
+        assert_eq!(all(&mut calls), [contact(0, false)]);
     }
 }

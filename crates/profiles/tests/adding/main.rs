@@ -48,7 +48,7 @@ impl Node {
             self.profile.write(&entry, bytes, &mut self.image)?;
         }
         entry.field().set(&mut self.image, bytes);
-        self.profile.received(&mut self.image);
+        self.profile.written(&entry, &mut self.image);
         Ok(())
     }
 }

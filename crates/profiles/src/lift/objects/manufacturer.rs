@@ -1,6 +1,7 @@
-//! Manufacturer-specific objects of the lift, 2300h to 2322h: which sensors the virtual devices have, and what CiA 417
-//! leaves open. The sensors of positions are described as those of the encoder are (2100h to 2106h).
+//! Manufacturer-specific objects of the lift, 2300h to 2322h: which virtual devices the node is, which sensors they have, and
+//! what CiA 417 leaves open. The sensors of positions are described as those of the encoder are (2100h to 2106h).
 
+use crate::lift::devices::Devices;
 use crate::lift::position::UNKNOWN;
 use canopen::dictionary::{Access, Group, Mapping, Object, Type};
 
@@ -49,6 +50,8 @@ pub(super) const OBJECTS: &[Object] = &[
     state(2, "Position unit 2 state"),
     state(3, "Position unit 3 state"),
     state(4, "Position unit 4 state"),
+    // A bit for each: 0 car position units, 1 load measuring unit, 2 input panel unit, 3 output panel unit.
+    parameter(0x2305, 0, "Virtual devices", Type::Unsigned8).limits(0, Devices::ALL.0 as i64).handled(),
     Object::highest(0x2310, 2, "Load filter"),
     // As 61A0h and 61A1h of CiA 404.
     parameter(0x2310, 1, "Load filter type", Type::Unsigned8).value(2),
@@ -77,7 +80,7 @@ pub(super) const OBJECTS: &[Object] = &[
     parameter(0x2321, 2, "Virtual output that lights lamp 1", Type::Unsigned48),
     parameter(0x2321, 3, "Virtual output that puts lamp 2 out", Type::Unsigned48),
     parameter(0x2321, 4, "Virtual output that lights lamp 2", Type::Unsigned48),
-    // Not 0: lit. A multiplexed PDO may write it, and an SDO client.
+    // Not 0: lit; 10h to 17h flashing. A multiplexed PDO may write it, and an SDO client.
     Object::highest(0x2322, 2, "Lamps"),
     lamp(1, "Lamp 1"),
     lamp(2, "Lamp 2"),

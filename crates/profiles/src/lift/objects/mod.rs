@@ -3,7 +3,9 @@
 //! The pre-defined PDOs (CiA 417-3-1), the objects of the application profile (6000h to 64FFh), and those of the
 //! manufacturer that they need (21xxh to 23xxh).
 
+mod choice;
 mod manufacturer;
+mod panel;
 pub mod pdos;
 mod profile;
 mod rules;
@@ -13,11 +15,12 @@ mod values;
 pub use values::Fields;
 
 use canopen::dictionary::{self, Dictionary, Entry, Object};
-use canopen::sdo::Abort;
+use canopen::sdo::{Abort, Multiplexer};
 
-use super::panel::Lamp;
+use super::devices::{Devices, PROFILE as NUMBER};
+use super::panel::Calls;
 use super::{Lift, Parameters, Snapshot};
-use crate::board::{DIGITAL_OUTPUTS, Outputs};
+use crate::board::Outputs;
 use crate::communication::{device_name, device_type, error_behaviour};
 use crate::fault::Fault;
 use crate::pressure;
@@ -30,7 +33,7 @@ const NO_CHANGE: i64 = 1;
 
 /// The rows of the lift devices, but for those that all devices have.
 pub const ROWS: &[&[Object]] = &[
-    &[device_type(values::PROFILE as i64)],
+    &[device_type(NUMBER as i64)],
     &[device_name("STM32F4 lift unit")],
     &error_behaviour(NO_CHANGE),
     &pdos::ROWS,
@@ -59,15 +62,22 @@ pub const fn handles(index: u16, sub: u8) -> bool {
 #[derive(Debug)]
 pub struct Objects {
     fields: &'static Fields,
-    lamps: [Lamp; DIGITAL_OUTPUTS],
+    calls: Calls,
+    lamps: panel::LampStates,
 }
+
+/// TPDO of virtual inputs, RPDO of virtual outputs.
+const INPUTS: u16 = 130;
+const OUTPUTS: u16 = 257;
+/// The RPDO that takes the multiplexed PDOs of all nodes that have none of their own.
+const MULTIPLEXED: u16 = 2;
 
 impl Profile for Objects {
     type Chain = Lift;
     type Fields = Fields;
 
     fn new(fields: &'static Fields) -> Objects {
-        Objects { fields, lamps: [Lamp::default(); DIGITAL_OUTPUTS] }
+        Objects { fields, calls: Calls::default(), lamps: panel::LampStates::default() }
     }
 
     fn initialise(&mut self, image: &mut [u8]) {
@@ -78,8 +88,10 @@ impl Profile for Objects {
         self.fields.parameters(image)
     }
 
-    fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+    fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
         self.fields.publish(snapshot, image);
+        self.calls.observe(snapshot.buttons);
+        self.lamps.milliseconds = self.lamps.milliseconds.wrapping_add(1);
     }
 
     fn handles(&self, index: u16, sub: u8) -> bool {
@@ -90,18 +102,64 @@ impl Profile for Objects {
         self.fields.write(entry, bytes, image)
     }
 
-    /// The load measuring unit is on the pressure input, the position units are on those of the encoder.
+    /// The load measuring unit is on the pressure input, the position units are on those of the encoder. A virtual device that
+    /// is not chosen has no faults: there may be no sensor.
     fn faults(snapshot: &Snapshot, each: &mut impl FnMut(&'static Fault, bool)) {
-        each(&pressure::objects::SENSOR_BREAK, snapshot.load.is_broken);
-        snapshot.position.conditions.faults(each);
+        let Snapshot { devices, load, position, .. } = snapshot;
+        each(&pressure::objects::SENSOR_BREAK, devices.has(Devices::LOAD) && load.is_broken);
+        let has_position = devices.has(Devices::POSITION);
+        position.conditions.faults(&mut |fault, active| each(fault, has_position && active));
     }
 
-    fn received(&mut self, image: &mut [u8]) {
-        self.fields.follow_output(&mut self.lamps, image);
+    fn received(&mut self, rpdo: u16, image: &mut [u8]) {
+        if rpdo == OUTPUTS {
+            self.follow_output(image);
+        }
+    }
+
+    fn written(&mut self, entry: &Entry, image: &mut [u8]) {
+        match (entry.index(), entry.sub()) {
+            (0x6011, 0) => self.follow_output(image),
+            (0x2322, sub @ 1..) => self.fields.panel.forget_lamp(usize::from(sub) - 1, &mut self.lamps),
+            _ => {}
+        }
+    }
+
+    fn sends_events(&self, tpdo: u16) -> bool {
+        tpdo == INPUTS
+    }
+
+    fn begin_events(&mut self, _: u16, _: &mut [u8]) {
+        self.calls.begin();
+    }
+
+    fn next_event(&mut self, _: u16, image: &mut [u8]) -> bool {
+        self.fields.devices(image).has(Devices::INPUT_PANEL)
+            && self.fields.panel.next_call(&mut self.calls, image)
+    }
+
+    fn takes_all_nodes(&self, rpdo: u16) -> bool {
+        rpdo == MULTIPLEXED
+    }
+
+    fn broadcasts(&self, at: Multiplexer, image: &[u8]) -> bool {
+        self.fields.is_there(at, image)
     }
 
     fn outputs(&self, image: &[u8]) -> Outputs {
-        Outputs { digital: self.fields.lit(image) }
+        Outputs { digital: self.fields.panel.lit(&self.lamps, image) }
+    }
+}
+
+impl Objects {
+    fn follow_output(&mut self, image: &mut [u8]) {
+        let devices = self.fields.devices(image);
+        if devices.has(Devices::INPUT_PANEL) {
+            self.fields.panel.answer(&mut self.calls, image);
+        }
+        if devices.has(Devices::OUTPUT_PANEL) {
+            self.fields.panel.follow_output(&mut self.lamps, image);
+        }
     }
 }
 

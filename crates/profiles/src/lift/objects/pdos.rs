@@ -146,7 +146,8 @@ macro_rules! mapped {
 }
 
 /// Those of this node. As consumer: virtual outputs, and the multiplexed PDOs of the nodes 1 to 7; as producer: its own
-/// multiplexed PDO, virtual inputs, the load, the positions. Units 2 to 4 are off until they have a sensor.
+/// multiplexed PDO, virtual inputs, the load, the positions. What has the same CAN-ID in every device is off until the node is
+/// chosen to be such a virtual device: two nodes as delivered must not send with one CAN-ID.
 const PARTS: &[&[Object]] = &[
     &rpdo(2, 1, communication!("RPDO", 2)),
     &rpdo(2, 2, communication!("RPDO", 3)),
@@ -166,8 +167,8 @@ const PARTS: &[&[Object]] = &[
     &rpdo_mapping::<2>(257, 1, mapped!("RPDO", 257)),
     &multiplexed_tpdo(communication!("TPDO", 2)),
     &tpdo(130, communication!("TPDO", 130), true),
-    &tpdo(258, communication!("TPDO", 258), true),
-    &tpdo(263, communication!("TPDO", 263), true),
+    &tpdo(258, communication!("TPDO", 258), false),
+    &tpdo(263, communication!("TPDO", 263), false),
     &tpdo(264, communication!("TPDO", 264), false),
     &tpdo(385, communication!("TPDO", 385), false),
     &tpdo(386, communication!("TPDO", 386), false),

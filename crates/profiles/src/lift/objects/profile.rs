@@ -15,6 +15,11 @@ const fn measured(index: u16, sub: u8, name: &'static str, kind: Type) -> Object
     Object::new(index, sub, name, kind, Access::ReadOnly)
 }
 
+/// What another device of the lift may set by a multiplexed PDO.
+const fn taken(row: Object) -> Object {
+    row.mappable(Mapping::Rpdo)
+}
+
 /// Process data: in a PDO of its own, or in the multiplexed one.
 const fn sent(row: Object) -> Object {
     row.mappable(Mapping::Tpdo)
@@ -37,11 +42,11 @@ macro_rules! units {
 const POSITION: &str = "6384h:1";
 
 const fn operating(sub: u8, name: &'static str) -> Object {
-    handled(0x6380, sub, name, Type::Unsigned16)
+    taken(handled(0x6380, sub, name, Type::Unsigned16))
 }
 
 const fn preset(sub: u8, name: &'static str) -> Object {
-    handled(0x6382, sub, name, Type::Unsigned32).unit(POSITION)
+    taken(handled(0x6382, sub, name, Type::Unsigned32)).unit(POSITION)
 }
 
 const fn position(sub: u8, name: &'static str) -> Object {
@@ -54,11 +59,11 @@ const fn speed(sub: u8, name: &'static str) -> Object {
 }
 
 const fn low_limit(sub: u8, name: &'static str) -> Object {
-    parameter(0x63B4, sub, name, Type::Integer32).unit(POSITION)
+    taken(parameter(0x63B4, sub, name, Type::Integer32)).unit(POSITION)
 }
 
 const fn high_limit(sub: u8, name: &'static str) -> Object {
-    parameter(0x63B8, sub, name, Type::Integer32).value(0x7FFF_FFFF).unit(POSITION)
+    taken(parameter(0x63B8, sub, name, Type::Integer32)).value(0x7FFF_FFFF).unit(POSITION)
 }
 
 const fn operating_status(sub: u8, name: &'static str) -> Object {
@@ -82,16 +87,36 @@ const fn warnings(sub: u8, name: &'static str) -> Object {
 }
 
 const fn limit(sub: u8, name: &'static str) -> Object {
-    parameter(0x6483, sub, name, Type::Unsigned16).unit("kg")
+    taken(parameter(0x6483, sub, name, Type::Unsigned16)).unit("kg")
+}
+
+/// 0 behind the last of the list.
+const fn listed(sub: u8, name: &'static str) -> Object {
+    measured(0x6000, sub, name, Type::Unsigned16)
 }
 
 /// All of them, in the order of the table.
 pub(super) const PARTS: &[&[Object]] = &[
     &[
+        Object::new(0x6000, 0, "Virtual devices", Type::Unsigned8, Access::ReadOnly),
+        listed(1, "Type of virtual device 1"),
+        listed(2, "Type of virtual device 2"),
+        listed(3, "Type of virtual device 3"),
+        listed(4, "Type of virtual device 4"),
         // A bit for each lift. The PDOs are those of lift 1.
         parameter(0x6001, 0, "Lift number", Type::Unsigned8).limits(1, 1).value(1),
         sent(measured(0x6010, 0, "Virtual input", Type::Unsigned48)),
         Object::new(0x6011, 0, "Virtual output", Type::Unsigned48, Access::ReadWrite).mappable(Mapping::Rpdo),
+        Object::highest(0x6100, 2, "Input group"),
+        handled(0x6100, 1, "Input 1", Type::Unsigned48),
+        handled(0x6100, 2, "Input 2", Type::Unsigned48),
+        // Bit 0: the input is used.
+        Object::highest(0x6120, 2, "Input group parameter 1"),
+        parameter(0x6120, 1, "Input 1 parameter 1", Type::Unsigned32).limits(0, 1).value(1),
+        parameter(0x6120, 2, "Input 2 parameter 1", Type::Unsigned32).limits(0, 1).value(1),
+        Object::highest(0x6200, 2, "Output group"),
+        parameter(0x6200, 1, "Output 1", Type::Unsigned48),
+        parameter(0x6200, 2, "Output 2", Type::Unsigned48),
     ],
     &units!(0x6380, "operating parameters", "Position unit operating parameters", operating),
     &units!(0x6382, "preset", "Position unit presets", preset),
@@ -126,6 +151,6 @@ pub(super) const PARTS: &[&[Object]] = &[
         limit(2, "Half load limit"),
         limit(3, "Full load limit"),
         limit(4, "Overload limit"),
-        handled(0x6486, 0, "Car reference weight", Type::Unsigned16).unit("kg"),
+        taken(handled(0x6486, 0, "Car reference weight", Type::Unsigned16)).unit("kg"),
     ],
 ];

@@ -1,6 +1,7 @@
 //! What a write to an object of the lift means beyond storing a value.
 
 use super::values::{Fields, UnitFields};
+use crate::lift::devices::Devices;
 use crate::lift::position::{INVERTED, UNKNOWN};
 use crate::pressure::objects::calibration;
 use canopen::dictionary::{Entry, Field};
@@ -19,6 +20,10 @@ pub(super) enum Rule {
     Reference,
     /// 2301h: the sensor of a unit.
     Source,
+    /// 2305h: the virtual devices that the node is.
+    Devices,
+    /// 6100h: what a button tells.
+    Input,
     /// 2200h to 2203h.
     Calibration(calibration::Rule),
 }
@@ -29,6 +34,8 @@ impl Rule {
         Some(match (index, sub) {
             (0x2100..=0x2103, 1..) | (0x2300, 0) | (0x6384, 1) => Rule::Measure,
             (0x2301, 1..) => Rule::Source,
+            (0x2305, 0) => Rule::Devices,
+            (0x6100, 1..) => Rule::Input,
             (0x6380, 1..) => Rule::Operating,
             (0x6382, 1..) => Rule::Preset,
             (0x6486, 0) => Rule::Reference,
@@ -51,6 +58,14 @@ impl Fields {
             Rule::Preset => self.preset(unit, value, image),
             Rule::Measure => self.measure_anew(entry.field(), bytes, image),
             Rule::Source => self.take_source(unit, entry.field(), bytes, image),
+            Rule::Devices => {
+                self.choose(Devices(value.to_le_bytes()[0]), true, image);
+                Ok(())
+            }
+            Rule::Input => {
+                self.panel.take_input(unit, bytes, image);
+                Ok(())
+            }
             Rule::Reference => self.weigh(value, image),
             Rule::Calibration(rule) => self.transducer.write(rule, entry, bytes, image),
         }
@@ -102,6 +117,7 @@ impl Fields {
         if bytes != field.get(image) {
             self.unit(number)?.offset.store(image, [0; 4]);
         }
+        self.switch_position(number, bytes != [0] && self.devices(image).has(Devices::POSITION), image);
         Ok(())
     }
 

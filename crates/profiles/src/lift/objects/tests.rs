@@ -3,8 +3,8 @@ use crate::board::{Inputs, RawEncoder, RawSample};
 use crate::communication::{TRANSFER_BUFFER, personality};
 use crate::lift::catalogue::{CobId, Content, PDOS as CATALOGUE};
 use crate::lift::load::{FULL_LOAD, OVERLOAD, ZERO_LOAD};
-use crate::lift::panel::Lamp;
 use crate::lift::position::{INVERTED, UNKNOWN};
+use crate::lift::word::Light;
 use crate::lift::{Lift, Parameters};
 use crate::pressure::objects::CALIBRATION;
 use crate::profile::Chain;
@@ -24,6 +24,7 @@ fn rows() -> impl Iterator<Item = &'static Object> {
 /// A dictionary with a lift behind it.
 struct Node {
     image: [u8; IMAGE_SIZE],
+    objects: Objects,
     lift: Lift,
     inputs: Inputs,
 }
@@ -50,7 +51,8 @@ fn defaults() -> [u8; IMAGE_SIZE] {
 impl Node {
     fn new() -> Node {
         let inputs = Inputs { analogue: pressure(0), position: RawEncoder::default(), digital: [false; 2] };
-        let mut node = Node { image: defaults(), lift: Lift::new(&PowerOn::default()), inputs };
+        let objects = Objects::new(&FIELDS);
+        let mut node = Node { image: defaults(), objects, lift: Lift::new(&PowerOn::default()), inputs };
         node.write(0x2310, 1, 0).unwrap();
         node.sample();
         node
@@ -59,7 +61,23 @@ impl Node {
     fn sample(&mut self) {
         let mut snapshot = Snapshot::default();
         self.lift.update(&self.inputs, &mut snapshot);
-        FIELDS.publish(&snapshot, &mut self.image);
+        self.objects.publish(&snapshot, &mut self.image);
+    }
+
+    /// What the virtual input says next.
+    fn call(&mut self) -> Option<u64> {
+        self.objects.next_event(INPUTS, &mut self.image).then(|| self.read(0x6010, 0))
+    }
+
+    /// A virtual output comes, over the bus.
+    fn output(&mut self, word: i64) -> [bool; 2] {
+        self.write(0x6011, 0, word).unwrap();
+        self.objects.received(OUTPUTS, &mut self.image);
+        self.lit()
+    }
+
+    fn lit(&self) -> [bool; 2] {
+        self.objects.outputs(&self.image).digital
     }
 
     /// Goes to this way in sensor steps of 200 mm / 4096.
@@ -121,7 +139,7 @@ fn every_parameter_is_saved_and_nothing_else() {
 /// reference weight leave behind.
 #[test]
 fn every_parameter_changes_what_the_measurement_gets() {
-    let silent = [0x2320, 0x2321, 0x6001, 0x6382, 0x6486];
+    let silent = [0x2320, 0x2321, 0x6001, 0x6100, 0x6120, 0x6200, 0x6382, 0x6486];
     let special = |index, sub| match (index, sub) {
         (0x2105 | 0x2301, _) | (0x2103, 3) => 0,
         (0x2101, _) => 8000,
@@ -276,32 +294,36 @@ fn the_transducer_is_calibrated_as_that_of_the_pressure_transmitter() {
     assert_eq!(node.read(0x6480, 1), 400);
 }
 
-#[test]
-fn a_button_is_a_word_and_a_word_is_a_lamp() {
+/// A panel whose words have no structure.
+fn panel() -> Node {
     let mut node = Node::new();
+    node.write(0x2305, 0, 0x0C).unwrap();
     let words = [(1, 0x11), (2, 0x9988_7766_5544), (3, 0x12), (4, 0x13)];
     for (sub, word) in words {
         node.write(0x2320, sub, word).unwrap();
-    }
-    node.sample();
-    assert_eq!(node.read(0x6010, 0), 0x11);
-    // The second button is told a millisecond after the first, and what was told last stays.
-    for (buttons, word) in [
-        ([true, true], 0x9988_7766_5544),
-        ([true, true], 0x13),
-        ([false, true], 0x11),
-        ([false, false], 0x12),
-        ([false, false], 0x12),
-    ] {
-        node.inputs.digital = buttons;
-        node.sample();
-        assert_eq!(node.read(0x6010, 0), word, "{buttons:?}");
     }
     let words = [(1, 0x22), (2, 0x33), (3, 0x55), (4, 0x33)];
     for (sub, word) in words {
         node.write(0x2321, sub, word).unwrap();
     }
-    let mut lamps = [Lamp::default(); 2];
+    node.sample();
+    node
+}
+
+#[test]
+fn a_button_is_a_word_and_a_word_is_a_lamp() {
+    let mut node = panel();
+    node.objects.begin_events(INPUTS, &mut node.image);
+    assert_eq!([node.call(), node.call(), node.call()], [Some(0x11), Some(0x12), None], "as they are");
+    // Each change is told, in its order, however late, and what was told last stays.
+    for buttons in [[true, true], [true, true], [false, true], [false, false], [false, false]] {
+        node.inputs.digital = buttons;
+        node.sample();
+    }
+    for word in [0x9988_7766_5544, 0x13, 0x11, 0x12] {
+        assert_eq!(node.call(), Some(word));
+    }
+    assert_eq!((node.call(), node.read(0x6010, 0)), (None, 0x12));
     for (word, lit) in [
         (0x33, [true, true]),
         (0x44, [true, true]),
@@ -309,44 +331,162 @@ fn a_button_is_a_word_and_a_word_is_a_lamp() {
         (0x55, [false, false]),
         (0, [false, false]),
     ] {
-        node.write(0x6011, 0, word).unwrap();
-        FIELDS.follow_output(&mut lamps, &mut node.image);
-        assert_eq!(FIELDS.lit(&node.image), lit, "{word:X}h");
+        assert_eq!(node.output(word), lit, "{word:X}h");
     }
     node.write(0x2322, 2, 1).unwrap();
-    FIELDS.follow_output(&mut lamps, &mut node.image);
-    assert_eq!(FIELDS.lit(&node.image), [false, true], "an old output says nothing new");
+    assert_eq!(node.lit(), [false, true]);
+    node.objects.received(2, &mut node.image);
+    assert_eq!(node.lit(), [false, true], "another PDO brings no output");
+}
+
+/// Somebody else has put the lamp out: what the call controller says again holds again.
+#[test]
+fn a_repeated_output_is_followed_too() {
+    let mut node = panel();
+    assert_eq!(node.output(0x33), [true, true]);
+    node.write(0x2322, 1, 0).unwrap();
+    assert_eq!(node.lit(), [false, true]);
+    assert_eq!(node.output(0x33), [true, true]);
 }
 
 #[test]
 fn a_button_that_is_not_used_says_nothing() {
     let mut node = Node::new();
+    node.write(0x2305, 0, 4).unwrap();
     node.write(0x2320, 3, 0x12).unwrap();
     node.write(0x2320, 4, 0x13).unwrap();
-    for (buttons, word) in [([true, false], 0), ([true, true], 0x13), ([false, true], 0x13)] {
+    for (buttons, word) in [([true, false], None), ([true, true], Some(0x13)), ([false, true], None)] {
         node.inputs.digital = buttons;
         node.sample();
-        assert_eq!(node.read(0x6010, 0), word, "{buttons:?}");
+        assert_eq!(node.call(), word, "{buttons:?}");
+    }
+    node.write(0x6120, 2, 0).unwrap();
+    node.inputs.digital = [false, false];
+    node.sample();
+    assert_eq!(node.call(), None, "switched off by its parameter");
+}
+
+/// As delivered, and with other virtual devices only.
+#[test]
+fn a_node_that_is_no_panel_has_no_calls_and_no_lamps() {
+    for devices in [0, 3] {
+        let mut node = panel();
+        node.write(0x2305, 0, devices).unwrap();
+        node.objects.begin_events(INPUTS, &mut node.image);
+        assert_eq!((node.call(), node.output(0x33)), (None, [false, false]));
+    }
+}
+
+/// Hall call up of lift 1 at floor 3, door 1, with high priority.
+const CALL: i64 = 0x00_01_03_01_01_04;
+
+#[test]
+fn an_input_with_the_public_structure_says_its_state_in_its_function_data() {
+    let mut node = Node::new();
+    node.write(0x2305, 0, 4).unwrap();
+    node.write(0x6100, 1, CALL).unwrap();
+    for is_pressed in [true, false] {
+        node.inputs.digital = [is_pressed, false];
+        node.sample();
+        assert_eq!(node.call(), Some(0x00_01_03_01_01_04 | u64::from(is_pressed) << 40));
+    }
+    assert_eq!(node.read(0x2320, 2), 0x01_01_03_01_01_04);
+}
+
+/// Command 00h of the call controller, to lift 1.
+#[test]
+fn a_request_is_answered_by_the_inputs_that_are_meant() {
+    let mut node = Node::new();
+    node.write(0x2305, 0, 4).unwrap();
+    node.write(0x6100, 1, CALL).unwrap();
+    // Door open, in the car of lift 2.
+    node.write(0x6100, 2, 0x00_01_00_02_09_0E).unwrap();
+    for (command, told) in [
+        (0x01_FF_FF_FF_00_00, [Some(0x01_03_01_01_04), Some(0x01_00_02_09_0E)]),
+        (0x01_FF_FF_01_00_00, [Some(0x01_03_01_01_04), None]),
+        (0x01_FF_FF_FF_01_00, [Some(0x01_03_01_01_04), None]),
+        (0x01_FF_FF_FF_02_00, [Some(0x01_00_02_09_0E), None]),
+        (0x01_FF_FF_FF_FF_00, [None, None]),
+        (0, [None, None]),
+    ] {
+        node.output(command);
+        assert_eq!([node.call(), node.call()], told, "{command:X}h");
     }
 }
 
 #[test]
-fn the_device_type_names_the_only_virtual_device_or_none() {
+fn a_lamp_answers_to_its_lifts_and_flashes() {
     let mut node = Node::new();
-    let device_type = |node: &Node| FIELDS.device_type(&node.image);
-    assert_eq!(device_type(&node), 0x0000_01A1, "position and load");
-    node.write_real(0x2311, 3, 0.0);
-    assert_eq!(device_type(&node), 0x0600_01A1);
+    node.write(0x2305, 0, 8).unwrap();
+    // Car call 4 of lifts 1 and 2, door 1.
+    node.write(0x6200, 1, 0x00_01_00_03_04_05).unwrap();
+    let on = |lifts: i64, data: i64| 0x00_01_00_00_04_05 | lifts << 16 | data << 40;
+    assert_eq!(node.output(on(1, 1)), [true, false]);
+    assert_eq!(node.output(on(2, 1)), [true, false]);
+    assert_eq!(node.output(on(1, 0)), [true, false], "lift 2 has still taken the call");
+    assert_eq!(node.output(on(2, 0)), [false, false]);
+    assert_eq!(node.output(on(4, 1)), [false, false], "another lift");
+    // Flashing with a period of 500 ms.
+    node.output(on(1, 0x37));
+    assert_eq!(node.read(0x2322, 1), 0x13);
+    let mut lit = 0;
+    for _ in 0..5000 {
+        node.sample();
+        lit += u32::from(node.lit()[0]);
+    }
+    assert_eq!(lit, 2500);
+    // One pulse: there is no timer for it.
+    assert_eq!(node.output(on(1, 0x15)), [true, false]);
+    assert_eq!(node.output(on(1, 0x14)), [false, false]);
+    assert_eq!(node.read(0x2322, 1), Light::OFF.0.into());
+}
+
+/// The choice decides on the device type, the list and the PDOs; a unit without a sensor has none.
+#[test]
+fn the_choice_of_virtual_devices() {
+    let mut node = Node::new();
+    let list = |node: &Node| [0, 1, 2, 3, 4].map(|sub| node.read(0x6000, sub));
+    let on =
+        |node: &Node| [0x1901, 0x1906, 0x1907, 0x1980, 0x1981].map(|index| node.read(index, 1) >> 31 == 0);
+    assert_eq!((node.read(0x1000, 0), list(&node), on(&node)), (0x1A1, [0; 5], [false; 5]), "as delivered");
+    for (chosen, device_type, types, valid) in [
+        (1, 0x0600_01A1, [1, 0x0600, 0, 0, 0], [false, true, false, false, false]),
+        (2, 0x0A00_01A1, [1, 0x0A00, 0, 0, 0], [true, false, false, false, false]),
+        (4, 0x0200_01A1, [1, 0x0200, 0, 0, 0], [false; 5]),
+        (8, 0x0300_01A1, [1, 0x0300, 0, 0, 0], [false; 5]),
+        (15, 0x0000_01A1, [4, 0x0600, 0x0A00, 0x0200, 0x0300], [true, true, false, false, false]),
+        (0, 0x0000_01A1, [0; 5], [false; 5]),
+    ] {
+        node.write(0x2305, 0, chosen).unwrap();
+        assert_eq!((node.read(0x1000, 0), list(&node), on(&node)), (device_type, types, valid), "{chosen}");
+    }
+    node.write(0x2305, 0, 1).unwrap();
+    node.write(0x2301, 3, 1).unwrap();
     node.write(0x2301, 1, 0).unwrap();
-    assert_eq!(device_type(&node), 0x0000_01A1, "nothing");
-    node.write(0x2320, 1, 7).unwrap();
-    assert_eq!(device_type(&node), 0x0200_01A1);
-    node.write(0x2320, 1, 0).unwrap();
-    node.write(0x2321, 1, 7).unwrap();
-    assert_eq!(device_type(&node), 0x0300_01A1);
-    node.write(0x2321, 1, 0).unwrap();
-    node.write_real(0x2311, 3, 1.0);
-    assert_eq!(device_type(&node), 0x0A00_01A1);
+    assert_eq!(on(&node), [false, false, false, true, false], "units with a sensor");
+}
+
+/// What is stored of the PDOs may be older than the choice.
+#[test]
+fn a_reset_silences_what_is_not_chosen() {
+    let mut node = Node::new();
+    node.write(0x2305, 0, 3).unwrap();
+    DICTIONARY.field(0x2305, 0).set(&mut node.image, &[2]);
+    node.objects.initialise(&mut node.image);
+    assert_eq!([0x1901, 0x1906].map(|index| node.read(index, 1) >> 31), [0, 1]);
+    assert_eq!((node.read(0x1000, 0), node.read(0x6000, 1)), (0x0A00_01A1, 0x0A00));
+}
+
+#[test]
+fn a_virtual_device_that_is_not_chosen_has_no_faults() {
+    let active = |devices| {
+        let mut snapshot = Snapshot { devices, ..Snapshot::default() };
+        snapshot.load.is_broken = true;
+        let mut count = 0;
+        Objects::faults(&snapshot, &mut |_, is_active| count += u32::from(is_active));
+        count
+    };
+    assert_eq!([Devices(0), Devices::POSITION, Devices::LOAD].map(active), [0, 0, 1]);
 }
 
 /// What the catalogue says of a PDO is what the device reads in the objects.

@@ -1,9 +1,11 @@
 //! Measured values into the image, parameters out of it.
 
+use super::choice::Choice;
+use super::panel::PanelFields;
 use crate::encoder::Area;
 use crate::encoder::objects::Sensors;
+use crate::lift::devices::Devices;
 use crate::lift::load::{self, Point};
-use crate::lift::panel::{BUTTONS, Contact, LAMPS, Lamp};
 use crate::lift::position::{self, Source, UNITS, UnitParameters, UnitValues};
 use crate::lift::{Parameters, Snapshot};
 use crate::pressure::objects::Places;
@@ -13,7 +15,8 @@ use core::num::{NonZeroU16, NonZeroU32};
 /// Where the lift's values are in the image of its dictionary.
 #[derive(Debug)]
 pub struct Fields {
-    device_type: Field,
+    pub(super) choice: Choice,
+    pub(super) panel: PanelFields,
     pub(super) sensors: Sensors,
     pub(super) transducer: Places,
     pub(super) units: [UnitFields; UNITS],
@@ -29,13 +32,6 @@ pub struct Fields {
     pub(super) load_offset: Field,
     pub(super) measured_load: Field,
     pub(super) load_state: Field,
-    input: Field,
-    output: Field,
-    /// The words of a button while it is released and while it is pressed.
-    buttons: [[Field; 2]; BUTTONS],
-    /// The words that put a lamp out and that light it.
-    lamp_words: [[Field; 2]; LAMPS],
-    lamps: [Field; LAMPS],
 }
 
 /// Where the values of one position unit are.
@@ -99,7 +95,8 @@ impl Fields {
     /// Looks them up, during compilation.
     pub(crate) const fn new(d: &Dictionary) -> Fields {
         Fields {
-            device_type: d.field(0x1000, 0),
+            choice: Choice::new(d),
+            panel: PanelFields::new(d),
             sensors: Sensors::new(d),
             transducer: Places::new(d),
             units: [
@@ -120,11 +117,6 @@ impl Fields {
             load_offset: d.field(0x2312, 0),
             measured_load: d.field(0x2313, 1),
             load_state: d.field(0x2313, 2),
-            input: d.field(0x6010, 0),
-            output: d.field(0x6011, 0),
-            buttons: [pair(d, 0x2320, 1), pair(d, 0x2320, 3)],
-            lamp_words: [pair(d, 0x2321, 1), pair(d, 0x2321, 3)],
-            lamps: pair(d, 0x2322, 1),
         }
     }
 
@@ -134,17 +126,6 @@ impl Fields {
             unit.publish(values, image);
         }
         self.publish_load(&snapshot.load, image);
-        self.publish_input(snapshot.button, image);
-    }
-
-    /// Of a button that is used: the virtual input says what it has said before, whatever the others do.
-    fn publish_input(&self, contact: Contact, image: &mut [u8]) {
-        let Some(words) = self.buttons.get(contact.button).filter(|words| differ(**words, image)) else {
-            return;
-        };
-        let [released, pressed] = words;
-        let word = if contact.is_pressed { pressed } else { released };
-        self.input.store(image, word.load::<6>(image));
     }
 
     fn publish_load(&self, values: &load::Snapshot, image: &mut [u8]) {
@@ -157,26 +138,13 @@ impl Fields {
         }
     }
 
-    /// Does what a new virtual output says. To be called after every frame that may have brought one: the next may be for
-    /// another panel.
-    pub(crate) fn follow_output(&self, followers: &mut [Lamp; LAMPS], image: &mut [u8]) {
-        let output = self.output.load(image);
-        for ((follower, words), lamp) in followers.iter_mut().zip(&self.lamp_words).zip(&self.lamps) {
-            let [off, on] = words.map(|at| at.load(image));
-            if let Some(is_lit) = follower.follow(output, on, off) {
-                lamp.store(image, [is_lit.into()]);
-            }
-        }
-    }
-
-    /// Which lamps are lit.
-    pub(crate) fn lit(&self, image: &[u8]) -> [bool; LAMPS] {
-        self.lamps.map(|lamp| lamp.u8(image) != 0)
-    }
-
     /// The parameters in the image. A value that no write could have put there acts as the smallest.
     pub(crate) fn parameters(&self, image: &[u8]) -> Parameters {
-        Parameters { position: self.position_parameters(image), load: self.load_parameters(image) }
+        Parameters {
+            position: self.position_parameters(image),
+            load: self.load_parameters(image),
+            devices: self.devices(image),
+        }
     }
 
     pub(super) fn position_parameters(&self, image: &[u8]) -> position::Parameters {
@@ -202,44 +170,22 @@ impl Fields {
         }
     }
 
-    /// Fills in what follows from the parameters: the device type.
+    /// Fills in what follows from the parameters: which virtual devices the node is. One that it is not sends nothing, whatever
+    /// else is stored.
     pub(crate) fn initialise(&self, image: &mut [u8]) {
-        self.device_type.store(image, self.device_type(image).to_le_bytes());
+        self.choose(self.devices(image), false, image);
     }
 
-    /// Device type (1000h): the virtual device that this one is, or 0 in bits 24 to 31 for several in one.
-    pub(super) fn device_type(&self, image: &[u8]) -> u32 {
-        let is_used = |all: &[[Field; 2]]| all.iter().any(|words| differ(*words, image));
-        let has = [
-            (INPUT_PANEL, is_used(&self.buttons)),
-            (OUTPUT_PANEL, is_used(&self.lamp_words)),
-            (POSITION_UNIT, self.units.iter().any(|unit| unit.source.u8(image) != 0)),
-            (LOAD_UNIT, self.load_parameters(image).is_calibrated()),
-        ];
-        let mut codes = has.into_iter().filter(|(_, is_there)| *is_there).map(|(code, _)| code);
-        let code = match (codes.next(), codes.next()) {
-            (Some(code), None) => code,
-            _ => 0,
-        };
-        code << 24 | PROFILE
+    /// The virtual devices that are chosen.
+    pub(super) fn devices(&self, image: &[u8]) -> Devices {
+        self.choice.devices(image)
     }
 }
 
 /// Two sub-indexes in a row.
-const fn pair(d: &Dictionary, index: u16, first: u8) -> [Field; 2] {
+pub(super) const fn pair(d: &Dictionary, index: u16, first: u8) -> [Field; 2] {
     [d.field(index, first), d.field(index, first + 1)]
 }
-
-fn differ([a, b]: [Field; 2], image: &[u8]) -> bool {
-    a.get(image) != b.get(image)
-}
-
-/// The number of the profile, and codes of virtual devices in object 1000h.
-pub(super) const PROFILE: u32 = 417;
-const INPUT_PANEL: u32 = 0x02;
-const OUTPUT_PANEL: u32 = 0x03;
-const POSITION_UNIT: u32 = 0x06;
-const LOAD_UNIT: u32 = 0x0A;
 
 fn integer(field: Field, image: &[u8]) -> i32 {
     i32::from_le_bytes(field.load(image))

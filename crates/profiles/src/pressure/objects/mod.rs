@@ -79,7 +79,7 @@ impl Profile for Objects {
         self.fields.parameters(image)
     }
 
-    fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+    fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
         self.fields.publish(snapshot, image);
     }
 

@@ -107,7 +107,7 @@ impl Profile for Objects {
         Parameters { polarity: self.fields.polarity.u8(image), resets: self.fields.resets.u8(image) }
     }
 
-    fn publish(&self, snapshot: &Snapshot, image: &mut [u8]) {
+    fn publish(&mut self, snapshot: &Snapshot, image: &mut [u8]) {
         self.fields.state.store(image, [snapshot.state]);
         for (field, count) in self.fields.counts.iter().zip(snapshot.counts) {
             field.store(image, count.to_le_bytes());

@@ -1,0 +1,139 @@
+//! The panel in the image: words of buttons and lamps, the virtual input and output.
+
+use super::values::pair;
+use crate::lift::panel::{BUTTONS, Calls, Contact, LAMPS};
+use crate::lift::word::{Light, Word};
+use canopen::dictionary::{Dictionary, Field};
+
+/// Where the values of the panel are.
+#[derive(Debug)]
+pub(super) struct PanelFields {
+    input: Field,
+    output: Field,
+    /// The words of a button while it is released and while it is pressed.
+    buttons: [[Field; 2]; BUTTONS],
+    /// 6120h: bit 0, the input is used.
+    enabled: [Field; BUTTONS],
+    /// The words that put a lamp out and that light it.
+    lamp_words: [[Field; 2]; LAMPS],
+    /// 6200h: the words that lamps answer to.
+    answers: [Field; LAMPS],
+    lamps: [Field; LAMPS],
+}
+
+/// The lamps beyond what the image says of them.
+#[derive(Debug, Default)]
+pub(super) struct LampStates {
+    pub(super) milliseconds: u32,
+    /// The lifts that have lit a lamp: one of them does not put out what another one has lit.
+    lit_by: [u8; LAMPS],
+}
+
+impl PanelFields {
+    pub(super) const fn new(d: &Dictionary) -> PanelFields {
+        PanelFields {
+            input: d.field(0x6010, 0),
+            output: d.field(0x6011, 0),
+            buttons: [pair(d, 0x2320, 1), pair(d, 0x2320, 3)],
+            enabled: pair(d, 0x6120, 1),
+            lamp_words: [pair(d, 0x2321, 1), pair(d, 0x2321, 3)],
+            answers: pair(d, 0x6200, 1),
+            lamps: pair(d, 0x2322, 1),
+        }
+    }
+
+    /// Puts the next call into the virtual input; whether there was one. A button that is not used has none.
+    #[inline(never)]
+    pub(super) fn next_call(&self, calls: &mut Calls, image: &mut [u8]) -> bool {
+        while let Some(Contact { button, is_pressed }) = calls.next() {
+            let place = usize::from(button);
+            let (Some(words), Some(enabled)) = (self.buttons.get(place), self.enabled.get(place)) else {
+                return false;
+            };
+            let [released, pressed] = [words[0], words[1]].map(|at| word(at, image));
+            if released != pressed && enabled.u32(image) & 1 != 0 {
+                let Word(told) = if is_pressed { pressed } else { released };
+                self.input.set(image, &told);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// 6100h: an input with the public structure has the same word for both of its states, but for the state.
+    #[inline(never)]
+    pub(super) fn take_input(&self, button: usize, bytes: &[u8], image: &mut [u8]) {
+        let (Some([released, pressed]), Ok(word)) = (self.buttons.get(button), bytes.try_into()) else {
+            return;
+        };
+        released.set(image, &Word(word).with_state(false).0);
+        pressed.set(image, &Word(word).with_state(true).0);
+    }
+
+    /// A command in the virtual output asks inputs for their states.
+    #[inline(never)]
+    pub(super) fn answer(&self, calls: &mut Calls, image: &[u8]) {
+        let command = word(self.output, image);
+        for (button, [released, _]) in self.buttons.iter().enumerate() {
+            if word(*released, image).is_asked_by(command) {
+                calls.ask(button);
+            }
+        }
+    }
+
+    /// Does what a virtual output says to the lamps. To be called for every frame that brings one, the same one too: somebody
+    /// else may have changed the lamp since.
+    #[inline(never)]
+    pub(super) fn follow_output(&self, states: &mut LampStates, image: &mut [u8]) {
+        let output = word(self.output, image);
+        let lamps = self.lamp_words.iter().zip(&self.answers).zip(self.lamps.iter().zip(&mut states.lit_by));
+        for (([off, on], answer), (lamp, lit_by)) in lamps {
+            if let Some(Light(light)) = says([*off, *on, *answer], output, lit_by, image) {
+                lamp.set(image, &[light]);
+            }
+        }
+    }
+
+    /// A client has set a lamp: whoever has lit it before has no part in it any more.
+    pub(super) fn forget_lamp(&self, lamp: usize, states: &mut LampStates) {
+        if let Some(lit_by) = states.lit_by.get_mut(lamp) {
+            *lit_by = 0;
+        }
+    }
+
+    /// Which lamps are lit.
+    #[inline(never)]
+    pub(super) fn lit(&self, states: &LampStates, image: &[u8]) -> [bool; LAMPS] {
+        self.lamps.map(|lamp| Light(lamp.u8(image)).is_lit(states.milliseconds))
+    }
+}
+
+/// What an output says to the lamp with these words: one that puts it out, one that lights it, one that it answers to.
+#[inline(never)]
+fn says(words: [Field; 3], output: Word, lit_by: &mut u8, image: &[u8]) -> Option<Light> {
+    let [off, on, own] = words.map(|at| word(at, image));
+    if own != Word::default() && own.is_meant_by(output) {
+        return follow(lit_by, own.lifts() & output.lifts(), output.light());
+    }
+    if off == on {
+        return None;
+    }
+    let light = if output == on { Light::ON } else { Light::OFF };
+    (output == on || output == off).then_some(light)
+}
+
+/// What becomes of a lamp when these lifts light it or put it out; `None` when others still light it.
+fn follow(lit_by: &mut u8, lifts: u8, light: Light) -> Option<Light> {
+    if light == Light::OFF {
+        *lit_by &= !lifts;
+        return (*lit_by == 0).then_some(light);
+    }
+    *lit_by |= lifts;
+    Some(light)
+}
+
+/// Not inlined: this crate is compiled for speed, and what happens at a call is in no hurry.
+#[inline(never)]
+fn word(at: Field, image: &[u8]) -> Word {
+    Word(at.load(image))
+}

@@ -1,0 +1,128 @@
+//! Calls of a lift panel: whether what the bus saw of the buttons tells everything that happened to them.
+
+/// A button that was pressed or released.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Transition {
+    /// When, in microseconds.
+    pub at: u64,
+    /// Which button, from 0.
+    pub button: usize,
+    /// Whether it is pressed now.
+    pub is_pressed: bool,
+}
+
+/// How the transitions of the two buttons of one panel reached the bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Verdict {
+    /// Transitions that were told on their own, in their order.
+    pub told: usize,
+    /// Transitions that a full state covered.
+    pub covered: usize,
+    /// Full states: one word for each button in a row.
+    pub full_states: usize,
+}
+
+/// Checks a log against what happened: every transition is told once, in its order, or is covered by a full state that is
+/// told after it. A word of the log was formed at most `lag` microseconds after the transitions that it knows of.
+///
+/// The log is read with the fewest full states that explain it.
+///
+/// # Errors
+/// The first word that nothing explains, or the number of transitions that the end of the log does not tell.
+pub fn verify(transitions: &[Transition], log: &[Transition], lag: u64) -> Result<Verdict, String> {
+    // What is possible after each word: the next transition to tell, and whether the second half of a full state is due.
+    let mut possible = vec![(0_usize, false, Verdict::default())];
+    for (place, word) in log.iter().enumerate() {
+        let made = transitions.partition_point(|transition| transition.at <= word.at);
+        let known = transitions.partition_point(|transition| transition.at + lag <= word.at);
+        let mut next: Vec<(usize, bool, Verdict)> = vec![];
+        for &(told, is_half, verdict) in &possible {
+            let mut add = |state: (usize, bool, Verdict)| match next
+                .iter_mut()
+                .find(|other| (other.0, other.1) == (state.0, state.1))
+            {
+                Some(other) if other.2.full_states <= state.2.full_states => {}
+                Some(other) => *other = state,
+                None => next.push(state),
+            };
+            let follows = transitions[told..made].first();
+            if follows.is_some_and(|other| (other.button, other.is_pressed) == (word.button, word.is_pressed))
+            {
+                add((told + 1, is_half, Verdict { told: verdict.told + 1, ..verdict }));
+            }
+            let is_so = |at: usize| level(&transitions[..at], word.button) == word.is_pressed;
+            if is_half && word.button == 1 && is_so(told) {
+                add((told, false, verdict));
+            }
+            for at in told.max(known)..=made {
+                // A start may interrupt a full state: another one begins.
+                if word.button == 0 && is_so(at) {
+                    let covered = verdict.covered + at - told;
+                    add((at, true, Verdict { covered, full_states: verdict.full_states + 1, ..verdict }));
+                }
+            }
+        }
+        if next.is_empty() {
+            return Err(format!("word {place} of {}: {word:?} after {possible:?}", log.len()));
+        }
+        possible = next;
+    }
+    let complete = possible.iter().filter(|(told, is_half, _)| *told == transitions.len() && !is_half);
+    let best = complete.map(|(.., verdict)| *verdict).min_by_key(|verdict| verdict.full_states);
+    best.ok_or_else(|| format!("of {} transitions the log ends with {possible:?}", transitions.len()))
+}
+
+/// Whether the button is pressed after these transitions.
+fn level(transitions: &[Transition], button: usize) -> bool {
+    let last = transitions.iter().rev().find(|transition| transition.button == button);
+    last.is_some_and(|transition| transition.is_pressed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn at(at: u64, button: usize, is_pressed: bool) -> Transition {
+        Transition { at, button, is_pressed }
+    }
+
+    const HAPPENED: [Transition; 4] = [at(10, 0, true), at(20, 1, true), at(30, 0, false), at(40, 1, false)];
+
+    fn later(transition: Transition) -> Transition {
+        Transition { at: transition.at + 100, ..transition }
+    }
+
+    #[test]
+    fn what_is_told_once_and_in_order_is_fine() {
+        let log = HAPPENED.map(later);
+        let expected = Verdict { told: 4, covered: 0, full_states: 0 };
+        assert_eq!(verify(&HAPPENED, &log, 100), Ok(expected));
+    }
+
+    #[test]
+    fn a_word_that_is_missing_twice_or_too_early_is_not() {
+        let log = HAPPENED.map(later);
+        for missing in 0..4 {
+            let mut log = log.to_vec();
+            log.remove(missing);
+            assert!(verify(&HAPPENED, &log, 0).is_err(), "without {missing}");
+        }
+        let mut twice = log.to_vec();
+        twice.insert(1, log[0]);
+        assert!(verify(&HAPPENED, &twice, 0).is_err());
+        assert!(verify(&HAPPENED, &[log[1], log[0], log[2], log[3]], 0).is_err(), "another order");
+        assert!(
+            verify(&HAPPENED, &[at(5, 0, true), log[1], log[2], log[3]], 0).is_err(),
+            "before it happened"
+        );
+    }
+
+    #[test]
+    fn a_full_state_covers_what_was_before() {
+        let log = [later(HAPPENED[0]), at(200, 0, false), at(200, 1, false)];
+        let expected = Verdict { told: 1, covered: 3, full_states: 1 };
+        assert_eq!(verify(&HAPPENED, &log, 10), Ok(expected));
+        assert!(verify(&HAPPENED, &log[..2], 10).is_err(), "half of it");
+        assert!(verify(&HAPPENED, &[log[0], log[1], at(200, 1, true)], 10).is_err(), "a wrong state");
+    }
+}
