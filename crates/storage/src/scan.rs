@@ -248,12 +248,16 @@ mod tests {
     fn scan(words_of_record: &[u32]) -> Scan {
         let first = FORMAT.first();
         let mut record = Check::new(first + FORMAT.head());
-        words_of_record.iter().for_each(|word| record.add(*word));
+        for word in words_of_record {
+            record.add(*word);
+        }
         let record = [words_of_record, &[record.commit_word()]].concat();
         let contents = Contents { words: u16::try_from(record.len()).unwrap(), groups: GroupSet(1) };
         let mut words = [&[CLEAN, ERASED, MARK, contents.word().unwrap()], &record[..]].concat();
         let mut check = Check::new(first);
-        words[3..].iter().for_each(|word| check.add(*word));
+        for word in &words[3..] {
+            check.add(*word);
+        }
         words.extend([check.commit_word(), MARK]);
         words.resize(16, ERASED);
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();

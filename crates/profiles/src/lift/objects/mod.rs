@@ -113,7 +113,9 @@ impl Profile for Objects {
         let Snapshot { devices, load, position, .. } = snapshot;
         each(&pressure::objects::SENSOR_BREAK, devices.has(Devices::LOAD) && load.is_broken);
         let has_position = devices.has(Devices::POSITION);
-        position.conditions.faults(&mut |fault, active| each(fault, has_position && active));
+        let conditions =
+            if has_position { position.conditions } else { crate::encoder::Conditions::default() };
+        conditions.faults(each);
     }
 
     fn received(&mut self, rpdo: u16, image: &mut [u8]) {
@@ -125,7 +127,7 @@ impl Profile for Objects {
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         match (entry.index(), entry.sub()) {
             (0x6011, 0) => self.follow_output(image),
-            (0x2322, sub @ 1..) => self.fields.panel.forget_lamp(usize::from(sub) - 1, &mut self.lamps),
+            (0x2322, sub @ 1..) => self.lamps.forget(usize::from(sub) - 1),
             _ => {}
         }
     }
