@@ -118,6 +118,8 @@ fn provoke_in_node(bench: &mut Bench, fault: Fault) {
         "PressureRail" => sample.pressure = 0,
         "TemperatureRail" => sample.temperature = 0,
         "EncoderBreak" => bench.write(0x2100, 1, &[2]).unwrap(),
+        // Further in a millisecond than any encoder can turn.
+        "EncoderPosition" => bench.encoder.counter = 20_000,
         "InputCurrent" => bench.encoder.board.current = Some(1000),
         "InputVoltage" => bench.encoder.board.supply = Some(0),
         "HardwareMemory" => bench.encoder.board.memory_error = true,
