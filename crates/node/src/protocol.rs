@@ -87,7 +87,7 @@ impl Protocol {
         if self.shown != shown {
             self.follow_faults(shown, now);
         }
-        self.device.publish(now, out, |application, image| application.show_values(image))
+        self.device.publish(now, out, NodeApplication::show_values)
     }
 
     /// Does what is due of PDO and SYNC timers.

@@ -61,7 +61,7 @@ impl Calls {
 
     /// What to tell next.
     #[inline(never)]
-    pub fn next(&mut self) -> Option<Contact> {
+    pub fn take_next(&mut self) -> Option<Contact> {
         if let Some(change) = self.changes.pop_front() {
             return Some(change);
         }
@@ -87,7 +87,7 @@ mod tests {
     }
 
     fn all(calls: &mut Calls) -> Vec<Contact> {
-        std::iter::from_fn(|| calls.next()).collect()
+        std::iter::from_fn(|| calls.take_next()).collect()
     }
 
     #[test]

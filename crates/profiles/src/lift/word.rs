@@ -5,8 +5,8 @@
 //! basic function  sub-function lifts     floor    doors    function data
 //! ```
 //!
-//! Lifts are a bit for each, the floor is 00h for the car and FFh for any, doors are bits 0 to 3 (bits 4 to 7 are destination
-//! doors of destination calls), FFh for any. The sources of these facts are in `docs/lift.md`.
+//! Lifts are a bit for each, the floor is 00h for the car and `FFh` for any, doors are bits 0 to 3 (bits 4 to 7 are destination
+//! doors of destination calls), `FFh` for any. The sources of these facts are in `docs/lift.md`.
 
 /// A word of 48 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,8 +63,9 @@ impl Word {
     #[must_use]
     #[inline(never)]
     pub const fn with_state(self, is_set: bool) -> Word {
-        let Word([a, b, c, d, e, data]) = self;
-        Word([a, b, c, d, e, data & !0x03 | is_set as u8])
+        let Word(mut bytes) = self;
+        bytes[5] = bytes[5] & !0x03 | is_set as u8;
+        Word(bytes)
     }
 
     /// Whether `output` is for a lamp that has this word.

@@ -120,7 +120,7 @@ impl Profile for Objects {
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
         match (entry.index(), entry.sub()) {
             (0x6011, 0) => self.follow_output(image),
-            (0x2322, sub @ 1..) => self.fields.panel.forget_lamp(usize::from(sub) - 1, &mut self.lamps),
+            (0x2322, sub @ 1..) => self.lamps.forget(usize::from(sub) - 1),
             _ => {}
         }
     }

@@ -45,7 +45,7 @@ impl PanelFields {
     /// Puts the next call into the virtual input; whether there was one. A button that is not used has none.
     #[inline(never)]
     pub(super) fn next_call(&self, calls: &mut Calls, image: &mut [u8]) -> bool {
-        while let Some(Contact { button, is_pressed }) = calls.next() {
+        while let Some(Contact { button, is_pressed }) = calls.take_next() {
             let place = usize::from(button);
             let (Some(words), Some(enabled)) = (self.buttons.get(place), self.enabled.get(place)) else {
                 return false;
@@ -94,17 +94,19 @@ impl PanelFields {
         }
     }
 
-    /// A client has set a lamp: whoever has lit it before has no part in it any more.
-    pub(super) fn forget_lamp(&self, lamp: usize, states: &mut LampStates) {
-        if let Some(lit_by) = states.lit_by.get_mut(lamp) {
-            *lit_by = 0;
-        }
-    }
-
     /// Which lamps are lit.
     #[inline(never)]
     pub(super) fn lit(&self, states: &LampStates, image: &[u8]) -> [bool; LAMPS] {
         self.lamps.map(|lamp| Light(lamp.u8(image)).is_lit(states.milliseconds))
+    }
+}
+
+impl LampStates {
+    /// A client has set a lamp: whoever has lit it before has no part in it any more.
+    pub(super) fn forget(&mut self, lamp: usize) {
+        if let Some(lit_by) = self.lit_by.get_mut(lamp) {
+            *lit_by = 0;
+        }
     }
 }
 
