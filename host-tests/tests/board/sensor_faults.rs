@@ -8,6 +8,8 @@ use crate::support::{Master, SECOND, START_ALL, TPDO1, world};
 
 /// TPDO 258 of a lift: load and signals.
 const LOAD: u16 = 0x188;
+/// Bit of 2305h: the node is a load measuring unit.
+const LOAD_UNIT: u8 = 1 << 1;
 const OVERLOAD: u8 = 1 << 3;
 /// Bit 0 of 6150h.
 const INVALID: u8 = 1;
@@ -46,6 +48,7 @@ fn after_a_fault_the_first_load_that_is_sent_as_valid_is_right() {
         let mut world = world(&format!("--bitrate 1000 --node 1:lift --pressure const:{}", pascal(kg)));
         let master = Master::join(&mut world);
         world.run_until(SECOND);
+        write(&mut world, &master, (0x2305, 0), &[LOAD_UNIT]);
         for (sub, limit) in (1..).zip([50_u16, 300, 600, 650]) {
             write(&mut world, &master, (0x6483, sub), &limit.to_le_bytes());
         }
