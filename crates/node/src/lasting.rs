@@ -62,14 +62,14 @@ impl LastingRecord {
         for (to, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(now.to_words()) {
             *to = word.to_le_bytes();
         }
-        save(device, &bytes, store)?;
+        save(*device, &bytes, store)?;
         Ok(true)
     }
 }
 
 /// Replaces the device record, and leaves what lies behind it.
 pub(crate) fn replace_device<F: NorFlash>(
-    device: &Device,
+    device: Device,
     store: &mut Store<F>,
 ) -> Result<(), Error<F::Error>> {
     let mut value: Value = [0; DeviceRecord::ROOM];
@@ -84,7 +84,7 @@ fn tail<E>(loaded: Result<Option<Loaded>, Error<E>>, value: &Value) -> Option<&[
     value.get(DeviceRecord::LEN..WHOLE).filter(|_| is_whole)
 }
 
-fn save<F: NorFlash>(device: &Device, tail: &[u8], store: &mut Store<F>) -> Result<(), Error<F::Error>> {
+fn save<F: NorFlash>(device: Device, tail: &[u8], store: &mut Store<F>) -> Result<(), Error<F::Error>> {
     let mut value: Value = [0; DeviceRecord::ROOM];
     value.iter_mut().zip(device.iter().chain(tail)).for_each(|(to, from)| *to = *from);
     let value = value.get(..DeviceRecord::LEN + tail.len()).unwrap_or(&value);
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use storage::{Memory, Pages};
 
-    const PAGES: Pages = Pages::new(0, 16 * 1024);
+    const PAGES: Pages = Pages::new(0, 4 * 1024);
     /// Node 5 at 250 kbit/s.
     const DEVICE: Device = [5, 1, 250, 0];
 
@@ -109,14 +109,13 @@ mod tests {
 
     #[test]
     fn the_first_start_leaves_a_record_and_the_next_ones_find_it() {
-        let mut flash = [0xFF; 32 * 1024];
+        let mut flash = [0xFF; 8 * 1024];
         let view = View::open(Memory(&mut flash[..]), PAGES).unwrap();
         let mut store = Store::prepare(view).unwrap();
         let mut record = LastingRecord::new(None);
         assert!(record.keep(&retained(0), &DEVICE, &mut store).unwrap(), "at once");
         assert!(!record.keep(&retained(9), &DEVICE, &mut store).unwrap());
         assert!(record.keep(&retained(10), &DEVICE, &mut store).unwrap(), "an hour later");
-        drop(store);
         let mut view = View::open(Memory(&flash[..]), PAGES).unwrap();
         let found = LastingRecord::read(&mut view);
         assert_eq!(found, Some([10, 0]));
@@ -127,12 +126,11 @@ mod tests {
 
     #[test]
     fn another_node_id_leaves_it() {
-        let mut flash = [0xFF; 32 * 1024];
+        let mut flash = [0xFF; 8 * 1024];
         let mut store = Store::prepare(View::open(Memory(&mut flash[..]), PAGES).unwrap()).unwrap();
-        replace_device(&DEVICE, &mut store).unwrap();
+        replace_device(DEVICE, &mut store).unwrap();
         LastingRecord::new(None).keep(&retained(7), &DEVICE, &mut store).unwrap();
-        replace_device(&[9, 1, 250, 0], &mut store).unwrap();
-        drop(store);
+        replace_device([9, 1, 250, 0], &mut store).unwrap();
         let mut view = View::open(Memory(&flash[..]), PAGES).unwrap();
         assert_eq!(LastingRecord::read(&mut view), Some([7, 0]));
         assert_eq!(view.device().unwrap().unwrap().node_id(), 9);
@@ -140,7 +138,7 @@ mod tests {
 
     #[test]
     fn flash_without_a_record_has_none() {
-        let flash = [0xFF; 32 * 1024];
+        let flash = [0xFF; 8 * 1024];
         let mut view = View::open(Memory(&flash[..]), PAGES).unwrap();
         assert_eq!(LastingRecord::read(&mut view), None);
     }

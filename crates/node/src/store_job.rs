@@ -48,14 +48,14 @@ impl StoreJob {
     pub fn run<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
         self.pack();
         if let Some(Job::Configure(_) | Job::Setting(_)) = self.job {
-            return lasting::replace_device(&self.device, store).map_err(abort_of);
+            return lasting::replace_device(self.device, store).map_err(|error| abort_of(&error));
         }
         let changes = match self.job {
             None | Some(Job::Configure(_) | Job::Setting(_)) => Vec::new(),
             Some(Job::Store(groups)) => each(groups, |group| self.stored(group)),
             Some(Job::Restore(groups)) => each(groups, |group| Change::Restore(record_of(group))),
         };
-        store.save(&changes).map_err(abort_of)
+        store.save(&changes).map_err(|error| abort_of(&error))
     }
 
     /// Packs what is stored; of what is restored there is nothing to pack.
@@ -74,7 +74,7 @@ impl StoreJob {
     }
 }
 
-fn abort_of<E>(error: Error<E>) -> Abort {
+fn abort_of<E>(error: &Error<E>) -> Abort {
     match error {
         Error::RestartNeeded => Abort::DeviceState,
         _ => Abort::Hardware,
