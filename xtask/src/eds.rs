@@ -6,5 +6,5 @@ use crate::command::{cargo, run};
 
 /// Writes the data sheets and the reference page.
 pub(crate) fn write() -> Result<()> {
-    run(cargo().args(["run", "--quiet", "-p", "eds", "--bin", "generate"]))
+    run(cargo().args(["run", "--quiet", "--profile", "sim", "-p", "eds", "--bin", "generate"]))
 }

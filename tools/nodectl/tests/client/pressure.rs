@@ -77,7 +77,15 @@ impl Pressure {
 
     fn save(&mut self, now: Instant, out: &mut impl Transmit) {
         let mut job = StoreJob::new(Personality::default());
-        if self.protocol.take_job(&mut job) {
+        // As in the firmware, a job may wait for the values of new parameters.
+        let is_taken = (0..4).any(|_| {
+            let is_taken = self.protocol.take_job(&mut job);
+            if !is_taken {
+                let _ = self.protocol.publish(now, out);
+            }
+            is_taken
+        });
+        if is_taken {
             let result = job.run(&mut self.store);
             let _ = self.protocol.finish(&job, result, now, out);
         }

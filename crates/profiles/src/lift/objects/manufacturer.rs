@@ -61,7 +61,9 @@ pub(super) const OBJECTS: &[Object] = &[
     reading(3, "Position unit 3 reading"),
     reading(4, "Position unit 4 reading"),
     // A bit for each: 0 car position units, 1 load measuring unit, 2 input panel unit, 3 output panel unit.
-    parameter(0x2305, 0, "Virtual devices", Type::Unsigned8).limits(0, Devices::ALL.0 as i64).handled(),
+    parameter(0x2305, 0, "Choice of virtual devices", Type::Unsigned8)
+        .limits(0, Devices::ALL.0 as i64)
+        .handled(),
     Object::highest(0x2306, 2, "Sensor references"),
     Object::new(0x2306, 1, "Sensor 1 references", Type::Unsigned8, Access::ReadOnly),
     Object::new(0x2306, 2, "Sensor 2 references", Type::Unsigned8, Access::ReadOnly),
