@@ -4,18 +4,20 @@
 //! | priority | task | why there |
 //! |---|---|---|
 //! | 2 | `receive` | a FIFO of three places fills in 141 us at 1 Mbit/s |
-//! | 1 | `wake` | the time base: ends the sleep of `idle` |
+//! | 1 | `wake`, `bus_error` | the time base, an error on the bus: end the sleep of `idle` |
 //! | 0 | `idle` | everything else, in steps of a few milliseconds at most |
 #![no_std]
 #![no_main]
 
 mod dictionary;
+mod identity;
 mod outbox;
 mod program;
 mod run;
 mod session;
 mod start;
 mod target;
+mod visit;
 
 /// Without a record of the place: the names of all of them would take 3 KiB.
 #[panic_handler]
@@ -30,6 +32,7 @@ mod app {
     use bsp::losses::Losses;
     use bsp::{ReceiveQueue, Receiver, TimeInterrupt, application};
 
+    use crate::identity::Identity;
     use crate::outbox::Outbox;
     use crate::run::Run;
     use crate::session::Session;
@@ -64,8 +67,10 @@ mod app {
         let bus = loader.rest.start();
         let lost: &'static Losses = cx.local.lost;
         let (receiver, frames) = Receiver::new(Fifo::Services, cx.local.queue, lost);
+        let identity = Identity::read(note);
         let run = Run {
-            session: Session::new(reason, note, loader.flash, bus.can),
+            session: Session::new(reason, identity, loader.flash, bus.can),
+            identity,
             frames,
             queue: Outbox::new(),
             transmitter: bus.transmitter,
@@ -84,6 +89,12 @@ mod app {
     #[task(binds = CAN1_RX1, priority = 2, local = [receiver])]
     fn receive(cx: receive::Context) {
         cx.local.receiver.drain();
+    }
+
+    /// An error ends the sleep of a guest.
+    #[task(binds = CAN1_SCE, priority = 1)]
+    fn bus_error(_: bus_error::Context) {
+        bsp::can::acknowledge_error();
     }
 
     #[task(binds = TIM2, priority = 1, local = [time])]

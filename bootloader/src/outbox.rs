@@ -18,6 +18,11 @@ impl Outbox {
         Outbox { frames: [None; CAPACITY], first: 0 }
     }
 
+    /// Drops what waits.
+    pub(crate) fn clear(&mut self) {
+        *self = Outbox::new();
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.frames.iter().all(Option::is_none)
     }

@@ -6,8 +6,10 @@ use bsp::{Alarm, Clock, Frames, StartUpWatchdog, Transmitter};
 use canopen::{Duration, Instant};
 use cortex_m::peripheral::SCB;
 
+use crate::identity::Identity;
 use crate::outbox::Outbox;
 use crate::session::{Session, Then};
+use crate::visit::Visit;
 
 /// Frames wait for a mailbox: no interrupt tells when one is free.
 const TRANSMIT_POLL: Duration = Duration::from_millis(1);
@@ -15,6 +17,7 @@ const TRANSMIT_POLL: Duration = Duration::from_millis(1);
 /// What the loop owns.
 pub(crate) struct Run {
     pub(crate) session: Session,
+    pub(crate) identity: Identity,
     pub(crate) frames: Frames,
     pub(crate) queue: Outbox,
     pub(crate) transmitter: Transmitter,
@@ -26,16 +29,21 @@ pub(crate) struct Run {
 impl Run {
     /// Serves the bus and the flash.
     pub(crate) fn forever(&mut self) -> ! {
-        self.session.join(&mut self.queue);
+        let mut visit = Visit::begin(self.identity, &mut self.session, &mut self.queue);
         loop {
             self.watchdog.feed();
+            visit.go_on(&mut self.session, &mut self.frames, &mut self.queue);
             self.receive();
             let then = self.session.step(&mut self.queue);
-            self.queue.pump(&mut self.transmitter);
+            if visit.is_on_bus() {
+                self.queue.pump(&mut self.transmitter);
+            } else {
+                self.queue.clear();
+            }
             self.led.set(blink(Clock::now()));
             match then {
                 Then::Again => (),
-                Then::Sleep(until) => self.sleep(until),
+                Then::Sleep(until) => self.sleep(visit.due().map_or(until, |due| due.min(until))),
                 Then::Reset(latest) => self.reset(latest),
             }
         }

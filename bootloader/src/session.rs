@@ -3,6 +3,7 @@
 use core::iter::{empty, once};
 
 use bsp::back_off::BackOff;
+use bsp::bit_rate_detection::{Heard, Step};
 use bsp::bit_timing::BitTiming;
 use bsp::bus_state::BusState;
 use bsp::can::Controller;
@@ -10,17 +11,14 @@ use bsp::filters;
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
 use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
-use update::{Next, Phase, Updater};
+use update::{Decision, Next, Phase, Start, Updater};
 
 use crate::dictionary::{DICTIONARY, ROWS};
+use crate::identity::Identity;
 use crate::outbox::Outbox;
 use crate::program::Program;
 use crate::start::Reason;
 use crate::target::TARGET;
-
-/// Where a node without an application is found, whatever it was before.
-const NODE_ID: Option<NodeId> = NodeId::new(126);
-const KBIT: u16 = 250;
 
 /// The loop comes by at least this often: a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -35,8 +33,8 @@ pub(crate) struct Session {
     can: Controller,
     timing: BitTiming,
     back_off: BackOff,
-    /// A copy that was begun before anybody could know where the bus is goes on without it.
-    is_silent: bool,
+    /// What was left to copy at the start is being copied: after that the application starts, if there is one.
+    is_resuming: bool,
     /// The chip is to be reset, at the latest then.
     reset: Option<Instant>,
 }
@@ -55,7 +53,7 @@ pub(crate) enum Then {
 impl Session {
     pub(crate) fn new(
         reason: Reason,
-        note: Option<Handover>,
+        identity: Identity,
         flash: bsp::ProgramFlash,
         can: Controller,
     ) -> Session {
@@ -65,24 +63,40 @@ impl Session {
             // A refusal shows in the status.
             let _ = updater.install();
         }
-        let node_id = note.map_or(NODE_ID, |note| note.node_id.and_then(NodeId::new));
-        let timing =
-            note.map(|note| note.timing).or_else(|| BitTiming::of(KBIT)).unwrap_or(BitTiming::FASTEST);
         Session {
-            device: Device::new(&DICTIONARY, node_id, Program::new(updater, TARGET)),
+            device: Device::new(&DICTIONARY, identity.node_id, Program::new(updater, TARGET)),
             can,
-            timing,
+            timing: identity.timing.unwrap_or(BitTiming::FASTEST),
             back_off: BackOff::default(),
-            is_silent: reason == Reason::Copy && note.is_none(),
+            is_resuming: reason == Reason::Copy,
             reset: None,
         }
     }
 
-    /// Goes on the bus.
-    pub(crate) fn join(&mut self, out: &mut Outbox) {
-        if self.is_silent {
-            return;
+    /// Goes on the bus at a rate, or listens at one. What was to be sent before is not sent any more.
+    pub(crate) fn go(&mut self, step: Step, out: &mut Outbox) {
+        out.clear();
+        match step {
+            Step::Found(timing) => {
+                self.timing = timing;
+                self.join(out);
+                self.can.watch_errors();
+            }
+            Step::Listen(timing) => {
+                self.can.listen(timing);
+                self.can.watch_errors();
+            }
+            Step::Stay => (),
         }
+    }
+
+    /// What the controller has heard since the last call.
+    pub(crate) fn heard(&mut self) -> Heard {
+        self.can.heard()
+    }
+
+    /// Starts the communication.
+    fn join(&mut self, out: &mut Outbox) {
         self.can.start(self.timing, &[]);
         // What follows is left to the next poll.
         let _ = self.device.start(Clock::now(), out);
@@ -102,7 +116,7 @@ impl Session {
     pub(crate) fn step(&mut self, out: &mut Outbox) -> Then {
         let now = Clock::now();
         self.watch_bus(now);
-        let next = self.advance(now, out);
+        let next = self.advance(now);
         let next_call = self.device.poll(now, out);
         let due = self.fulfil(next_call, out);
         match (self.reset, next) {
@@ -114,7 +128,7 @@ impl Session {
     }
 
     /// One step of the update. An image that is good is copied at once: 1F57h is busy until it can be started.
-    fn advance(&mut self, now: Instant, out: &mut Outbox) -> Next {
+    fn advance(&mut self, now: Instant) -> Next {
         let program = self.device.application_mut();
         let mut next = program.updater().poll();
         if program.updater().phase() == Phase::Committed {
@@ -123,19 +137,19 @@ impl Session {
             next = program.updater().next();
         }
         self.publish();
-        if self.is_silent && next == Next::Nothing {
-            self.end_silence(now, out);
+        if self.is_resuming && next == Next::Nothing {
+            self.is_resuming = false;
+            self.start_if_good(now);
         }
         next
     }
 
-    /// A silent copy has come to its end: the application is started, or the bus is told.
-    fn end_silence(&mut self, now: Instant, out: &mut Outbox) {
-        self.is_silent = false;
-        if self.device.application_mut().updater().phase() == Phase::Installed {
+    /// What was left to copy is copied or was refused: the application starts in either case, if it is good.
+    fn start_if_good(&mut self, now: Instant) {
+        let start = Start { stay: false, trial: retained::trial() };
+        let flash = self.device.application_mut().updater().flash();
+        if matches!(update::boot(flash, &TARGET, start), Decision::Start(_)) {
             self.reset = Some(now);
-        } else {
-            self.join(out);
         }
     }
 

@@ -8,7 +8,9 @@ use node::{BitRate, Fault, Identity, LastingRecord, NodeId, Parameters, Personal
 use profiles::board::{ChipThermometer, LASTING_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 
-/// Where the store has nothing to say: node-ID 1, 250 kbit/s, pressure.
+use crate::bit_rate::Rate;
+
+/// Where the store has nothing to say: node-ID 1, pressure, the bit rate of whoever speaks first, 250 kbit/s.
 const DEFAULT_NODE_ID: Option<NodeId> = NodeId::new(1);
 const DEFAULT_BIT_RATE: u16 = 250;
 const PAGES: Pages = Pages::new(0, memory::PARAMETER_PAGE);
@@ -19,6 +21,8 @@ pub(crate) struct Loaded {
     /// Those of the measurement.
     pub(crate) parameters: Parameters,
     pub(crate) setup: Setup,
+    /// The stored bit rate, if one is stored.
+    pub(crate) rate: Rate,
     /// What is wrong with the device record.
     pub(crate) boot_data: Option<&'static Fault>,
     /// Ready to store; `None` where nothing can be stored.
@@ -36,15 +40,17 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
             let setup = setup(None);
             let protocol = make(place, &setup);
             let parameters = protocol.load_defaults();
-            return Loaded { protocol, parameters, setup, boot_data: None, store: None, lasting: None };
+            let rate = Rate::Missing;
+            return Loaded { protocol, parameters, setup, rate, boot_data: None, store: None, lasting: None };
         }
     };
     let Identity { record, fault } = Identity::read(&mut view);
     let setup = setup(record);
+    let rate = record.map_or(Rate::Missing, |_| Rate::of(setup.bit_rate));
     let protocol = make(place, &setup);
     let parameters = protocol.load(&mut view);
     let lasting = LastingRecord::read(&mut view);
-    Loaded { protocol, parameters, setup, boot_data: fault, store: prepare(view), lasting }
+    Loaded { protocol, parameters, setup, rate, boot_data: fault, store: prepare(view), lasting }
 }
 
 /// Not inlined: the stack on which the value is made is free again for what reads the flash.

@@ -65,7 +65,6 @@ mod app {
     use node::{LastingRecord, Measurement, Parameters, Protocol, StoreJob};
     use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
-    use crate::bit_rate::Rate;
     use crate::configuration::Loaded;
     use crate::position_inputs::PositionReader;
     use crate::process::Process;
@@ -114,7 +113,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, boot_data, store, lasting } =
+        let Loaded { protocol, parameters, setup, rate, boot_data, store, lasting } =
             configuration::load(board.parameters, cx.local.protocol);
         let job = cx.local.job.write(StoreJob::new(setup.personality));
         let storage = StorageTask::new(store, job, LastingRecord::new(lasting));
@@ -153,7 +152,7 @@ mod app {
             process: Process::new(process_frames, process_alarm, board.lamps, lost),
             services: Services::new(
                 board.can,
-                Rate::of(setup.bit_rate),
+                rate,
                 service_frames,
                 lost,
                 services_alarm,

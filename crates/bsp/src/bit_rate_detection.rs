@@ -21,7 +21,9 @@ pub enum Heard {
     Silence,
     /// A frame without an error.
     Frame,
-    /// An error.
+    /// A frame of our own that nobody has acknowledged.
+    Nobody,
+    /// Any other error.
     Error,
 }
 
@@ -62,7 +64,7 @@ impl Detector {
         match heard {
             Heard::Frame => Step::Found(self.timing()),
             Heard::Silence if now < self.until => Step::Stay,
-            Heard::Silence | Heard::Error => self.next(now),
+            Heard::Silence | Heard::Nobody | Heard::Error => self.next(now),
         }
     }
 

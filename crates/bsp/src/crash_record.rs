@@ -1,8 +1,6 @@
 //! The crash record: a few words in RAM that no start-up code touches. A crash leaves the record for the next start; a CRC tells
 //! the record from what RAM holds by chance.
 
-use crate::checksum::SMALL;
-
 const MAGIC: u32 = 0x4352_5348;
 const FAULT: u32 = 1;
 const PANIC: u32 = 2;
@@ -89,7 +87,7 @@ impl Crash {
         let (kind, content) = self.content();
         let body = [MAGIC, kind].into_iter().chain(content);
         words.iter_mut().zip(body).for_each(|(to, from)| *to = from);
-        words[WORDS - 1] = checksum(&words);
+        words[WORDS - 1] = check(&words);
         words
     }
 
@@ -97,7 +95,7 @@ impl Crash {
     #[must_use]
     pub fn open(words: &Sealed) -> Option<Crash> {
         let [MAGIC, kind, content @ .., sum] = words else { return None };
-        if *sum != checksum(words) {
+        if *sum != check(words) {
             return None;
         }
         match *kind {
@@ -145,8 +143,8 @@ fn interrupt([number, ..]: &Content) -> i16 {
 }
 
 /// The CRC of all words but the last.
-fn checksum(words: &Sealed) -> u32 {
-    let mut digest = SMALL.digest();
+fn check(words: &Sealed) -> u32 {
+    let mut digest = checksum::begin();
     words.iter().take(WORDS - 1).for_each(|word| digest.update(&word.to_le_bytes()));
     digest.finalize()
 }

@@ -1,14 +1,12 @@
 //! The serial number of 1018h sub-index 4 from the unique identifier of the chip.
 
-use crate::checksum::SMALL;
-
 /// 32 bits of the 96 of the unique identifier (RM0390, 34.1): its CRC-32.
 ///
 /// Two of a thousand boards share one with a probability of about 1 in 10,000. Where that is too much the production
 /// line must store a number of its own.
 #[must_use]
 pub fn serial_number(unique_id: &[u8; 12]) -> u32 {
-    SMALL.checksum(unique_id)
+    checksum::of(unique_id)
 }
 
 #[cfg(test)]

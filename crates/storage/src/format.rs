@@ -1,6 +1,6 @@
 //! The words of a page; the picture is in the documentation of the crate. All numbers are little-endian.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+use checksum::Digest;
 
 use crate::group::GroupSet;
 
@@ -79,9 +79,6 @@ pub(crate) fn in_words(len: u32) -> u32 {
     len.wrapping_add(WORD - 1) & !(WORD - 1)
 }
 
-/// A reference, as the linker keeps one of equal constants of several crates, but every static: the table takes 1 KiB.
-static CRC: &Crc<u32> = &Crc::<u32>::new(&CRC_32_ISO_HDLC);
-
 /// A number beside its complement. A torn word has some zeros of the target missing, in one half or the other, so
 /// it is never another valid number; nor is a word with an odd count of flipped bits.
 pub(crate) fn guarded(value: u16) -> u32 {
@@ -120,12 +117,12 @@ pub(crate) fn unguarded(word: u32) -> Option<u16> {
 }
 
 /// The running check of a transaction or of a record.
-pub(crate) struct Check(Digest<'static, u32>);
+pub(crate) struct Check(Digest);
 
 impl Check {
     /// Begins with the place in the page, so that what is found elsewhere, as a copy in a value, is none.
     pub(crate) fn new(at: u32) -> Check {
-        let mut check = Check(CRC.digest());
+        let mut check = Check(checksum::begin());
         check.add(at);
         check
     }
@@ -166,10 +163,10 @@ mod tests {
     fn a_commit_word_never_reads_as_erased() {
         let mut check = Check::new(8);
         // After the word that is what the register holds, the register is 0 and the CRC all ones.
-        let word = !CRC.checksum(&8_u32.to_le_bytes());
+        let word = !checksum::of(&8_u32.to_le_bytes());
         check.add(word);
         let bytes = [8_u32.to_le_bytes(), word.to_le_bytes()].concat();
-        assert_eq!(CRC.checksum(&bytes), ERASED);
+        assert_eq!(checksum::of(&bytes), ERASED);
         assert_eq!(check.commit_word(), 0);
     }
 }

@@ -107,6 +107,7 @@ mod device;
 mod error;
 mod format;
 mod group;
+mod lookup;
 mod memory;
 #[cfg(feature = "mock")]
 pub mod mock;
@@ -120,6 +121,7 @@ mod writer;
 pub use device::DeviceRecord;
 pub use error::Error;
 pub use group::{Change, Group, Health, Loaded};
+pub use lookup::device_record;
 pub use memory::Memory;
 pub use page::Pages;
 pub use provision::{provision, read};

@@ -86,6 +86,13 @@ pub(crate) struct StoredRecord {
     pub(crate) end: u32,
 }
 
+impl StoredRecord {
+    /// Whether it gives the group a value of some bytes.
+    pub(crate) fn is_value_of(&self, group: Group) -> bool {
+        self.group == Some(group) && self.kind == KIND_VALUE && self.len > 0
+    }
+}
+
 impl Page {
     pub(crate) fn word<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<u32, F::Error> {
         let mut bytes = [0; WORD as usize];

@@ -141,7 +141,7 @@ fn arrange(a: Scan, b: Scan) -> (Scan, Scan) {
 }
 
 /// Whether generation `x` comes after `y`. They are never far apart, so this holds across the wrap.
-fn follows(x: u16, y: u16) -> bool {
+pub(crate) fn follows(x: u16, y: u16) -> bool {
     x.wrapping_sub(y).cast_signed() > 0
 }
 

@@ -2,7 +2,6 @@
 
 use core::fmt;
 
-use crate::checksum;
 use crate::refusal::Refusal;
 
 /// Bytes of the header (region `IMAGE_HEADER` of memory.x).

@@ -2,8 +2,9 @@
 
 use core::ops::Range;
 
+use checksum::Digest;
+
 use crate::area::Area;
-use crate::checksum::{self, Digest};
 use crate::flash::{Flash, read_step};
 use crate::header::{HEADER, HEADER_LEN, Header};
 use crate::key::KEY_LEN;

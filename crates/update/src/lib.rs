@@ -50,7 +50,6 @@ extern crate std;
 
 mod area;
 mod boot;
-mod checksum;
 mod commit;
 mod copy;
 mod erase;

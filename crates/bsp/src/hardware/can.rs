@@ -86,14 +86,20 @@ impl Controller {
     /// What has been heard since the last call, but for frames that wait in a FIFO; acknowledges the error interrupt, which would
     /// come again and again otherwise.
     pub fn heard(&mut self) -> Heard {
-        registers().msr().write(|w| w.erri().set_bit());
+        acknowledge_error();
         let code = registers().esr().read().lec().bits();
         self.mark_error_code();
         match code {
             NO_ERROR => Heard::Frame,
             UNTOUCHED => Heard::Silence,
+            NO_ACKNOWLEDGE => Heard::Nobody,
             _ => Heard::Error,
         }
+    }
+
+    /// From now on, until the next start, every error raises the error interrupt.
+    pub fn watch_errors(&mut self) {
+        registers().ier().modify(|_, w| w.lecie().set_bit());
     }
 
     /// The hardware never sets the code to this value, so any other one is new (RM0390, 30.9.2, LEC).
@@ -113,7 +119,7 @@ impl Controller {
 
     /// State of the fault confinement; acknowledges the error interrupt.
     pub fn state(&mut self) -> BusState {
-        registers().msr().write(|w| w.erri().set_bit());
+        acknowledge_error();
         BusState::from_esr(registers().esr().read().bits())
     }
 
@@ -125,15 +131,21 @@ impl Controller {
                 | Interrupts::ERROR,
         );
         // What counts as an error for that last one, which bxcan does not know.
-        registers().ier().modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit());
+        registers().ier().modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit().lecie().clear_bit());
     }
+}
+
+/// Acknowledges the error interrupt, which comes again and again until then. What has happened can still be read.
+pub fn acknowledge_error() {
+    registers().msr().write(|w| w.erri().set_bit());
 }
 
 /// How often to look for an acknowledge that comes at once, if at all.
 const ACKNOWLEDGE_POLLS: u32 = 1_000;
 
-/// Values of LEC (RM0390, 30.9.2): a frame without an error; set by software.
+/// Values of LEC (RM0390, 30.9.2): a frame without an error; one that nobody acknowledged; set by software.
 const NO_ERROR: u8 = 0;
+const NO_ACKNOWLEDGE: u8 = 3;
 const UNTOUCHED: u8 = 7;
 
 fn fifo(fifo: Fifo) -> bxcan::Fifo {

@@ -4,8 +4,6 @@ use core::ops::Range;
 
 use update::{HEADER_LEN, Header};
 
-use crate::checksum::FAST;
-
 unsafe extern "C" {
     static _stack_start: u8;
     static _stack_end: u8;
@@ -47,6 +45,12 @@ pub fn parameters() -> Range<u32> {
     unsafe { region(&_parameters_start, &_parameters_end) }
 }
 
+/// What the parameter store holds, for the bootloader: nobody programs these pages while it runs.
+pub fn parameter_pages() -> &'static [u8; 2 * PARAMETER_PAGE as usize] {
+    // SAFETY: the region is as long (memory.x): flash, readable whatever it holds, and in the bootloader nobody programs it.
+    unsafe { &*(parameters().start as *const _) }
+}
+
 /// What an update may erase and program: the application with its header, and staging.
 pub(super) fn updatable() -> Range<u32> {
     // SAFETY: only the addresses are used.
@@ -72,7 +76,7 @@ fn own_crc() -> u32 {
     let len = end.saturating_sub(start) as usize;
     // SAFETY: the linker puts the program there: flash, readable for ever, and nobody programs it while it runs.
     let program = unsafe { core::slice::from_raw_parts(start as *const u8, len) };
-    FAST.checksum(program)
+    checksum::of(program)
 }
 
 /// Size of each of the two pages: a sector (memory.x).

@@ -2,6 +2,7 @@
 
 mod damage;
 mod figures;
+mod lookup;
 mod model;
 mod ordinary;
 mod power_cuts;

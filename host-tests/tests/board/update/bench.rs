@@ -8,6 +8,7 @@ use emulator::Machine;
 use host_tests::sdo::{Channel, Client, Failure};
 use sign::image::Image;
 use sign::product;
+use sim::port::Adapter;
 use sim::world::World;
 use update::{Description, Status, Version};
 
@@ -37,6 +38,7 @@ const STEP: Time = Time::from_micros(100);
 pub(super) struct Bench {
     pub(super) world: World,
     master: Master,
+    bit_rate: u32,
     pub(super) node: u8,
     pub(super) slowest: Time,
     sent: Time,
@@ -50,7 +52,7 @@ impl Bench {
     /// A master on the bus of a world that is there already.
     pub(super) fn with(mut world: World, bit_rate: u32, node: u8) -> Bench {
         let master = Master::join_at(&mut world, bit_rate);
-        Bench { world, master, node, slowest: Time::ZERO, sent: Time::ZERO }
+        Bench { world, master, bit_rate, node, slowest: Time::ZERO, sent: Time::ZERO }
     }
 
     /// A node of version A that has run for a second at 1 Mbit/s.
@@ -73,6 +75,17 @@ impl Bench {
         let before = self.world.now();
         what(self);
         self.world.now().since(before).as_secs_f64()
+    }
+
+    /// Of the master, in bit/s.
+    pub(super) fn bit_rate(&self) -> u32 {
+        self.bit_rate
+    }
+
+    /// The master leaves the bus, or comes back.
+    pub(super) fn attach(&mut self, is_there: bool) {
+        let adapter = Adapter { bit_rate: self.bit_rate, silent: false };
+        self.world.port(self.master.port).attach(is_there.then_some(adapter));
     }
 
     pub(super) fn power_cycle(&mut self) {

@@ -1,5 +1,7 @@
-//! CRC-32 (ISO HDLC, the one of Ethernet and zip), four bits at a time. Crate `crc` has a table of 1 KiB, for which the
-//! bootloader has no room, or none: then the CRC of an application takes 0.1 s at every start.
+//! CRC-32 (ISO HDLC, the one of Ethernet and zip), four bits at a time. Crate `crc` has a table of 1 KiB, for which an image
+//! has no room, or none: then the CRC of an application takes 0.1 s at every start.
+#![no_std]
+#![forbid(unsafe_code)]
 
 /// The polynomial 04C1 1DB7h with its bits reversed.
 const POLYNOMIAL: u32 = 0xEDB8_8320;
@@ -24,17 +26,18 @@ static TABLE: [u32; 16] = {
 
 /// A CRC in the making.
 #[derive(Clone, Debug)]
-pub(crate) struct Digest(u32);
+pub struct Digest(u32);
 
 /// The CRC of nothing yet.
-pub(crate) fn begin() -> Digest {
+#[must_use]
+pub fn begin() -> Digest {
     Digest(u32::MAX)
 }
 
 impl Digest {
     /// Goes on with these bytes.
     #[inline(never)]
-    pub(crate) fn update(&mut self, bytes: &[u8]) {
+    pub fn update(&mut self, bytes: &[u8]) {
         self.0 = bytes.iter().fold(self.0, |crc, byte| {
             let crc = crc ^ u32::from(*byte);
             half(half(crc))
@@ -42,7 +45,8 @@ impl Digest {
     }
 
     /// The CRC.
-    pub(crate) fn finalize(self) -> u32 {
+    #[must_use]
+    pub fn finalize(self) -> u32 {
         !self.0
     }
 }
@@ -54,7 +58,8 @@ fn half(crc: u32) -> u32 {
 }
 
 /// The CRC of `bytes`.
-pub(crate) fn of(bytes: &[u8]) -> u32 {
+#[must_use]
+pub fn of(bytes: &[u8]) -> u32 {
     let mut digest = begin();
     digest.update(bytes);
     digest.finalize()

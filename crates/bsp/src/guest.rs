@@ -1,0 +1,202 @@
+//! How a node that is not sure of the bit rate comes on a bus: as a guest, who hurts nobody's frames.
+//!
+//! | state | on the bus | it ends with |
+//! |---|---|---|
+//! | trying | yes, at a rate that was stored; nothing was understood yet | a frame that is understood: it stays. The first error: it searches |
+//! | searching | listens, one rate after the other | a frame that is understood: it stays, at that rate. Long silence: it rests |
+//! | resting | listens at 250 kbit/s | a frame that is understood: it stays. An error and no such frame soon: it searches |
+//! | staying | yes | nothing |
+//!
+//! A guest without a stored rate says nothing before somebody else does: a bus may be silent because its nodes wait. A frame that
+//! nobody acknowledges is sent again and again, by a sender that soon is error passive; then the guest understands the frame too.
+
+use canopen::{Duration, Instant};
+
+use crate::bit_rate_detection::{Detector, Heard, Step};
+use crate::bit_timing::BitTiming;
+
+/// Where a node without a bit rate waits on a silent bus, in kbit/s (as CMP 8271 does).
+const ASSUMED: u16 = 250;
+/// So long the frame of a sender that is alone may look like an error: 16 attempts of 135 bits and an error flag at 250 kbit/s
+/// make the sender error passive.
+const ATTEMPTS: Duration = Duration::from_millis(12);
+/// A search that hears nothing for so long has begun with a disturbance. Longer than two rounds at the longest patience of a rate.
+const SEARCH: Duration = Duration::from_millis(25_000);
+
+/// The guest.
+#[derive(Debug)]
+pub struct Guest(State);
+
+#[derive(Debug)]
+enum State {
+    Trying,
+    /// When something was heard last; `None` for a search that never rests.
+    Searching(Detector, Option<Instant>),
+    /// Since the first error.
+    Resting(Option<Instant>),
+    Staying,
+}
+
+impl Guest {
+    /// A guest that begins at a rate that was stored ([`Step::Found`]), or listens ([`Step::Listen`]); the caller does that.
+    #[must_use]
+    pub fn new(stored: Option<BitTiming>) -> (Guest, Step) {
+        match stored {
+            Some(timing) => (Guest(State::Trying), Step::Found(timing)),
+            None => (Guest(State::Resting(None)), Step::Listen(assumed())),
+        }
+    }
+
+    /// A guest that searches until it understands a frame, whatever the silence (automatic detection). It listens first.
+    #[must_use]
+    pub fn searching(now: Instant) -> (Guest, Step) {
+        let (_, step) = search(now);
+        (Guest(State::Searching(Detector::new(now), None)), step)
+    }
+
+    /// Whether it only listens.
+    #[must_use]
+    pub fn is_listening(&self) -> bool {
+        matches!(self.0, State::Searching(..) | State::Resting(_))
+    }
+
+    /// Whether it has understood a frame and stays as it is.
+    #[must_use]
+    pub fn is_staying(&self) -> bool {
+        matches!(self.0, State::Staying)
+    }
+
+    /// Takes what was heard since the last step: go on as before, listen at a rate, or go on the bus ([`Step::Found`]).
+    pub fn step(&mut self, heard: Heard, now: Instant) -> Step {
+        let (state, step) = match (&mut self.0, heard) {
+            (State::Staying, _)
+            | (State::Trying | State::Resting(None), Heard::Silence)
+            | (State::Trying, Heard::Nobody) => return Step::Stay,
+            (State::Trying, Heard::Frame) => (State::Staying, Step::Stay),
+            (State::Trying, Heard::Error) => search(now),
+            (State::Resting(_), Heard::Frame) => (State::Staying, Step::Found(assumed())),
+            (State::Resting(None), _) => (State::Resting(Some(now)), Step::Stay),
+            (State::Resting(Some(since)), _) if now < *since + ATTEMPTS => return Step::Stay,
+            (State::Resting(_), _) => search(now),
+            (State::Searching(_, Some(last)), Heard::Silence) if now >= *last + SEARCH => rest(),
+            (State::Searching(detector, last), heard) => {
+                *last = last.map(|last| if heard == Heard::Silence { last } else { now });
+                match detector.step(heard, now) {
+                    Step::Found(timing) => (State::Staying, Step::Found(timing)),
+                    step => return step,
+                }
+            }
+        };
+        self.0 = state;
+        step
+    }
+}
+
+fn search(now: Instant) -> (State, Step) {
+    let detector = Detector::new(now);
+    let timing = detector.timing();
+    (State::Searching(detector, Some(now)), Step::Listen(timing))
+}
+
+fn rest() -> (State, Step) {
+    (State::Resting(None), Step::Listen(assumed()))
+}
+
+fn assumed() -> BitTiming {
+    BitTiming::of(ASSUMED).unwrap_or(BitTiming::FASTEST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: Instant = Instant(0);
+    const LATER: Instant = Instant(2_000_000);
+
+    fn at(kbit: u16) -> BitTiming {
+        BitTiming::of(kbit).unwrap()
+    }
+
+    fn with(stored: Option<u16>) -> Guest {
+        Guest::new(stored.map(at)).0
+    }
+
+    #[test]
+    fn a_stored_rate_is_used_at_once_and_holds_with_the_first_frame() {
+        let (mut guest, step) = Guest::new(Some(at(500)));
+        assert_eq!(step, Step::Found(at(500)));
+        assert_eq!(guest.step(Heard::Silence, LATER), Step::Stay);
+        assert_eq!(guest.step(Heard::Nobody, LATER), Step::Stay, "nobody is there yet");
+        assert!(!guest.is_staying() && !guest.is_listening());
+        assert_eq!(guest.step(Heard::Frame, LATER), Step::Stay);
+        assert!(guest.is_staying());
+        assert_eq!(guest.step(Heard::Error, LATER), Step::Stay);
+    }
+
+    #[test]
+    fn a_stored_rate_that_does_not_fit_is_left_with_the_first_error() {
+        let mut guest = with(Some(500));
+        assert_eq!(guest.step(Heard::Error, NOW), Step::Listen(at(250)));
+        assert!(guest.is_listening());
+        assert_eq!(guest.step(Heard::Error, NOW), Step::Listen(at(500)));
+        assert_eq!(guest.step(Heard::Error, NOW), Step::Listen(at(125)));
+        assert_eq!(guest.step(Heard::Frame, NOW), Step::Found(at(125)));
+        assert!(guest.is_staying());
+    }
+
+    #[test]
+    fn without_a_rate_it_waits_at_250_kbit_for_somebody_to_speak() {
+        let (mut guest, step) = Guest::new(None);
+        assert_eq!(step, Step::Listen(at(250)));
+        for seconds in 0..1_000 {
+            assert_eq!(guest.step(Heard::Silence, Instant(seconds * 1_000_000)), Step::Stay);
+            assert!(guest.is_listening());
+        }
+        assert_eq!(guest.step(Heard::Frame, LATER), Step::Found(at(250)));
+        assert!(guest.is_staying());
+    }
+
+    #[test]
+    fn a_master_that_is_alone_is_understood_once_it_is_error_passive() {
+        let mut guest = with(None);
+        for millis in 0..10 {
+            assert_eq!(guest.step(Heard::Error, Instant(millis * 1_000)), Step::Stay);
+        }
+        assert_eq!(guest.step(Heard::Frame, Instant(10_000)), Step::Found(at(250)));
+    }
+
+    #[test]
+    fn a_bus_at_another_rate_is_found_from_rest() {
+        let mut guest = with(None);
+        assert_eq!(guest.step(Heard::Error, NOW), Step::Stay);
+        assert_eq!(guest.step(Heard::Silence, Instant(11_000)), Step::Stay);
+        assert_eq!(guest.step(Heard::Silence, Instant(12_000)), Step::Listen(at(250)));
+        assert_eq!(guest.step(Heard::Error, NOW), Step::Listen(at(500)));
+        assert_eq!(guest.step(Heard::Frame, NOW), Step::Found(at(500)));
+    }
+
+    #[test]
+    fn a_search_that_was_asked_for_never_speaks_and_never_rests() {
+        let (mut guest, step) = Guest::searching(NOW);
+        assert_eq!(step, Step::Listen(at(250)));
+        for i in 0..10_000_u64 {
+            let step = guest.step(Heard::Silence, Instant(i * 10_000));
+            assert!(!matches!(step, Step::Found(_)));
+            assert!(matches!(guest.0, State::Searching(..)));
+        }
+        assert!(matches!(guest.step(Heard::Frame, Instant(100_000_000)), Step::Found(_)));
+    }
+
+    /// A pulse on the line is no bus.
+    #[test]
+    fn a_search_that_hears_nothing_comes_to_rest_and_does_not_speak() {
+        let mut guest = with(Some(500));
+        assert_eq!(guest.step(Heard::Error, NOW), Step::Listen(at(250)));
+        let rests = (0..3_000_u64).map(|i| Instant(i * 10_000)).find(|&now| {
+            let step = guest.step(Heard::Silence, now);
+            assert!(!matches!(step, Step::Found(_)));
+            matches!(guest.0, State::Resting(_))
+        });
+        assert_eq!(rests, Some(Instant(25_000_000)));
+    }
+}
