@@ -21,9 +21,7 @@ pub(crate) struct Identity {
 impl Identity {
     pub(crate) fn read(note: Option<Handover>) -> Identity {
         match note {
-            Some(note) => {
-                Identity { node_id: note.node_id.and_then(NodeId::new), timing: Some(note.timing) }
-            }
+            Some(note) => Identity { node_id: note.node_id.and_then(NodeId::new), timing: Some(note.timing) },
             None => stored().map_or(Identity { node_id: NODE_ID, timing: None }, |record| Identity {
                 node_id: NodeId::new(record.node_id()),
                 timing: BitTiming::of(record.bit_rate_kbit()),

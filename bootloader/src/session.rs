@@ -7,7 +7,7 @@ use bsp::bit_rate_detection::{Heard, Step};
 use bsp::bit_timing::BitTiming;
 use bsp::bus_state::BusState;
 use bsp::can::Controller;
-use bsp::filters;
+use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
 use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
@@ -95,13 +95,12 @@ impl Session {
         self.can.heard()
     }
 
-    /// Starts the communication.
+    /// Starts the communication. The controller joins last: what it acknowledges is answered.
     fn join(&mut self, out: &mut Outbox) {
-        self.can.start(self.timing, &[]);
         // What follows is left to the next poll.
         let _ = self.device.start(Clock::now(), out);
+        self.can.start(self.timing, &self.banks());
         self.note();
-        self.filter();
     }
 
     /// A frame has come: each of the two takes what is its own.
@@ -201,10 +200,13 @@ impl Session {
         }
     }
 
-    /// NMT, SDO and LSS, all of them to FIFO 1: there is nothing else, and a client waits for its answers.
     fn filter(&mut self) {
+        self.can.set_filters(&self.banks());
+    }
+
+    /// NMT, SDO and LSS, all of them to FIFO 1: there is nothing else, and a client waits for its answers.
+    fn banks(&self) -> Banks {
         let ids = once(CanId::NMT).chain(self.device.service_ids());
-        let banks = filters::pack(empty(), ids.map(CanId::get));
-        self.can.set_filters(&banks);
+        filters::pack(empty(), ids.map(CanId::get))
     }
 }

@@ -38,8 +38,14 @@ impl Visit {
         let heard = session.heard();
         let step = self.0.step(if has_frame { Heard::Frame } else { heard }, Clock::now());
         if step != Step::Stay {
-            session.go(step, out);
-            drop_all(frames);
+            // A frame of the old rate may end now; whoever goes on the bus answers all that comes from now on.
+            if matches!(step, Step::Listen(_)) {
+                session.go(step, out);
+                drop_all(frames);
+            } else {
+                drop_all(frames);
+                session.go(step, out);
+            }
         }
     }
 

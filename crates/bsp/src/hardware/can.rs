@@ -131,7 +131,9 @@ impl Controller {
                 | Interrupts::ERROR,
         );
         // What counts as an error for that last one, which bxcan does not know.
-        registers().ier().modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit().lecie().clear_bit());
+        registers()
+            .ier()
+            .modify(|_, w| w.ewgie().set_bit().epvie().set_bit().bofie().set_bit().lecie().clear_bit());
     }
 }
 

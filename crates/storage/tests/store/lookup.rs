@@ -21,7 +21,7 @@ fn save(flash: &mut Flash, node_id: u8) -> bool {
 fn there_is_none_where_none_was_saved() {
     let mut flash = Flash::new(1024, 0);
     assert_eq!(device_record(&mut flash, PAGES), None);
-    start(&mut flash, PAGES).unwrap().save(&as_changes(&[set(Group::Application, 1, 8)])).unwrap();
+    start(&mut flash, PAGES).unwrap().save(&as_changes(&vec![set(Group::Application, 1, 8)])).unwrap();
     assert_eq!(device_record(&mut flash, PAGES), None);
     assert_eq!(device_record(&mut flash, Pages::new(0, 4096)), None, "pages beyond the flash");
 }

@@ -2,6 +2,7 @@
 //! update brings the damaged one back.
 
 use bsp::update_layout::LAYOUT;
+use host_tests::sdo::Failure;
 use storage::{DeviceRecord, Memory, Pages};
 
 use super::bench::{BOOT, Bench, CONTROL, DEVICE_TYPE, HEADER, version_a};
@@ -191,8 +192,13 @@ fn on_a_silent_bus_the_node_is_126_at_250_kbit_whenever_a_master_comes() {
         let now = bench.world.now();
         bench.machine().power_on(now);
         bench.run(SECOND * seconds);
-        assert_eq!((bench.world.summary(1.0, 0).bus.frames, errors(&bench)), (frames, before), "it is silent");
+        assert_eq!(
+            (bench.world.summary(1.0, 0).bus.frames, errors(&bench)),
+            (frames, before),
+            "it is silent"
+        );
         bench.attach(true);
+        assert_eq!(bench.read(DEVICE_TYPE), Err(Failure::Silence), "the first frame tells the bit rate");
         assert_eq!(bench.read(DEVICE_TYPE), Ok(BOOT.to_vec()), "after {seconds} s");
     }
 }
