@@ -73,11 +73,10 @@ impl Guest {
             | (State::Trying | State::Resting(None), Heard::Silence)
             | (State::Trying, Heard::Nobody) => return Step::Stay,
             (State::Trying, Heard::Frame) => (State::Staying, Step::Stay),
-            (State::Trying, Heard::Error) => search(now),
             (State::Resting(_), Heard::Frame) => (State::Staying, Step::Found(assumed())),
             (State::Resting(None), _) => (State::Resting(Some(now)), Step::Stay),
             (State::Resting(Some(since)), _) if now < *since + ATTEMPTS => return Step::Stay,
-            (State::Resting(_), _) => search(now),
+            (State::Trying, Heard::Error) | (State::Resting(_), _) => search(now),
             (State::Searching(_, Some(last)), Heard::Silence) if now >= *last + SEARCH => rest(),
             (State::Searching(detector, last), heard) => {
                 *last = last.map(|last| if heard == Heard::Silence { last } else { now });

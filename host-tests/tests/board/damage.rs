@@ -13,6 +13,8 @@ const SIZE: usize = 0x8000;
 const EMCY: u16 = 0x080;
 const BOOT_UP: u16 = 0x700;
 const TPDO1: u16 = 0x180;
+/// The heartbeat of another node.
+const SOMEBODY: u16 = 0x77F;
 /// First byte of the error field: what holds instead of what was stored last.
 const OLDER: u8 = 1;
 const DEFAULTS: u8 = 2;
@@ -147,8 +149,15 @@ impl Examiner {
         self.world.machine(0).power_off();
         self.world.machine(0).power_on(now);
         self.world.take_frames();
+        // A node without a record listens until somebody speaks.
+        for round in 1..=50 {
+            self.world.run_until(now + Time::from_millis(20 * round));
+            self.master.send(&mut self.world, SOMEBODY, &[5]);
+        }
         self.world.run_until(now + SECOND * 2);
-        let frames: Vec<_> = self.world.take_frames().iter().map(|sent| said(&sent.frame)).collect();
+        let frames = self.world.take_frames();
+        let frames = frames.iter().map(|sent| said(&sent.frame)).filter(|(id, _)| *id != SOMEBODY);
+        let frames: Vec<_> = frames.collect();
         assert_eq!(frames.first(), Some(&(BOOT_UP + u16::from(node), vec![0])), "{frames:x?}");
         let emergencies = frames.iter().filter(|(id, _)| *id == EMCY + u16::from(node));
         let told = emergencies.map(|(_, data)| (u16::from_le_bytes([data[0], data[1]]), data[3])).collect();
