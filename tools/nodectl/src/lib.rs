@@ -18,6 +18,7 @@
 pub mod acquisition;
 pub mod bus;
 mod catalogue;
+pub mod check;
 pub mod cli;
 pub mod configuration;
 pub mod heartbeat;
@@ -27,6 +28,7 @@ pub mod meaning;
 mod network;
 pub mod nmt;
 pub mod object;
+mod pdo_parameters;
 pub mod quantity;
 pub mod scan;
 pub mod sdo;
@@ -38,4 +40,4 @@ pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;
-pub use network::Network;
+pub use network::{Logged, Network};
