@@ -55,7 +55,7 @@ fn after_a_cut_it_is_the_old_or_the_new_one_and_what_the_store_says_later() {
                 flash.power_up();
                 let found = device_record(&mut flash, PAGES);
                 assert!(found == Some(record(before)) || found == Some(record(100)), "{found:?}");
-                drop(start(&mut flash, PAGES).unwrap());
+                start(&mut flash, PAGES).unwrap();
                 let stored = storage::View::open(&mut flash, PAGES).unwrap().device().unwrap();
                 assert_eq!(device_record(&mut flash, PAGES), stored);
                 cuts += 1;
