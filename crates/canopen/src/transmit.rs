@@ -47,7 +47,7 @@ pub trait Transmit {
 
 /// One call of the device: when it is, and the way to the queue. That can be shut: it then takes nothing, and the senders
 /// try again later.
-pub(crate) struct Turn<'a, T> {
+pub struct Turn<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,

@@ -19,10 +19,6 @@ pub(crate) enum Writable {
 
 /// The dictionary with its values and rules.
 pub(crate) trait Objects {
-    /// Whether the image is short of room: then it has no upload in blocks, and a client takes segments, and no shortcuts
-    /// that only save time.
-    const IS_SMALL: bool = false;
-
     /// The value of an entry.
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
     /// How the entry can be written, if it can be at all.

@@ -91,16 +91,13 @@ impl Server {
     /// Takes a segment within a block; whether that has a reply, which is an abort. `None` for any other frame, which is
     /// for [`answer`](Server::answer). The deadline is not earlier afterwards.
     #[inline]
-    pub(crate) fn take_next<O: Objects>(
+    pub(crate) fn take_next(
         &mut self,
         frame: &[u8; 8],
-        objects: &mut O,
+        objects: &mut impl Objects,
         now: Instant,
     ) -> Option<bool> {
         let Transfer::BlockDownload(receiver) = &mut self.transfer else { return None };
-        if O::IS_SMALL {
-            return None;
-        }
         let taken = receiver.take_next(frame, &mut self.buffer, objects)?;
         self.active = now;
         Some(taken.is_err_and(|abort| self.give_up(abort)))
@@ -108,9 +105,9 @@ impl Server {
 
     /// Takes a request; whether there is a reply.
     #[inline(never)]
-    pub(crate) fn answer<O: Objects>(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
         // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
-        let is_of_series = O::IS_SMALL || !matches!(frame[0] >> 5, 1 | 2) || self.wants_block_segments();
+        let is_of_series = !matches!(frame[0] >> 5, 1 | 2) || self.wants_block_segments();
         let is_repeated = is_of_series && *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;
