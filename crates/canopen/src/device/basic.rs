@@ -68,6 +68,11 @@ impl<A: Application> Basic<A, [u8]> {
         CanId::of_service(function, self.node_id.map_or(0, NodeId::get))
     }
 
+    /// The services are due at this instant, or earlier.
+    pub(super) fn serve_until(&mut self, due: Instant) {
+        self.services_due = self.services_due.min(due);
+    }
+
     /// Asks the caller for something.
     pub(super) fn ask(&mut self, action: Action) {
         self.pending.ask(action);

@@ -59,7 +59,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Reacts to an error of the application as object 1029h says.
     pub fn error(&mut self, class: ErrorClass) -> Next {
         self.body.apply_error(class);
-        self.services.follow_state(&self.body);
+        self.silence_services();
         self.process_next()
     }
 }

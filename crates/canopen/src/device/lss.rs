@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::{Action, STALE};
-use crate::lss::{BitRate, Configuration, Outcome, RESPONSE, Request, Response, Slave, Switch};
+use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Request, Response, Slave, Switch};
 use crate::transmit::{RETRY, Turn};
 use crate::{Frame, Instant, NodeId, Transmit};
 
@@ -65,7 +65,7 @@ impl Layer {
         turn: &mut Turn<'_, impl Transmit>,
         body: &mut impl Body,
     ) {
-        let Some(request) = frame.full().copied().and_then(Request::parse) else { return };
+        let Some(request) = frame.full(REQUEST).copied().and_then(Request::parse) else { return };
         let basic = body.basic_mut();
         let identity = basic.identity();
         let response = match self.slave.take(request, &identity, basic.node_id) {

@@ -67,6 +67,7 @@ pub type ServiceDevice<A, const N: usize> = Node<Basic<A, [u8; N]>>;
 
 /// A device: its services, and what they serve. Named as [`Device`] or [`ServiceDevice`].
 #[derive(Debug)]
+#[repr(C)] // The services first: they are short, and an instruction reaches what is near the beginning.
 pub struct Node<B> {
     services: Services,
     body: B,

@@ -15,30 +15,6 @@ const ERROR_CONTROL: u16 = 0x700;
 /// Frames for which a block upload leaves room in the queue: all PDOs of a SYNC, a heartbeat, an EMCY.
 const RESERVED_ROOM: usize = 10;
 
-impl<B: Body> Node<B> {
-    /// Takes a frame with one of the [`service_ids`](Node::service_ids). Any other is ignored.
-    #[inline]
-    pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
-        self.services.take_frame(frame, now, out, &mut self.body);
-        self.services_next()
-    }
-
-    /// Sends what is due of the services, and hands over what is left to the caller.
-    #[inline]
-    pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if now >= self.body.basic().services_due {
-            self.services.poll(now, out, &mut self.body);
-        }
-        self.services_next()
-    }
-
-    /// Identifiers of frames for [`on_service_frame`](Node::on_service_frame).
-    pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
-        let sdo = self.body.basic().node_id.map(|own| own.service(SDO_REQUEST));
-        [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
-    }
-}
-
 /// What serves a device: the SDO server and the LSS slave, with their responses.
 #[derive(Debug)]
 pub(super) struct Services {
@@ -71,13 +47,6 @@ impl Services {
         self.lss.node_id()
     }
 
-    /// A transfer does not survive a state without SDO.
-    pub(super) fn follow_state(&mut self, body: &impl Body) {
-        if !body.basic().state.has_services() {
-            self.forget_transfer();
-        }
-    }
-
     fn forget_transfer(&mut self) {
         self.server.reset();
         (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
@@ -87,132 +56,171 @@ impl Services {
     pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
         Turn { now, out, is_open: !self.lss.is_switching() }
     }
+}
 
-    #[inline(never)]
-    fn take_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit, body: &mut impl Body) {
-        if frame.id() == body.basic().service(SDO_REQUEST).get() {
-            self.take_request(frame, &mut self.turn(now, out), body);
-        } else if frame.id() == lss::REQUEST.get() {
-            self.lss.take_frame(frame, &mut self.turn(now, out), body);
-        } else if frame.id() & 0x780 == ERROR_CONTROL {
-            body.on_heartbeat(frame, now);
+impl<B: Body> Node<B> {
+    /// Takes a frame with one of the [`service_ids`](Node::service_ids). Any other is ignored.
+    #[inline]
+    pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        if self.services.server.takes_block() && self.take_segment(frame, now) {
+            return self.process_next();
         }
-        if now >= body.basic().services_due {
-            self.poll(now, out, body);
-        }
+        self.take_service_frame(frame, now, out);
+        self.services_next()
     }
 
-    /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-    fn take_request(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>, body: &mut impl Body) {
-        let has_sdo = body.basic().state.has_services();
-        let Some(request) = frame.full().filter(|_| has_sdo) else { return };
-        match self.server.take_next(request, body, turn.now) {
-            Some(false) => (),
-            Some(true) => self.respond(turn, body),
-            None => self.answer(request, turn, body),
+    /// Sends what is due of the services, and hands over what is left to the caller.
+    #[inline]
+    pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        if now >= self.body.basic().services_due {
+            self.send_services(now, out);
+        }
+        self.services_next()
+    }
+
+    /// Identifiers of frames for [`on_service_frame`](Node::on_service_frame).
+    pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
+        let sdo = self.body.basic().node_id.map(|own| own.service(SDO_REQUEST));
+        [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
+    }
+
+    /// The CAN-ID of requests to the SDO server.
+    fn sdo_request(&self) -> CanId {
+        self.body.basic().service(SDO_REQUEST)
+    }
+
+    /// Takes a frame if it is a segment of a block from which nothing follows. Without SDO, no transfer is under way.
+    #[inline(never)]
+    fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
+        let request = frame.full(self.sdo_request());
+        request.is_some_and(|request| self.services.server.take_segment(request, now))
+    }
+
+    #[inline(never)]
+    fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        // A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
+        if let Some(request) = frame.full(self.sdo_request()) {
+            if self.body.basic().state.has_services() {
+                self.on_request(request, &mut self.services.turn(now, out));
+            }
+        } else if frame.id() == lss::REQUEST.get() {
+            let turn = &mut self.services.turn(now, out);
+            self.services.lss.take_frame(frame, turn, &mut self.body);
+        } else if frame.id() & 0x780 == ERROR_CONTROL {
+            self.body.on_heartbeat(frame, now);
+        }
+        if now >= self.body.basic().services_due {
+            self.send_services(now, out);
         }
     }
 
     #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
-    fn answer(&mut self, request: &[u8; 8], turn: &mut Turn<'_, impl Transmit>, body: &mut impl Body) {
-        let was_idle = self.server.is_idle();
-        let has_reply = self.server.answer(request, body, turn.now);
+    fn on_request(&mut self, request: &[u8; 8], turn: &mut Turn<'_, impl Transmit>) {
+        let Services { server, reply_due, .. } = &mut self.services;
+        let was_idle = server.is_idle();
+        let has_reply = server.answer(request, &mut self.body, turn.now);
         // A deadline that was there is later now, but for the pause within a block.
-        if was_idle && !self.server.is_idle() || self.server.is_within_block() {
-            let basic = body.basic_mut();
-            basic.services_due = basic.services_due.min(self.server.deadline());
+        if was_idle && !server.is_idle() || server.is_within_block() {
+            self.body.basic_mut().serve_until(server.deadline());
         }
         // Only a request without a reply starts a block.
         if has_reply {
-            return self.respond(turn, body);
+            return self.respond(turn);
         }
         // A reply that still waits is obsolete: its client has gone on.
-        self.reply_due = Instant::NEVER;
-        if self.server.is_sending() {
-            self.send_block(turn, body);
+        *reply_due = Instant::NEVER;
+        if server.is_sending() {
+            self.send_block(turn);
         }
     }
 
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
-    fn send_block(&mut self, turn: &mut Turn<'_, impl Transmit>, body: &mut impl Body) {
-        let id = body.basic().service(SDO_RESPONSE);
-        let has_reply = self.server.send_block(body, turn.now, |data| {
+    #[inline(never)]
+    fn send_block(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        let id = self.body.basic().service(SDO_RESPONSE);
+        let server = &mut self.services.server;
+        let has_reply = server.send_block(&self.body, turn.now, |data| {
             turn.room() > RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
         });
+        let block_due = if server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
+        self.services.block_due = block_due;
+        self.body.basic_mut().serve_until(block_due);
         if has_reply {
-            self.respond(turn, body);
+            self.respond(turn);
         }
-        self.block_due = if self.server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
-        let basic = body.basic_mut();
-        basic.services_due = basic.services_due.min(self.block_due);
     }
 
     /// Sends the server's reply.
-    fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>, body: &mut impl Body) {
-        let basic = body.basic_mut();
+    #[inline(never)]
+    fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        let basic = self.body.basic_mut();
         let id = basic.service(SDO_RESPONSE);
-        if turn.send(Frame::data_frame(id, 8, self.server.reply())) {
-            self.reply_due = Instant::NEVER;
+        if turn.send(Frame::data_frame(id, 8, self.services.server.reply())) {
+            self.services.reply_due = Instant::NEVER;
         } else {
-            self.reply_due = turn.now + RETRY;
-            basic.services_due = basic.services_due.min(self.reply_due);
+            self.services.reply_due = turn.now + RETRY;
+            basic.serve_until(self.services.reply_due);
         }
     }
 
     /// A job has come to its end: whoever waits for the end is answered, the LSS master if `lss_waits`.
-    pub(super) fn finish(
+    pub(super) fn finish_job(
         &mut self,
         result: Result<(), Abort>,
         lss_waits: bool,
         turn: &mut Turn<'_, impl Transmit>,
-        body: &mut impl Body,
     ) {
         if lss_waits {
-            self.lss.respond(lss::Slave::stored(result.is_ok()), turn);
+            self.services.lss.respond(lss::Slave::stored(result.is_ok()), turn);
         }
-        if self.server.release(result, turn.now) {
-            self.respond(turn, body);
+        if self.services.server.release(result, turn.now) {
+            self.respond(turn);
         }
-        body.basic_mut().services_due = STALE;
+        self.body.basic_mut().services_due = STALE;
+    }
+
+    /// A transfer does not survive a state without SDO.
+    pub(super) fn silence_services(&mut self) {
+        if !self.body.basic().state.has_services() {
+            self.services.forget_transfer();
+        }
     }
 
     #[inline(never)]
-    fn poll(&mut self, now: Instant, out: &mut impl Transmit, body: &mut impl Body) {
-        self.lss.poll_switching(now, body);
-        let turn = &mut self.turn(now, out);
-        self.lss.poll(turn);
-        let basic = body.basic_mut();
+    fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
+        self.services.lss.poll_switching(now, &mut self.body);
+        let turn = &mut self.services.turn(now, out);
+        self.services.lss.poll(turn);
+        let basic = self.body.basic_mut();
         if !basic.is_initialising() {
             let id = basic.service(ERROR_CONTROL);
             basic.heartbeat.poll(id, basic.state, turn);
-            body.poll_errors(turn);
-            self.follow_state(body);
+            self.body.poll_errors(turn);
+            self.silence_services();
         }
-        if body.basic().state.has_services() {
-            self.poll_sdo(turn, body);
+        if self.body.basic().state.has_services() {
+            self.poll_sdo(turn);
         }
-        body.basic_mut().services_due = self.due(body);
+        self.body.basic_mut().services_due = self.next_service();
     }
 
-    fn poll_sdo(&mut self, turn: &mut Turn<'_, impl Transmit>, body: &mut impl Body) {
-        if turn.now >= self.reply_due {
-            self.respond(turn, body);
+    fn poll_sdo(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now >= self.services.reply_due || self.services.server.expire(turn.now) {
+            self.respond(turn);
         }
-        if self.server.expire(turn.now) {
-            self.respond(turn, body);
-        }
-        if turn.now >= self.block_due {
-            self.send_block(turn, body);
+        if turn.now >= self.services.block_due {
+            self.send_block(turn);
         }
     }
 
-    fn due(&self, body: &impl Body) -> Instant {
-        let (lss, basic) = (self.lss.due(), body.basic());
+    fn next_service(&self) -> Instant {
+        let (services, basic) = (&self.services, self.body.basic());
+        let lss = services.lss.due();
         if basic.is_initialising() {
             return lss;
         }
-        let due = lss.min(basic.heartbeat.due()).min(body.errors_due());
+        let due = lss.min(basic.heartbeat.due()).min(self.body.errors_due());
         // Without SDO, no transfer is under way, and nothing of the three is due.
-        due.min(self.server.deadline()).min(self.reply_due).min(self.block_due)
+        due.min(services.server.deadline()).min(services.reply_due).min(services.block_due)
     }
 }

@@ -167,7 +167,7 @@ impl<B: Body> Node<B> {
             }
         };
         self.body.enter(state);
-        self.services.follow_state(&self.body);
+        self.silence_services();
     }
 
     /// What follows from a call of the process half.

@@ -83,7 +83,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
         let lss_waits = core::mem::take(&mut self.body.jobs).lss_waits;
         let turn = &mut self.services.turn(now, out);
-        self.services.finish(result, lss_waits, turn, &mut self.body);
+        self.finish_job(result, lss_waits, turn);
         self.process_next()
     }
 }
