@@ -118,17 +118,23 @@ pub fn empty_store() -> Flash {
     Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
 }
 
+/// The job that the node asks for; `None` when there is none.
+///
+/// As in the firmware, a job may wait for the values of new parameters: they come with the next samples.
+pub fn take_job(protocol: &mut Protocol, now: Instant, out: &mut impl Transmit) -> Option<StoreJob> {
+    let mut job = StoreJob::new(Personality::default());
+    for _ in 0..4 {
+        if protocol.take_job(&mut job) {
+            return Some(job);
+        }
+        let _ = protocol.publish(now, out);
+    }
+    None
+}
+
 /// Stores at once what the node asks to be stored.
 pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
-    let mut job = StoreJob::new(Personality::default());
-    // As in the firmware, a job may wait for the values of new parameters.
-    if (0..4).any(|_| {
-        let is_taken = protocol.take_job(&mut job);
-        if !is_taken {
-            let _ = protocol.publish(now, out);
-        }
-        is_taken
-    }) {
+    if let Some(mut job) = take_job(protocol, now, out) {
         let result = job.run(store);
         let _ = protocol.finish(&job, result, now, out);
     }

@@ -35,6 +35,18 @@ impl State {
     pub const fn code(self) -> u8 {
         self as u8
     }
+
+    /// The state of a code; `None` for a code that CiA 301, 7.2.8.3.2.2 reserves.
+    #[must_use]
+    pub const fn from_code(code: u8) -> Option<State> {
+        match code {
+            0x00 => Some(State::Initialising),
+            0x04 => Some(State::Stopped),
+            0x05 => Some(State::Operational),
+            0x7F => Some(State::PreOperational),
+            _ => None,
+        }
+    }
 }
 
 /// A command of the NMT master. The discriminant is the command specifier.

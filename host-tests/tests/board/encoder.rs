@@ -7,27 +7,29 @@ use sim::world::World;
 use crate::support::{Master, SECOND, START_ALL, SYNC, read, run, world, write};
 
 /// TPDO 2, which carries the position with every SYNC.
-const TPDO2: u16 = 0x281;
+pub(crate) const TPDO2: u16 = 0x281;
 /// Steps in a revolution: of the incremental encoder, and of the absolute one.
 pub(crate) const COUNTS: f64 = 4096.0;
 pub(crate) const STEPS: f64 = 8192.0;
 
 pub(crate) const POSITION: (u16, u8) = (0x6004, 0);
-const OPERATING: (u16, u8) = (0x6000, 0);
+pub(crate) const PRESET: (u16, u8) = (0x6003, 0);
+pub(crate) const ALARMS: (u16, u8) = (0x6503, 0);
+pub(crate) const OPERATING: (u16, u8) = (0x6000, 0);
 const PER_REVOLUTION: (u16, u8) = (0x6001, 0);
 const SPEED: (u16, u8) = (0x6030, 1);
-const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
-const FASTEST: (u16, u8) = (0x2104, 1);
+pub(crate) const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
+pub(crate) const FASTEST: (u16, u8) = (0x2104, 1);
 pub(crate) const SENSOR_STATE: (u16, u8) = (0x210B, 1);
 
 /// Codes of sensor types (object 1000h).
-const MULTI_TURN: u32 = 2;
+pub(crate) const MULTI_TURN: u32 = 2;
 /// Operating parameters: the scaling works.
 const SCALING: u32 = 1 << 2;
 /// Sensor states.
 pub(crate) const NO_SIGNAL: u32 = 1 << 0;
-const IMPLAUSIBLE: u32 = 1 << 3;
-const UNREFERENCED: u32 = 1 << 5;
+pub(crate) const IMPLAUSIBLE: u32 = 1 << 3;
+pub(crate) const UNREFERENCED: u32 = 1 << 5;
 pub(crate) const POSITION_ERROR: u32 = 1 << 7;
 
 /// A node with an encoder, a second after power-on.

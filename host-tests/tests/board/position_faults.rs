@@ -3,30 +3,24 @@
 use sim::world::World;
 
 use crate::encoder::{
-    COUNTS, POSITION, POSITION_ERROR, SENSOR_STATE, STEPS, cycle_power, shaft, start, stimulate, wait,
+    ALARMS, COUNTS, IMPLAUSIBLE, OPERATING, POSITION, POSITION_ERROR, PRESET, SENSOR_STATE, SENSOR_TYPE,
+    STEPS, TPDO2, UNREFERENCED, cycle_power, shaft, start, stimulate, wait,
 };
 use crate::support::{Master, START_ALL, SYNC, read, write};
 
-const ALARMS: (u16, u8) = (0x6503, 0);
 const ACKNOWLEDGE: (u16, u8) = (0x2109, 0);
 const ERROR_REGISTER: (u16, u8) = (0x1001, 0);
 const ON_DEVICE_ERROR: (u16, u8) = (0x1029, 2);
-const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
 const RESOLUTION: (u16, u8) = (0x2101, 1);
-const OPERATING: (u16, u8) = (0x6000, 0);
-const PRESET: (u16, u8) = (0x6003, 0);
 const OFFSET: (u16, u8) = (0x6509, 0);
 const DIAGNOSTIC: (u16, u8) = (0x210C, 1);
 /// The car position unit is chosen.
 const DEVICES: (u16, u8) = (0x2305, 0);
 const EMCY: u16 = 0x081;
-const TPDO2: u16 = 0x281;
 /// EMCY of a position that is not right: that of a broken sensor, the generic bit of the error register, and 2 in the detail.
 const WRONG: [u8; 8] = [0x06, 0x50, 1, 2, 0, 0, 0, 0];
 
-const IMPLAUSIBLE: u32 = 1 << 3;
 const INDEX: u32 = 1 << 4;
-const UNREFERENCED: u32 = 1 << 5;
 
 /// What the EMCYs since the last call said.
 fn emcys(world: &mut World, master: &Master) -> Vec<Vec<u8>> {

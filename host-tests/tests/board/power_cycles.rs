@@ -6,14 +6,12 @@ use host_tests::thorough;
 use sim::world::World;
 
 use crate::encoder::{
-    COUNTS, POSITION, POSITION_ERROR, SENSOR_STATE, STEPS, start, start_absolute, stimulate, wait,
+    ALARMS, COUNTS, POSITION, POSITION_ERROR, PRESET, SENSOR_STATE, STEPS, UNREFERENCED, start,
+    start_absolute, stimulate, wait,
 };
 use crate::support::{Master, SECOND, read, run, write};
 
-const PRESET: (u16, u8) = (0x6003, 0);
-const ALARMS: (u16, u8) = (0x6503, 0);
-/// Sensor state of an encoder whose index has not been seen.
-const UNREFERENCED: u32 = 1 << 5;
+const PRESET_VALUE: u32 = 1000;
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
 
 /// Cycles of each kind of encoder.
@@ -44,26 +42,31 @@ fn fail(world: &mut World, rng: &mut Rng) {
     wait(world, 30);
 }
 
+/// Fails the power of an absolute encoder that has been preset where the shaft is now, and that turns meanwhile: after each start the
+/// position is the one of the preset and of the way since.
+fn assert_preset_lasts(world: &mut World, master: &Master, rng: &mut Rng) {
+    let zero = revolutions(world) * STEPS - f64::from(PRESET_VALUE);
+    for cycle in 0..cycles() {
+        stimulate(world, "shaft", &format!("rpm:{}", rng.i32(-600..600)));
+        world.run_until(world.now() + Time::from_micros(rng.u64(1..100_000)));
+        fail(world, rng);
+        let rest = (revolutions(world) * STEPS).floor() / STEPS;
+        stimulate(world, "shaft", &format!("const:{rest}"));
+        wait(world, 10);
+        let expected = (rest * STEPS - zero) as i64 as u32 & 0x1FF_FFFF;
+        assert_eq!(read(world, master, POSITION), expected, "cycle {cycle}");
+        assert_eq!(read(world, master, ALARMS), 0, "cycle {cycle}");
+    }
+}
+
 /// The absolute encoder turns while the power fails and while it is off: its position is preset and offset by what was kept.
 #[test]
 fn an_absolute_encoder_keeps_its_preset_through_power_that_fails_at_any_moment() {
-    const VALUE: u32 = 1000;
     let mut rng = Rng::with_seed(14);
     let (mut world, master) = start_absolute("--shaft const:7.125");
-    write(&mut world, &master, PRESET, 4, VALUE);
+    write(&mut world, &master, PRESET, 4, PRESET_VALUE);
     assert_eq!(master.ask(&mut world, 1, &SAVE)[0], 0x60);
-    let zero = revolutions(&mut world) * STEPS - f64::from(VALUE);
-    for cycle in 0..cycles() {
-        stimulate(&mut world, "shaft", &format!("rpm:{}", rng.i32(-600..600)));
-        world.run_until(world.now() + Time::from_micros(rng.u64(1..100_000)));
-        fail(&mut world, &mut rng);
-        let rest = (revolutions(&mut world) * STEPS).floor() / STEPS;
-        stimulate(&mut world, "shaft", &format!("const:{rest}"));
-        wait(&mut world, 10);
-        let expected = (rest * STEPS - zero) as i64 as u32 & 0x1FF_FFFF;
-        assert_eq!(read(&mut world, &master, POSITION), expected, "cycle {cycle}");
-        assert_eq!(read(&mut world, &master, ALARMS), 0, "cycle {cycle}");
-    }
+    assert_preset_lasts(&mut world, &master, &mut rng);
 }
 
 /// An incremental encoder that stands while the power is off has its position again, and is still referenced.
@@ -100,22 +103,10 @@ fn an_incremental_encoder_at_rest_keeps_its_position_through_power_that_fails_at
 /// Without a battery the position of an absolute encoder is found again from its offset.
 #[test]
 fn an_absolute_encoder_without_a_battery_keeps_its_preset() {
-    const VALUE: u32 = 1000;
     let mut rng = Rng::with_seed(24);
     let (mut world, master) = start_absolute("--shaft const:7.125 --fault battery-empty@0");
-    write(&mut world, &master, PRESET, 4, VALUE);
-    let zero = revolutions(&mut world) * STEPS - f64::from(VALUE);
-    for cycle in 0..cycles() {
-        stimulate(&mut world, "shaft", &format!("rpm:{}", rng.i32(-600..600)));
-        world.run_until(world.now() + Time::from_micros(rng.u64(1..100_000)));
-        fail(&mut world, &mut rng);
-        let rest = (revolutions(&mut world) * STEPS).floor() / STEPS;
-        stimulate(&mut world, "shaft", &format!("const:{rest}"));
-        wait(&mut world, 10);
-        let expected = (rest * STEPS - zero) as i64 as u32 & 0x1FF_FFFF;
-        assert_eq!(read(&mut world, &master, POSITION), expected, "cycle {cycle}");
-        assert_eq!(read(&mut world, &master, ALARMS), 0, "cycle {cycle}");
-    }
+    write(&mut world, &master, PRESET, 4, PRESET_VALUE);
+    assert_preset_lasts(&mut world, &master, &mut rng);
 }
 
 /// Without a battery no start knows where a counted position is: each one says so, until the position is preset.

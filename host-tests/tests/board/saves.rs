@@ -5,25 +5,18 @@ use canbus::{Stamped, Time};
 use host_tests::thorough;
 use sim::world::World;
 
+use crate::encoder::{ALARMS, FASTEST, MULTI_TURN, SENSOR_STATE, SENSOR_TYPE, STEPS, TPDO2};
 use crate::support::{Master, SECOND, START_ALL, SYNC, frame, read, run, world, write};
 
-/// TPDO 2, which carries the position with every SYNC.
-const TPDO2: u16 = 0x281;
 const BIT_RATES: [u16; 8] = [1000, 800, 500, 250, 125, 50, 20, 10];
 const RPM: f64 = 6000.0;
-/// Steps in a revolution, and in the range of the encoder.
-const STEPS: f64 = 8192.0;
+/// Steps in the range of the encoder.
 const RANGE: i64 = 1 << 25;
 
-const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
-const FASTEST: (u16, u8) = (0x2104, 1);
-const SENSOR_STATE: (u16, u8) = (0x210B, 1);
 /// Words of the absolute encoder that did not come whole.
 const LOST_WORDS: (u16, u8) = (0x2001, 4);
-const ALARMS: (u16, u8) = (0x6503, 0);
 /// A value that is saved and changes nothing: the limit of the operating time.
 const SAVED: (u16, u8) = (0x2106, 5);
-const MULTI_TURN: u32 = 2;
 /// 1010h:3, save the application parameters.
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 3, b's', b'a', b'v', b'e'];
 const DONE: u8 = 0x60;

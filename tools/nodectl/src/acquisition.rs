@@ -6,7 +6,7 @@ use canopen::emcy::Message;
 use canopen::nmt::{Command, State};
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, Instant, NodeId};
-use eds::DataType;
+use eds::{Class, DataType};
 use thiserror::Error;
 
 use crate::bus::{BusError, Received};
@@ -44,6 +44,19 @@ pub struct Sample {
     pub signal: usize,
     /// The value.
     pub value: Value,
+}
+
+/// What the values of a signal are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Integers of up to 64 bits with a sign.
+    Signed,
+    /// The same without a sign; BOOLEAN is 0 or 1.
+    Unsigned,
+    /// Numbers with a fraction: of a REAL type, or integers with decimal digits or a measuring step.
+    Number,
+    /// Texts, bytes, and all that has no type that is known.
+    Text,
 }
 
 /// How values are acquired.
@@ -265,6 +278,18 @@ impl Signal {
             _ => DataType(0x07),
         };
         self.data_type.unwrap_or_else(guessed).to_string()
+    }
+
+    /// What its values are.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match self.data_type.map(DataType::class) {
+            Some(Class::Signed(_) | Class::Unsigned(_)) if self.quantity.is_scaled() => Kind::Number,
+            Some(Class::Signed(_)) => Kind::Signed,
+            Some(Class::Unsigned(_)) => Kind::Unsigned,
+            Some(Class::Real(_)) => Kind::Number,
+            Some(Class::Text | Class::Bytes) | None => Kind::Text,
+        }
     }
 
     fn decode(&self, bytes: &[u8]) -> Value {

@@ -27,6 +27,7 @@ pub mod meaning;
 mod network;
 pub mod nmt;
 pub mod object;
+mod pdo_parameters;
 pub mod quantity;
 pub mod scan;
 pub mod sdo;

@@ -32,6 +32,12 @@ impl Quantity {
         Quantity { unit: unit.to_owned(), scale: None }
     }
 
+    /// Whether the number of an object is multiplied to be the value.
+    #[must_use]
+    pub fn is_scaled(&self) -> bool {
+        self.scale.is_some()
+    }
+
     /// What the data sheet says, or the objects of the node that it names: the unit (6131h in CiA 404) and the decimal
     /// digits beside it (6132h), or a measuring step (6384h in CiA 417).
     ///

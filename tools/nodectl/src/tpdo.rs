@@ -6,14 +6,8 @@ use canopen::sdo::Multiplexer;
 
 use crate::Catalogue;
 use crate::object::at;
+use crate::pdo_parameters::{Parameters, slots, walk};
 use crate::sdo::{Client, Error};
-
-/// So many TPDOs in a row that do not exist, and there are no more but those of the data sheet. Devices may leave gaps.
-const GAP: u16 = 4;
-/// As many as there can be (CiA 301, 7.5.2.37).
-const TPDOS: u16 = 512;
-/// More mapped objects than this are no mapping but a kind of MPDO (CiA 301, 7.5.2.36).
-const SLOTS: u8 = 64;
 
 /// A TPDO that is switched on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,31 +50,26 @@ fn bits(data: &[u8], from: usize, length: usize) -> Option<Vec<u8>> {
 /// # Errors
 /// Those of SDO.
 pub fn read(client: &mut Client, catalogue: &Catalogue) -> Result<Vec<Tpdo>, Error> {
-    let (mut found, mut missing) = (Vec::new(), 0);
-    for number in 0..TPDOS {
-        if missing >= GAP && catalogue.entry(at(0x1800 + number, 1)).is_none() {
-            continue;
+    let mut found = Vec::new();
+    walk(catalogue, 0x1800, |pdo| {
+        let cob_id = word(client, at(pdo.communication, 1))?;
+        if let Some(cob_id) = cob_id {
+            found.extend(read_one(client, pdo, cob_id)?);
         }
-        match word(client, at(0x1800 + number, 1))? {
-            None => missing += 1,
-            Some(cob_id) => {
-                missing = 0;
-                found.extend(read_one(client, number, cob_id)?);
-            }
-        }
-    }
+        Ok(cob_id.is_some())
+    })?;
     Ok(found)
 }
 
-fn read_one(client: &mut Client, number: u16, cob_id: u32) -> Result<Option<Tpdo>, Error> {
+fn read_one(client: &mut Client, pdo: Parameters, cob_id: u32) -> Result<Option<Tpdo>, Error> {
     // Bit 31 switches it off; one with an extended identifier is none for us.
     let Some(cob_id) = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31) else { return Ok(None) };
-    let count = client.upload(at(0x1A00 + number, 0))?.first().copied().unwrap_or(0);
+    let count = client.upload(at(pdo.mapping, 0))?.first().copied().unwrap_or(0);
     let mut mapping = Vec::new();
-    for slot in 1..=if count <= SLOTS { count } else { 0 } {
-        mapping.extend(word(client, at(0x1A00 + number, slot))?.map(MappedObject::parse));
+    for slot in slots(count.into()) {
+        mapping.extend(word(client, at(pdo.mapping, slot))?.map(MappedObject::parse));
     }
-    Ok(Some(Tpdo { number: number + 1, id: cob_id.id.get(), mapping }))
+    Ok(Some(Tpdo { number: pdo.number + 1, id: cob_id.id.get(), mapping }))
 }
 
 fn word(client: &mut Client, at: Multiplexer) -> Result<Option<u32>, Error> {

@@ -1,14 +1,17 @@
 //! What the documentation shows of the measurement chain, computed with the chain itself: plots of input against output
-//! for each filter, and tables of settling times, delays and resolution.
+//! for each filter, tables of settling times, delays and resolution, and what an encoder makes of disturbed readings.
 //!
 //! The output is the same on every run, so a test compares it with what lies in docs/.
 
+mod encoder;
 mod figure;
+mod filters;
 mod page;
 mod resolution;
 mod response;
 mod stimulus;
 
+pub use encoder::{Disturbance, Sample, turn};
 pub use resolution::{Resolution, resolution};
 pub use response::{Filter, Trace, delay, settling, trace};
 pub use stimulus::Stimulus;
@@ -24,7 +27,7 @@ pub struct File {
     pub text: String,
 }
 
-/// Every file: a plot for each filter, and the page with its tables brought up to date.
+/// Every file: a plot for each filter and one for the encoder, and the page with its tables brought up to date.
 ///
 /// # Panics
 /// When a plot cannot be drawn, or the page is not there.
@@ -34,9 +37,10 @@ pub fn files() -> Vec<File> {
     let docs = root.join("docs");
     let plots = Filter::SHOWN.iter().map(|filter| File {
         path: docs.join("plots").join(format!("{}.svg", filter.file_name())),
-        text: figure::svg(*filter),
+        text: filters::plot(*filter),
     });
+    let encoder = File { path: docs.join("plots").join("encoder.svg"), text: encoder::plot() };
     let path = docs.join("measuring.md");
     let old = std::fs::read_to_string(&path).expect("the page is there");
-    plots.chain([File { path, text: page::updated(&old) }]).collect()
+    plots.chain([encoder, File { path, text: page::updated(&old) }]).collect()
 }

@@ -1,6 +1,7 @@
 //! The plots and tables in docs/ are what the chain gives now, and what theory says.
 
-use plots::{Filter, Stimulus, delay, files, resolution, settling, trace};
+use plots::{Disturbance, Filter, Stimulus, delay, files, resolution, settling, trace, turn};
+use profiles::encoder::SENSOR_POSITION_ERROR;
 
 const CONSTANTS: [u8; 5] = [1, 2, 10, 100, 255];
 
@@ -82,4 +83,19 @@ fn with_noise_sixteen_conversions_are_four_times_as_good_as_one() {
         assert!((got / expected - 1.0).abs() < 0.03, "{noise}: {got} for {expected}");
     }
     assert!((resolution(0.5).bits() - 13.0).abs() < 0.05);
+}
+
+#[test]
+fn a_disturbed_reading_is_not_taken_over_and_the_next_good_one_is() {
+    for disturbance in [Disturbance::Jump, Disturbance::Silence] {
+        let samples = turn(disturbance);
+        for sample in &samples {
+            let held = &samples[29];
+            let expected = if sample.read == Some(sample.shaft) { sample.shaft } else { held.shaft };
+            assert_eq!(i64::from(sample.values.position), expected, "{disturbance:?} at {} ms", sample.ms);
+        }
+        // From the third millisecond on the state says that the position is not right.
+        let is_wrong = |ms: usize| samples[ms].values.sensor_state & SENSOR_POSITION_ERROR != 0;
+        assert_eq!([29, 31, 32, 49].map(is_wrong), [false, false, true, true], "{disturbance:?}");
+    }
 }

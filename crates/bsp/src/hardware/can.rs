@@ -4,7 +4,7 @@ use bxcan::filter::Mask16;
 use bxcan::{Interrupts, StandardId};
 use stm32f4xx_hal::can::Can as Pins;
 use stm32f4xx_hal::gpio::{PB8, PB9};
-use stm32f4xx_hal::pac::{CAN1, can1};
+use stm32f4xx_hal::pac::{CAN1, RCC, can1};
 use stm32f4xx_hal::rcc::Rcc;
 
 use super::transmit::Transmitter;
@@ -33,6 +33,12 @@ unsafe impl bxcan::MasterInstance for Registers {}
 pub(crate) fn registers() -> &'static can1::RegisterBlock {
     // SAFETY: see the implementation of `Instance`; whoever calls this keeps to its own registers.
     unsafe { &*CAN1::ptr() }
+}
+
+/// Takes the controller off the bus at once, in the middle of a frame too, until the next reset of the chip.
+pub(super) fn hold_in_reset() {
+    // SAFETY: the program has ended: nobody else writes the register any more.
+    unsafe { (*RCC::ptr()).apb1rstr().modify(|_, reset| reset.can1rst().set_bit()) };
 }
 
 /// Mode, timing, filters and errors of the controller.

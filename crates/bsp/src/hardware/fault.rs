@@ -9,7 +9,7 @@ use core::mem::MaybeUninit;
 
 use cortex_m::peripheral::SCB;
 
-use super::{crash, memory};
+use super::{can, crash, memory};
 use crate::crash_record::{Crash, Fault};
 
 const EMERGENCY_BYTES: usize = 1024;
@@ -64,10 +64,13 @@ fn stacked(sp: u32) -> Option<[u32; 2]> {
     readable.then(|| unsafe { ((sp + 20) as *const [u32; 2]).read_volatile() })
 }
 
-/// The clock on OSC_IN has failed: the core runs from HSI now, and the bit timing is wrong. The reset takes the node off the
-/// bus; it comes back with the clock.
+/// The clock on OSC_IN has failed: the core runs from HSI now, and the bit timing is wrong. The node comes back with the clock.
+///
+/// The controller leaves the bus before the crash record is written: the checksum of the record takes longer than a frame at
+/// this clock, and an error frame of wrong bits would destroy what others send meanwhile.
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() -> ! {
+    can::hold_in_reset();
     crash::restart(&Crash::Clock)
 }
 

@@ -19,9 +19,7 @@ impl Heartbeat {
     pub fn parse(frame: &Frame) -> Option<Heartbeat> {
         let &[code] = frame.data() else { return None };
         let node = u8::try_from(frame.id().checked_sub(0x700)?).ok().and_then(NodeId::new)?;
-        let states = [State::Initialising, State::Stopped, State::Operational, State::PreOperational];
-        let state = states.into_iter().find(|state| state.code() == code)?;
-        Some(Heartbeat { node, state })
+        Some(Heartbeat { node, state: State::from_code(code)? })
     }
 }
 

@@ -21,8 +21,8 @@
 //!
 //! * 6000h bit 3 is printed "reward": reverse, as in 6500h. Bits that are reserved are refused, as is a direction bit that
 //!   no sensor has. In 6500h bit 1 says that the diagnostic is supported, not that it runs.
-//! * 6001h is at most the resolution of the sensor (6501h) and 6002h at most what it tells apart, as makers of encoders
-//!   have it. The position repeats after 6002h whatever its ratio to 6001h is, since turns are counted without end.
+//! * 6001h and 6002h take all of UNSIGNED32 but 0, also beyond the resolution of the sensor (6501h, 6502h). The position repeats after
+//!   6002h whatever its ratio to 6001h is, since turns are counted without end.
 //! * A preset is below 6002h; above, it is refused. In other units the offset is 0 again; counted the other way, the
 //!   position stays and the offset follows ([`Position::rescale`]).
 //! * 6010h and 6020h are INTEGER32 (v3.1), 6003h and 6004h UNSIGNED32: the same 32 bits. Limits of cams and of the work
@@ -30,7 +30,8 @@
 //! * Both channels are scaled by the same 6000h to 6002h; 6005h is for those that are linear.
 //! * Cam limits in the wrong order are swapped; a cam that is not enabled reads 0 whatever its polarity; hysteresis
 //!   moves the points where a cam goes off outwards, and without history the limits alone decide ([`Cam`]).
-//! * 6400h bit 0 is set beyond the limits of 650Ah, not at them, and those limits have no channel: they hold for both.
+//! * 6400h bit 0 is set when a limit of 650Ah is reached. The ends of INTEGER32, as delivered, are no limits. The limits have no channel:
+//!   they hold for both.
 //! * An alarm stays until it is acknowledged, for which the manufacturer's object 2109h is there, and its cause has gone.
 //! * 6502h cannot hold 65 536 and 6501h not 2^32.
 //! * 1000h is type 10 when two channels are used, and the type of the sensor when one is.

@@ -221,6 +221,8 @@ impl Board {
         let inputs = Inputs { analogue: *raw, position, digital: buttons };
         self.measurement.update(&inputs, self.protocol.snapshot_mut());
         let _ = self.protocol.publish(self.now, &mut self.out);
+        // A job may have waited for the values of new parameters.
+        self.run_job();
     }
 
     /// Polls and fulfils until there is nothing left to do now.

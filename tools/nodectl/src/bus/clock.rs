@@ -1,4 +1,4 @@
-//! The time of buses that are real.
+//! The time of buses that are real, and time stamps in text.
 
 use std::sync::LazyLock;
 use std::time;
@@ -16,4 +16,11 @@ pub(super) fn now() -> Instant {
 /// What is left until an instant; nothing when it has passed.
 pub(super) fn left(until: Instant) -> time::Duration {
     time::Duration::from_micros(until.0.saturating_sub(now().0))
+}
+
+/// `SECONDS.FRACTION`, as candump and socketcand write a time stamp; digits below a microsecond are cut off.
+pub(crate) fn parse(text: &str) -> Option<Instant> {
+    let (seconds, fraction) = text.split_once('.')?;
+    let micros = format!("{fraction:0<6}").get(..6)?.parse::<u64>().ok()?;
+    Some(Instant(seconds.parse::<u64>().ok()?.checked_mul(1_000_000)?.checked_add(micros)?))
 }

@@ -1,7 +1,7 @@
 //! Ways onto a CAN bus. One trait, so that everything above it runs on any adapter and in a test without one.
 
 mod address;
-mod clock;
+pub(crate) mod clock;
 mod none;
 mod simulated;
 mod slcan;

@@ -9,9 +9,9 @@ use std::io::{self, ErrorKind};
 
 use canopen::{Duration, Frame, Instant};
 
-use super::socketcand::hex_bytes;
 use super::stream::Stream;
 use super::{Bus, BusError, Received, clock};
+use crate::value::hex_bytes;
 
 /// Bit rates of S0 to S8 in kbit/s.
 const BIT_RATES: [u16; 9] = [10, 20, 50, 100, 125, 250, 500, 800, 1000];

@@ -11,6 +11,7 @@ use canopen::{Duration, Frame, Instant};
 
 use super::stream::Stream;
 use super::{Bus, BusError, Received, clock};
+use crate::value::hex_bytes;
 
 /// How long the daemon may take to answer.
 const ANSWER: Duration = Duration::from_millis(3000);
@@ -44,22 +45,8 @@ fn parse(text: &str) -> Message {
 fn frame(id: &str, time: &str, frame: impl FnOnce(u16) -> Option<Frame>) -> Message {
     // Eight digits are an extended identifier, whatever its value.
     let id = u16::from_str_radix(id, 16).ok().filter(|_| id.len() <= 3);
-    let received = || Some(Received { frame: frame(id?)?, at: instant(time)? });
+    let received = || Some(Received { frame: frame(id?)?, at: clock::parse(time)? });
     received().map_or(Message::Other, Message::Frame)
-}
-
-/// `SECONDS.MICROSECONDS`
-fn instant(text: &str) -> Option<Instant> {
-    let (seconds, micros) = text.split_once('.')?;
-    let seconds: u64 = seconds.parse().ok()?;
-    Some(Instant(seconds.checked_mul(1_000_000)?.checked_add(micros.parse().ok()?)?))
-}
-
-/// Pairs of hexadecimal digits.
-pub(super) fn hex_bytes(text: &str) -> Option<Vec<u8>> {
-    let pair = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
-    let is_plain = text.len().is_multiple_of(2) && text.bytes().all(|byte| byte.is_ascii_hexdigit());
-    is_plain.then(|| text.as_bytes().chunks(2).map(pair).collect())?
 }
 
 /// The message that sends a frame.
@@ -180,7 +167,7 @@ mod tests {
     #[test]
     fn frames_however_they_are_cut() {
         let text =
-            "< hi >< ok >< frame 123 1.000002 DEADBEEF >< frame 080 12.500000  >< frame 701 0.1 05 06 >";
+            "< hi >< ok >< frame 123 1.000002 DEADBEEF >< frame 080 12.500000  >< frame 701 0.000001 05 06 >";
         let expected = [
             Message::Hi,
             Message::Ok,

@@ -2,6 +2,8 @@
 
 use canopen::{Frame, Instant};
 
+use crate::bus::clock;
+
 /// A line that is no record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no record of candump, as (1.000000) can0 701#05 or can0 701 [1] 05")]
@@ -16,7 +18,7 @@ pub fn parse(line: &str) -> Result<Option<(Instant, Frame)>, NotARecord> {
     let at = match words.peek().and_then(|word| word.strip_prefix('(')?.strip_suffix(')')) {
         Some(time) => {
             words.next();
-            instant(time).ok_or(NotARecord)?
+            clock::parse(time).ok_or(NotARecord)?
         }
         None => Instant(0),
     };
@@ -27,13 +29,6 @@ pub fn parse(line: &str) -> Result<Option<(Instant, Frame)>, NotARecord> {
         None => of_output(record, &rest),
     }
     .map(|frame| frame.map(|frame| (at, frame)))
-}
-
-/// `SECONDS.MICROSECONDS`
-fn instant(text: &str) -> Option<Instant> {
-    let (seconds, fraction) = text.split_once('.')?;
-    let micros = format!("{fraction:0<6}").get(..6)?.parse::<u64>().ok()?;
-    Some(Instant(seconds.parse::<u64>().ok()?.checked_mul(1_000_000)?.checked_add(micros)?))
 }
 
 /// `701#05`, `701#R1`

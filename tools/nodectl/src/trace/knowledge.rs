@@ -8,15 +8,10 @@ use canopen::sdo::Multiplexer;
 
 use crate::Catalogue;
 use crate::object::at;
+use crate::pdo_parameters::{PDOS, slots, walk};
 use crate::quantity::Quantity;
 use crate::sdo::{Client, Error};
 
-/// So many PDOs in a row that do not exist, and there are no more but those of the data sheet.
-const GAP: u16 = 4;
-/// As many as there can be (CiA 301, 7.5.2.35 and 7.5.2.37).
-const PDOS: u16 = 512;
-/// More mapped objects than this are no mapping but a kind of MPDO (CiA 301, 7.5.2.36).
-const SLOTS: u32 = 64;
 /// The first communication parameters of RPDOs and of TPDOs.
 const COMMUNICATION: [u16; 2] = [0x1400, 0x1800];
 
@@ -58,23 +53,17 @@ impl Knowledge {
     }
 
     fn ask_pdos(&mut self, client: &mut Client, first: u16) -> Result<(), Error> {
-        let mut missing = 0;
-        for number in 0..PDOS {
-            let (communication, mapping) = (first + number, first + 0x200 + number);
-            if missing >= GAP && self.catalogue.entry(at(communication, 1)).is_none() {
-                continue;
+        let catalogue = self.catalogue.clone();
+        walk(&catalogue, first, |pdo| {
+            if self.fetch(client, at(pdo.communication, 1))?.is_none() {
+                return Ok(false);
             }
-            if self.fetch(client, at(communication, 1))?.is_none() {
-                missing += 1;
-                continue;
+            let count = self.fetch(client, at(pdo.mapping, 0))?.unwrap_or(0);
+            for slot in slots(count) {
+                self.fetch(client, at(pdo.mapping, slot))?;
             }
-            missing = 0;
-            let count = self.fetch(client, at(mapping, 0))?.unwrap_or(0);
-            for slot in 1..=if count <= SLOTS { count } else { 0 } {
-                self.fetch(client, at(mapping, u8::try_from(slot).unwrap_or(0)))?;
-            }
-        }
-        Ok(())
+            Ok(true)
+        })
     }
 
     /// The objects that [`Quantity::of`] asks for.

@@ -62,8 +62,7 @@ impl States {
             return Some(Said::text("asked for its state (node guarding)"));
         }
         let &[code] = frame.data() else { return Some(odd(frame, "no heartbeat")) };
-        let states = [State::Initialising, State::Stopped, State::Operational, State::PreOperational];
-        let Some(state) = states.into_iter().find(|state| state.code() == code & 0x7F) else {
+        let Some(state) = State::from_code(code & 0x7F) else {
             return Some(odd(frame, "unknown state"));
         };
         let before = self.0.insert(node, state);

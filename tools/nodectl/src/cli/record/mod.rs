@@ -1,10 +1,12 @@
 //! `nodectl record`
 
+mod arrow;
 mod plot;
+mod rows;
 mod table;
+mod target;
 
-use std::error::Error;
-use std::io::{self, Write};
+use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,9 +14,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use canopen::{Duration, Instant};
 use clap::Args;
 
+use self::arrow::Arrow;
+use self::plot::Plot;
 pub(super) use self::plot::range;
+pub(super) use self::rows::seconds as seconds_between;
+use self::rows::{Rows, Sink};
 use self::table::Table;
-pub(super) use self::table::seconds as seconds_between;
+use self::target::Target;
 use super::monitor::Source;
 use super::replacement::Replacement;
 use super::{Failure, Session};
@@ -23,7 +29,7 @@ use crate::acquisition::{Acquisition, Sample, Signal};
 /// How often the end of the recording is looked for while nothing arrives.
 const WAKE: Duration = Duration::from_millis(50);
 
-/// Records values over time, as CSV and as a plot.
+/// Records values over time, as CSV, as a stream of Apache Arrow and as a plot.
 ///
 /// Times are those of the bus, where the adapter tells them. What has come is kept however the recording ends: by its
 /// duration, Ctrl-C, SIGTERM or the loss of the bus. A file that is there already is replaced when the new one is complete.
@@ -36,9 +42,13 @@ pub(super) struct Record {
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Duration>,
 
-    /// Table of the values, one row for each time; to the standard output if there is neither this nor a plot.
+    /// Table of the values, one row for each time; to the standard output if there is no other file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+
+    /// The same table as a stream of Apache Arrow, for recordings of days.
+    #[arg(long, value_name = "FILE")]
+    arrow: Option<PathBuf>,
 
     /// Plot of the values.
     #[arg(long, value_name = "FILE")]
@@ -57,19 +67,16 @@ fn seconds(text: &str) -> Result<Duration, String> {
 impl Record {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         // All files are opened before anything is recorded: what cannot be written is told at once.
-        let csv = self.csv.as_deref().map(Replacement::open).transpose()?;
-        let svg = self.svg.as_deref().map(Replacement::open).transpose()?;
+        let files = [&self.csv, &self.arrow, &self.svg];
+        let [csv, arrow, svg] = files.map(|path| path.as_deref().map(Replacement::open).transpose());
+        let (csv, arrow, svg) = (csv?, arrow?, svg?);
         let (mut acquisition, _) = self.source.open(session)?;
         let signals = acquisition.signals().to_vec();
-        let mut table = Table::new(Target::new(csv, svg.is_some()));
-        table.head(&signals)?;
-        let (mut samples, mut count) = (Vec::new(), 0_usize);
+        let mut rows = Rows::new(&signals, sinks(&signals, csv, arrow, svg)?);
+        let mut count = 0_usize;
         let ended = acquire(&mut acquisition, self.duration, |sample| {
             count += 1;
-            if svg.is_some() {
-                samples.push(sample.clone());
-            }
-            table.take(sample)
+            rows.take(sample)
         });
         if count == 0 {
             ended?;
@@ -77,73 +84,42 @@ impl Record {
             return Err(Failure::Silence(format!("nothing is recorded: {hint}")));
         }
         // Whatever has ended the recording: what has come is kept.
-        table.end_row()?;
-        let rows = table.rows();
-        table.into_inner()?.complete()?;
-        if let (Some(path), Some(file)) = (&self.svg, svg) {
-            write_plot(file, &signals, &samples).map_err(|error| Failure::file(path, error))?;
-        }
-        self.tell(rows);
+        self.tell(rows.complete()?);
         ended
     }
 
     /// What has been written.
     fn tell(&self, rows: usize) {
-        let csv = self.csv.iter().map(|path| format!("{rows} rows in {}", path.display()));
+        let tables =
+            self.csv.iter().chain(&self.arrow).map(|path| format!("{rows} rows in {}", path.display()));
         let svg = self.svg.iter().map(|path| format!("a plot in {}", path.display()));
-        let written: Vec<String> = csv.chain(svg).collect();
+        let written: Vec<String> = tables.chain(svg).collect();
         if !written.is_empty() {
             eprintln!("{}", written.join(", "));
         }
     }
 }
 
-fn write_plot(mut file: Replacement, signals: &[Signal], samples: &[Sample]) -> Result<(), Box<dyn Error>> {
-    file.write_all(plot::draw(signals, samples)?.as_bytes())?;
-    Ok(file.complete()?)
-}
-
-/// Where the table goes.
-enum Target {
-    File(Replacement),
-    Standard(io::Stdout),
-    /// Only a plot is wanted.
-    Nowhere,
-}
-
-impl Target {
-    fn new(csv: Option<Replacement>, has_plot: bool) -> Target {
-        match csv {
-            Some(file) => Target::File(file),
-            None if has_plot => Target::Nowhere,
-            None => Target::Standard(io::stdout()),
-        }
+/// Where the rows go: to all files, and to the standard output when there are none.
+fn sinks(
+    signals: &[Signal],
+    csv: Option<Replacement>,
+    arrow: Option<Replacement>,
+    svg: Option<Replacement>,
+) -> Result<Vec<Box<dyn Sink>>, Failure> {
+    let has_other = arrow.is_some() || svg.is_some();
+    let csv = csv.map(Target::File).or_else(|| (!has_other).then(|| Target::Standard(io::stdout())));
+    let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
+    if let Some(target) = csv {
+        sinks.push(Box::new(Table::new(target, signals)?));
     }
-
-    fn complete(self) -> Result<(), Failure> {
-        match self {
-            Target::File(file) => file.complete(),
-            Target::Standard(_) | Target::Nowhere => Ok(()),
-        }
+    if let Some(file) = arrow {
+        sinks.push(Box::new(Arrow::new(file, signals)?));
     }
-}
-
-impl Write for Target {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Target::File(file) => file.write(bytes),
-            Target::Standard(out) => out.write(bytes),
-            Target::Nowhere => Ok(bytes.len()),
-        }
+    if let Some(file) = svg {
+        sinks.push(Box::new(Plot::new(file, signals)));
     }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Target::File(file) => file.flush(),
-            Target::Standard(out) => out.flush(),
-            Target::Nowhere => Ok(()),
-        }
-    }
+    Ok(sinks)
 }
 
 /// Takes samples until the time is over or a signal (Ctrl-C, SIGTERM) comes.

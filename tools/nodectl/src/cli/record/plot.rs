@@ -1,14 +1,17 @@
 //! The recording as a plot: a chart for each unit, one above the other.
 
 use std::error::Error;
+use std::io::{self, Write};
 use std::ops::Range;
 
-use canopen::Instant;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::table::{seconds, title};
-use crate::acquisition::{Sample, Signal};
+use super::rows::{Row, Sink, title};
+use crate::acquisition::Signal;
+use crate::cli::Failure;
+use crate::cli::replacement::Replacement;
+use crate::value::Value;
 
 const WIDTH: u32 = 1000;
 /// Of one chart.
@@ -26,9 +29,41 @@ struct Chart {
     lines: Vec<Line>,
 }
 
-/// Draws all signals that are numbers, above one another on one time axis. The text of the file.
-pub(super) fn draw(signals: &[Signal], samples: &[Sample]) -> Result<String, Box<dyn Error>> {
-    let charts = charts(signals, samples);
+/// Draws all signals that are numbers, above one another on one time axis, when there are no more rows.
+pub(super) struct Plot {
+    to: Replacement,
+    /// One for each signal.
+    lines: Vec<Line>,
+    units: Vec<String>,
+}
+
+impl Plot {
+    pub(super) fn new(to: Replacement, signals: &[Signal]) -> Plot {
+        let lines = signals.iter().map(|signal| Line { title: title(signal), points: vec![] }).collect();
+        Plot { to, lines, units: signals.iter().map(|signal| signal.unit.clone()).collect() }
+    }
+}
+
+impl Sink for Plot {
+    fn write(&mut self, row: &Row) -> Result<(), Failure> {
+        for (line, value) in self.lines.iter_mut().zip(&row.values) {
+            let number = value.as_ref().and_then(Value::as_f64).filter(|number| number.is_finite());
+            line.points.extend(number.map(|number| (row.seconds, number)));
+        }
+        Ok(())
+    }
+
+    fn complete(self: Box<Self>) -> Result<(), Failure> {
+        let Plot { mut to, lines, units } = *self;
+        let text = draw(&charts(lines, units))
+            .map_err(|error| Failure::Output(io::Error::other(error.to_string())))?;
+        to.write_all(text.as_bytes())?;
+        to.complete()
+    }
+}
+
+/// The text of the file.
+fn draw(charts: &[Chart]) -> Result<String, Box<dyn Error>> {
     let rows = charts.len().max(1);
     let size = (WIDTH, HEIGHT * u32::try_from(rows)?);
     let mut text = String::new();
@@ -43,20 +78,13 @@ pub(super) fn draw(signals: &[Signal], samples: &[Sample]) -> Result<String, Box
     Ok(text)
 }
 
-fn charts(signals: &[Signal], samples: &[Sample]) -> Vec<Chart> {
-    let start = samples.first().map_or(Instant(0), |sample| sample.at);
+/// What has the same unit shares a chart.
+fn charts(lines: Vec<Line>, units: Vec<String>) -> Vec<Chart> {
     let mut charts: Vec<Chart> = Vec::new();
-    for (number, signal) in signals.iter().enumerate() {
-        let of_signal = samples.iter().filter(|sample| sample.signal == number);
-        let points = of_signal.filter_map(|sample| Some((seconds(start, sample.at), sample.value.as_f64()?)));
-        let points: Vec<_> = points.filter(|(_, value)| value.is_finite()).collect();
-        if points.is_empty() {
-            continue;
-        }
-        let line = Line { title: title(signal), points };
-        match charts.iter_mut().find(|chart| chart.unit == signal.unit) {
+    for (line, unit) in lines.into_iter().zip(units).filter(|(line, _)| !line.points.is_empty()) {
+        match charts.iter_mut().find(|chart| chart.unit == unit) {
             Some(chart) => chart.lines.push(line),
-            None => charts.push(Chart { unit: signal.unit.clone(), lines: vec![line] }),
+            None => charts.push(Chart { unit, lines: vec![line] }),
         }
     }
     charts
