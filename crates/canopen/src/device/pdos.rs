@@ -249,7 +249,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// The layout of the first `count` mapping entries.
     fn layout(&self, pdo: Pdo, count: u8) -> Result<Layout, Abort> {
-        let mut layout = Layout::default();
+        let mut layout = Layout::EMPTY;
         for slot in 0..count {
             let mapped = MappedObject::parse(self.basic().number(pdo.mapping(), slot + 1));
             layout.push(locate(self.basic.dictionary, mapped, pdo.direction())?)?;

@@ -16,17 +16,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if self.rpdo_filter & filter_bit(frame.id()) == 0 {
             return;
         }
-        let stands_in = self.all_nodes.filter(|(id, _)| id.is_of_same_service(frame.id()));
-        let is_own = |rpdo: &crate::pdo::Rpdo| rpdo.id().is_some_and(|id| id.get() == frame.id());
-        let stands_in =
-            stands_in.filter(|_| !self.rpdos.iter().any(is_own)).map(|(_, place)| usize::from(place));
-        let mut links = self.first_rpdos;
+        let (mut links, mut is_own) = (self.first_rpdos, false);
         while let Some(rpdo) = self.rpdos.get(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
-            if is_own(rpdo) || stands_in == Some(place) {
+            if rpdo.is_of(frame) {
+                is_own = true;
                 self.take_rpdo(place, frame, now);
             }
+        }
+        // A node that has no RPDO of its own is left to the one for all nodes.
+        if let Some((id, place)) = self.all_nodes
+            && !is_own
+            && id.is_of_same_service(frame.id())
+        {
+            self.take_rpdo(place.into(), frame, now);
         }
     }
 

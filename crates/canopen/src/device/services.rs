@@ -117,10 +117,8 @@ impl<B: Body> Node<B> {
     #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
     fn on_request(&mut self, request: &[u8; 8], turn: &mut Turn<'_, impl Transmit>) {
         let Services { server, reply_due, .. } = &mut self.services;
-        let was_idle = server.is_idle();
         let has_reply = server.answer(request, &mut self.body, turn.now);
-        // A deadline that was there is later now, but for the pause within a block.
-        if was_idle && !server.is_idle() || server.is_within_block() {
+        if !server.is_idle() {
             self.body.basic_mut().serve_until(server.deadline());
         }
         // Only a request without a reply starts a block.
