@@ -1,8 +1,10 @@
 //! What the user sees: a live screen on a terminal, plain lines elsewhere, nothing beside JSON.
 
+mod nodes;
 mod plain;
 mod screen;
 mod tpdo;
+mod view;
 
 use std::io::{self, IsTerminal};
 

@@ -5,7 +5,7 @@ use crate::status::NodeStatus;
 
 /// The first value of the last TPDO 1 with its unit. A PDO that is mapped otherwise is shown as it is.
 pub(super) fn value(node: &NodeStatus) -> String {
-    let Some(data) = &node.heard.tpdo1 else { return "no TPDO".to_owned() };
+    let Some(data) = &node.heard.tpdo1 else { return "none".to_owned() };
     match (node.personality, data.as_slice()) {
         // Two process values, the first in bar.
         (Personality::Pressure, &[a, b, c, d, _, _, _, _]) => {
@@ -44,6 +44,6 @@ mod tests {
     fn what_is_mapped_otherwise_is_shown_as_it_is() {
         assert_eq!(shown(Personality::Pressure, Some(&[0x12, 0xAB])), "12AB");
         assert_eq!(shown(Personality::Encoder, Some(&[])), "");
-        assert_eq!(shown(Personality::Lift, None), "no TPDO");
+        assert_eq!(shown(Personality::Lift, None), "none");
     }
 }
