@@ -291,13 +291,13 @@ impl Tpdo {
         let tells_events = self.settings.events_of.is_some();
         let is_sent = if tells_events { turn.send(frame) } else { turn.send_state(frame) };
         self.pending = !is_sent;
-        if !is_sent {
-            self.inhibited_until = turn.now + RETRY;
-        } else {
+        if is_sent {
             self.data = Some(data);
             if *inhibit != 0 {
                 self.inhibited_until = turn.now + Duration::from_inhibit(*inhibit);
             }
+        } else {
+            self.inhibited_until = turn.now + RETRY;
         }
         if transmission.is_event_driven() && self.event_due == Instant::NEVER {
             self.event_due = self.following_event(turn.now);
