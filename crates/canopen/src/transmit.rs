@@ -15,7 +15,8 @@ impl core::fmt::Display for QueueFull {
 
 impl core::error::Error for QueueFull {}
 
-/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others.
+/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others, and that of a
+/// [`ServiceDevice`](crate::ServiceDevice) for two.
 pub trait Transmit {
     /// Queues one frame.
     ///

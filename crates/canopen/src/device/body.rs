@@ -17,6 +17,9 @@ pub trait Body: Sized {
     /// The memory of all values.
     type Image;
 
+    /// Frames for which a block upload leaves room in the queue: a heartbeat and an answer of LSS.
+    const RESERVED_ROOM: usize = 2;
+
     /// A device that has not started.
     fn new(dictionary: &'static Dictionary, node_id: Option<NodeId>, application: Self::Application) -> Self;
 

@@ -47,6 +47,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     type Application = A;
     type Image = [u8; N];
 
+    /// All PDOs of a SYNC, a heartbeat, an EMCY.
+    const RESERVED_ROOM: usize = 10;
+
     fn new(dictionary: &'static Dictionary, node_id: Option<NodeId>, application: A) -> Self {
         let emcy = emcy::Producer::new(A::CONDITIONS, application.register_bits());
         Full {

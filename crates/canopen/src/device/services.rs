@@ -12,8 +12,6 @@ use crate::{CanId, Frame, Instant, NodeId, Transmit};
 const SDO_RESPONSE: u16 = 0x580;
 const SDO_REQUEST: u16 = 0x600;
 const ERROR_CONTROL: u16 = 0x700;
-/// Frames for which a block upload leaves room in the queue: all PDOs of a SYNC, a heartbeat, an EMCY.
-const RESERVED_ROOM: usize = 10;
 
 /// What serves a device: the SDO server and the LSS slave, with their responses.
 #[derive(Debug)]
@@ -138,7 +136,7 @@ impl<B: Body> Node<B> {
         let id = self.body.basic().service(SDO_RESPONSE);
         let server = &mut self.services.server;
         let has_reply = server.send_block(&self.body, turn.now, |data| {
-            turn.room() > RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
+            turn.room() > B::RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
         });
         let block_due = if server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
         self.services.block_due = block_due;

@@ -44,17 +44,23 @@ impl Application for Loader {
     }
 }
 
+/// A short queue: eight frames at a time.
 #[derive(Default)]
 struct Sent(Vec<Frame>);
 
+const ROOM: usize = 8;
+
 impl Transmit for Sent {
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        if self.room() == 0 {
+            return Err(QueueFull);
+        }
         self.0.push(frame);
         Ok(())
     }
 
     fn room(&self) -> usize {
-        usize::MAX
+        ROOM - self.0.len()
     }
 }
 
@@ -162,6 +168,25 @@ fn lss_tells_its_identity() {
     bench.receive(Frame::new(0x7E5, &[4, 1, 0, 0, 0, 0, 0, 0]).unwrap());
     let answers = bench.receive(Frame::new(0x7E5, &[0x5A, 0, 0, 0, 0, 0, 0, 0]).unwrap());
     assert_eq!(answers, [Frame::new(0x7E4, &[0x5A, 1, 0, 0, 0, 0, 0, 0]).unwrap()]);
+}
+
+#[test]
+fn a_block_upload_goes_through_a_short_queue() {
+    let mut bench = Bench::booted();
+    let content: Vec<u8> = (0..84).collect();
+    assert_eq!(bench.write(DOMAIN.index, DOMAIN.sub, &content), Ok(()));
+    let id = 0x600 + u16::from(ID);
+    let begin = Request::BlockUpload { at: DOMAIN, crc: true, block_size: 127, threshold: 0 };
+    bench.receive(Frame::new(id, &begin.encode()).unwrap());
+    let mut frames = bench.receive(Frame::new(id, &Request::BlockUploadStart.encode()).unwrap());
+    while frames.len() < 12 {
+        assert!(bench.now < Instant(1_100_000), "only {} of 12 segments", frames.len());
+        let mut out = Sent::default();
+        bench.now = bench.device.poll(bench.now, &mut out).due().max(bench.now);
+        frames.extend(out.0);
+    }
+    let data: Vec<u8> = frames.iter().flat_map(|frame| frame.data()[1..].to_vec()).collect();
+    assert_eq!(data, content);
 }
 
 #[test]
