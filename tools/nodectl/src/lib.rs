@@ -18,6 +18,7 @@
 pub mod acquisition;
 pub mod bus;
 mod catalogue;
+pub mod check;
 pub mod cli;
 pub mod configuration;
 pub mod heartbeat;
@@ -39,4 +40,4 @@ pub mod update;
 pub mod value;
 
 pub use catalogue::Catalogue;
-pub use network::Network;
+pub use network::{Logged, Network};

@@ -15,6 +15,22 @@ const KEPT: usize = 4096;
 /// Frames that a service is handed between two of its steps. A bus that is flooded must not hold up its deadline.
 const AT_ONCE: usize = 256;
 
+/// Frames that a log takes; what comes later is not written down.
+const LOGGED: usize = 100_000;
+
+/// A frame of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Logged {
+    /// The frame.
+    pub frame: Frame,
+    /// When it was on the bus, by the clock of the adapter; when this side sent the frame, by the clock of this side.
+    pub at: Instant,
+    /// When it was received or sent, by the clock of this side.
+    pub here: Instant,
+    /// Whether this side sent it.
+    pub is_sent: bool,
+}
+
 /// A bus that can be opened again when it is lost.
 pub struct Network {
     opener: Box<dyn FnMut() -> Result<Box<dyn Bus>, BusError>>,
@@ -22,6 +38,7 @@ pub struct Network {
     kept: VecDeque<Received>,
     /// Time stamp of the newest frame and when it arrived.
     newest: Option<(Instant, Instant)>,
+    log: Option<Vec<Logged>>,
 }
 
 impl Network {
@@ -33,7 +50,7 @@ impl Network {
         mut opener: impl FnMut() -> Result<Box<dyn Bus>, BusError> + 'static,
     ) -> Result<Network, BusError> {
         let bus = opener()?;
-        Ok(Network { opener: Box::new(opener), bus, kept: VecDeque::new(), newest: None })
+        Ok(Network { opener: Box::new(opener), bus, kept: VecDeque::new(), newest: None, log: None })
     }
 
     /// Opens the bus anew. What is kept of the old one is dropped.
@@ -83,7 +100,32 @@ impl Network {
     /// # Errors
     /// The bus is lost.
     pub fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.bus.send(frame)
+        self.bus.send(frame)?;
+        let now = self.bus.now();
+        self.write_down(Logged { frame: *frame, at: now, here: now, is_sent: true });
+        Ok(())
+    }
+
+    /// Begins a log of all frames, sent and received. One that was begun before is dropped.
+    pub fn begin_log(&mut self) {
+        self.log = Some(Vec::new());
+    }
+
+    /// The frames since [`begin_log`](Network::begin_log), in their order.
+    #[must_use]
+    pub fn log(&self) -> &[Logged] {
+        self.log.as_deref().unwrap_or_default()
+    }
+
+    /// Ends the log.
+    pub fn end_log(&mut self) {
+        self.log = None;
+    }
+
+    fn write_down(&mut self, logged: Logged) {
+        if let Some(log) = self.log.as_mut().filter(|log| log.len() < LOGGED) {
+            log.push(logged);
+        }
     }
 
     /// The next frame; `None` when there was none until then. First come those that [`wait`](Network::wait) passed over.
@@ -191,7 +233,9 @@ impl Network {
     fn fetch(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
         let received = self.bus.receive(until)?;
         if let Some(received) = received {
-            self.newest = Some((received.at, self.bus.now()));
+            let here = self.bus.now();
+            self.newest = Some((received.at, here));
+            self.write_down(Logged { frame: received.frame, at: received.at, here, is_sent: false });
         }
         Ok(received)
     }

@@ -24,7 +24,8 @@ Exit codes:
   5  the node did not accept the new program, or has another than it was given
   6  the program is not for this node; nothing was changed
   7  a file cannot be read or written
-  8  two configurations differ (diff)";
+  8  two configurations differ (diff)
+  9  the device does not conform (check)";
 
 /// Why a command failed.
 #[derive(Debug, Error)]
@@ -67,6 +68,14 @@ pub enum Failure {
     /// Two configurations are not the same.
     #[error("{0} parameters differ")]
     Different(usize),
+    /// Checks of a device failed, or it did not take back what was changed; each was told already.
+    #[error("{failed} checks failed{}", left_words(.left_behind))]
+    NotConforming {
+        /// How many did.
+        failed: usize,
+        /// What the device did not take back.
+        left_behind: Vec<String>,
+    },
     /// A node does not have what was written to it.
     #[error("still different after it was written: {0}")]
     NotApplied(String),
@@ -116,6 +125,7 @@ impl Failure {
         match self {
             Failure::Usage(_) => 2,
             Failure::Different(_) => 8,
+            Failure::NotConforming { .. } => 9,
             Failure::NotApplied(_) => 1,
             Failure::Sdo(error) => sdo_code(error),
             Failure::Lss(lss::Error::Service(Service::Refused(..))) => 1,
@@ -126,6 +136,10 @@ impl Failure {
             Failure::File { .. } | Failure::Output(_) => 7,
         }
     }
+}
+
+fn left_words(left_behind: &[String]) -> String {
+    if left_behind.is_empty() { String::new() } else { format!(", not put back: {}", left_behind.join(", ")) }
 }
 
 fn sdo_code(error: &sdo::Error) -> u8 {

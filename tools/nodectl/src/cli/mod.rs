@@ -1,5 +1,6 @@
 //! The command line: one file for each command.
 
+mod check;
 mod dump;
 mod failure;
 mod info;
@@ -65,6 +66,7 @@ enum Command {
     Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Update(update::Update),
+    Check(check::Check),
     Completions(manual::Completions),
     Man(manual::Man),
 }
@@ -88,6 +90,7 @@ impl Cli {
         match &self.command {
             Command::Diff(diff) => diff.needs_a_bus(),
             Command::Trace(trace) => trace.needs_a_bus(),
+            Command::Check(check) => check.needs_a_bus(),
             Command::Completions(_) | Command::Man(_) => false,
             _ => true,
         }
@@ -117,6 +120,7 @@ impl Cli {
             Command::Nmt(nmt) => nmt.run(session),
             Command::Lss(lss) => lss.run(session),
             Command::Update(update) => update.run(session),
+            Command::Check(check) => check.run(session),
             Command::Completions(completions) => completions.run(session),
             Command::Man(man) => man.run(session),
         }

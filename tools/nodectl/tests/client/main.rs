@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod blocks;
+mod check;
 mod commands;
 mod configuration;
 mod hostile;

@@ -34,6 +34,7 @@ fn the_help_lists_the_exit_codes() {
         "nmt",
         "lss",
         "update",
+        "check",
         "completions",
         "man",
     ] {
@@ -45,7 +46,7 @@ fn the_help_lists_the_exit_codes() {
 /// Every command is completed in every shell, and has a manual page.
 #[test]
 fn shells_and_man_know_every_command() {
-    const COMMANDS: [&str; 4] = ["scan", "trace", "lss", "update"];
+    const COMMANDS: [&str; 5] = ["scan", "trace", "lss", "update", "check"];
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let (code, script, error) = nodectl("socketcan:none", &["completions", shell]);
         assert_eq!((code, error.as_str()), (0, ""), "{shell}");
@@ -63,7 +64,7 @@ fn shells_and_man_know_every_command() {
     std::fs::create_dir_all(&dir).expect("a directory");
     let (code, out, error) = nodectl("socketcan:none", &["man", "--dir", dir.to_str().expect("text")]);
     assert_eq!((code, out.as_str(), error.as_str()), (0, "", ""));
-    for page in ["nodectl.1", "nodectl-read.1", "nodectl-lss-scan.1"] {
+    for page in ["nodectl.1", "nodectl-read.1", "nodectl-lss-scan.1", "nodectl-check.1"] {
         let text = std::fs::read_to_string(dir.join(page)).expect(page);
         assert!(text.contains(".SH SYNOPSIS"), "{page}");
     }

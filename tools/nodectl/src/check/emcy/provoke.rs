@@ -1,0 +1,48 @@
+//! Errors that a tool can cause: a heartbeat that is missing.
+
+use super::super::prelude::*;
+use super::super::subject::Mark;
+use crate::Logged;
+
+/// The emergency error code of a missing heartbeat.
+pub(super) const LIFE: u16 = 0x8130;
+
+/// Lets the device miss the heartbeat of a node that is not there; from where the EMCY is in the log. Skipped where the
+/// device watches no heartbeat.
+pub(super) fn lose_heartbeat(s: &mut Subject<'_>, node: u16) -> Outcome<Mark> {
+    s.need_solitude()?;
+    if s.try_read(0x1016, 1)?.is_err() {
+        return Err(skip("no error can be caused from the bus: the device has no 1016h"));
+    }
+    s.set(0x1016, 1, u32::from(node) << 16 | 100)?;
+    let mark = s.mark();
+    s.send(0x700 + node, &[0x05])?;
+    s.pass(400)?;
+    Ok(mark)
+}
+
+/// The node is back, and the error gone.
+pub(super) fn heartbeat_is_back(s: &mut Subject<'_>, node: u16) -> Outcome<Mark> {
+    let mark = s.mark();
+    s.send(0x700 + node, &[0x05])?;
+    s.pass(20)?;
+    s.set(0x1016, 1, 0)?;
+    s.pass(300)?;
+    Ok(mark)
+}
+
+/// The EMCY messages since then.
+pub(super) fn messages(s: &Subject<'_>, mark: Mark) -> Vec<Logged> {
+    s.heard(mark, 0x80 + s.id())
+}
+
+/// The error codes since then.
+pub(super) fn codes(s: &Subject<'_>, mark: Mark) -> Vec<u16> {
+    let code = |heard: &Logged| Some(u16::from_le_bytes(*heard.frame.data().first_chunk()?));
+    messages(s, mark).iter().filter_map(code).collect()
+}
+
+/// A node-ID that nobody has.
+pub(super) fn nobody(s: &Subject<'_>) -> u16 {
+    if s.id() == 0x6F { 0x6E } else { 0x6F }
+}

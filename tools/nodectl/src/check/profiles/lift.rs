@@ -1,0 +1,24 @@
+//! CiA 417: what every device of a lift has.
+
+use super::super::prelude::*;
+use super::{has, names};
+
+pub(super) const CHECKS: &[Check] = &[
+    Check::new("P417-01", "1000h names CiA 417", "CiA 417-1, device type", names::<417>),
+    Check::new("P417-02", "6000h tells the virtual devices", "CiA 417-2, object 6000h", has::<0x6000, 0, 1>),
+    Check::new("P417-03", "6000h:1 can be read", "CiA 417-2, object 6000h", has::<0x6000, 1, 2>),
+    Check::new("P417-04", "6001h tells the lift", "CiA 417-2, object 6001h", lift_number),
+    Check::new("P417-05", "A PDO of the lift is there", "CiA 417-3", pdos),
+];
+
+fn lift_number(s: &mut Subject<'_>) -> Outcome {
+    let number = s.number(0x6001, 0)?;
+    ensure(number <= 0xFF, "a lift in one byte", format!("{number:X}h"))
+}
+
+/// The PDOs that CiA 417 defines, beyond the four of the pre-defined connection set.
+fn pdos(s: &mut Subject<'_>) -> Outcome {
+    let sheet = s.sheet()?;
+    let is_one = |index: u16| matches!(index, 0x1400..=0x15FF | 0x1800..=0x19FF);
+    ensure(sheet.objects.keys().any(|index| is_one(*index)), "a PDO", "none in the data sheet")
+}

@@ -1,0 +1,103 @@
+//! Frames: what is sent, and what the device sends of its own.
+
+use canopen::{Duration, Frame};
+
+use super::Subject;
+use crate::Logged;
+use crate::check::Outcome;
+use crate::check::verdict::skip;
+
+/// A place in the log of the bus.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::check) struct Mark(usize);
+
+impl Subject<'_> {
+    /// From here on.
+    pub(in crate::check) fn mark(&self) -> Mark {
+        Mark(self.network.log().len())
+    }
+
+    /// Lets so many milliseconds pass.
+    pub(in crate::check) fn pass(&mut self, ms: u64) -> Outcome {
+        self.network.pause(Duration::from_millis(ms))?;
+        self.network.forget();
+        Ok(())
+    }
+
+    /// Sends a frame.
+    pub(in crate::check) fn send(&mut self, id: u16, data: &[u8]) -> Outcome {
+        self.transmit(Frame::new(id, data))
+    }
+
+    /// Sends a remote frame.
+    pub(in crate::check) fn remote(&mut self, id: u16, len: u8) -> Outcome {
+        self.transmit(Frame::remote(id, len))
+    }
+
+    fn transmit(&mut self, frame: Option<Frame>) -> Outcome {
+        match frame {
+            Some(frame) => Ok(self.network.send(&frame)?),
+            None => Err(skip("no such frame can be sent")),
+        }
+    }
+
+    /// What has come since then.
+    pub(in crate::check) fn since(&self, mark: Mark) -> impl Iterator<Item = &Logged> {
+        self.network.log().iter().skip(mark.0).filter(|logged| !logged.is_sent)
+    }
+
+    /// The data frames with this CAN-ID that have come since then.
+    pub(in crate::check) fn heard(&self, mark: Mark, id: u16) -> Vec<Logged> {
+        self.since(mark)
+            .filter(|logged| logged.frame.id() == id && !logged.frame.is_remote())
+            .copied()
+            .collect()
+    }
+
+    /// The newest data frame with this CAN-ID in the log.
+    pub(in crate::check) fn newest(&self, id: u16) -> Option<Logged> {
+        self.heard(Mark(0), id).last().copied()
+    }
+
+    /// The first data frame with this CAN-ID since then; waits so many milliseconds for one.
+    pub(in crate::check) fn next(&mut self, mark: Mark, id: u16, ms: u64) -> Outcome<Option<Logged>> {
+        let until = self.network.now() + Duration::from_millis(ms);
+        loop {
+            if let Some(heard) = self.heard(mark, id).first() {
+                return Ok(Some(*heard));
+            }
+            if self.network.now() >= until {
+                return Ok(None);
+            }
+            self.network.wait(until, |frame| (frame.id() == id).then_some(()))?;
+            self.network.forget();
+        }
+    }
+
+    /// Sends a SYNC, and lets time pass until it has its effect.
+    pub(in crate::check) fn sync(&mut self) -> Outcome {
+        self.send(0x080, &[])?;
+        self.pass(20)
+    }
+
+    /// Nothing is sent that is for all nodes while others are on the bus.
+    pub(in crate::check) fn need_solitude(&self) -> Outcome {
+        if self.has_company {
+            Err(skip("other nodes are on the bus, and the frame would be for them too"))
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Listens for this long whether there are others.
+    pub(in crate::check) fn look_round(&mut self, ms: u64) -> Outcome {
+        let mark = self.mark();
+        self.pass(ms)?;
+        let own = self.id();
+        let others = self
+            .since(mark)
+            .filter(|logged| matches!(logged.frame.id(), 0x701..=0x77F) && logged.frame.id() & 0x7F != own);
+        self.has_company = others.count() > 0;
+        Ok(())
+    }
+}

@@ -1,0 +1,83 @@
+//! The NMT state of the device and its restart.
+
+use canopen::nmt::{Command, State};
+
+use super::Subject;
+use crate::check::Outcome;
+use crate::check::verdict::{fail, skip};
+
+/// How long a device may take to change its state.
+const SETTLE: u64 = 20;
+
+impl Subject<'_> {
+    /// Sends an NMT command to the device.
+    pub(in crate::check) fn command(&mut self, command: Command) -> Outcome {
+        self.send(0x000, &command.encode(Some(self.setup.node)))
+    }
+
+    /// Brings the device into a state, and gives it a little time.
+    pub(in crate::check) fn enter(&mut self, state: State) -> Outcome {
+        self.command(match state {
+            State::Operational => Command::Start,
+            State::Stopped => Command::Stop,
+            _ => Command::EnterPreOperational,
+        })?;
+        self.pass(SETTLE)
+    }
+
+    /// The CAN-ID of heartbeat, boot-up and guarding.
+    pub(in crate::check) fn error_control(&self) -> u16 {
+        0x700 + self.id()
+    }
+
+    /// Switches a heartbeat on; skipped where the device has none.
+    pub(in crate::check) fn beat(&mut self, ms: u32) -> Outcome {
+        self.need(0x1017, 0)?;
+        self.set(0x1017, 0, ms)
+    }
+
+    /// The state that the next heartbeat tells; a heartbeat has to be on.
+    pub(in crate::check) fn told_state(&mut self) -> Outcome<u8> {
+        let (mark, id) = (self.mark(), self.error_control());
+        let heard = self.next(mark, id, 500)?;
+        let heard = heard.ok_or_else(|| fail("a heartbeat", "none in 500 ms"))?;
+        heard.frame.data().first().copied().ok_or_else(|| fail("a heartbeat of one byte", "no byte"))
+    }
+
+    /// The next heartbeat tells this state.
+    pub(in crate::check) fn tells(&mut self, state: State) -> Outcome {
+        let seen = self.told_state()?;
+        if seen == state.code() {
+            return Ok(());
+        }
+        Err(fail(format!("a heartbeat with the state {:02X}h", state.code()), format!("{seen:02X}h")))
+    }
+
+    /// Restarts the device or its communication, and waits for the boot-up message.
+    pub(in crate::check) fn reset(&mut self, command: Command) -> Outcome {
+        let (mark, id, time) = (self.mark(), self.error_control(), self.setup.boot.0 / 1000);
+        self.command(command)?;
+        let until = self.network.now().0 / 1000 + time;
+        loop {
+            let left = until.saturating_sub(self.network.now().0 / 1000);
+            let boot_ups = self.heard(mark, id).iter().filter(|heard| heard.frame.data() == [0]).count();
+            if boot_ups > 0 {
+                return self.pass(SETTLE);
+            }
+            if left == 0 {
+                return Err(fail("a boot-up message", format!("none in {time} ms")));
+            }
+            self.pass(left.min(SETTLE))?;
+        }
+    }
+
+    /// The device rests in Pre-operational after a restart; one that starts by itself is skipped.
+    pub(in crate::check) fn need_no_self_start(&mut self) -> Outcome {
+        match self.optional(0x1F80, 0)? {
+            Some(value) if value & 0x04 == 0 && value != 0 => {
+                Err(skip("1F80h lets the device start by itself"))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! What the data sheet says of the device.
+
+use eds::{Class, Eds, Entry};
+
+use super::Subject;
+use crate::check::Outcome;
+use crate::check::verdict::skip;
+
+impl Subject<'_> {
+    /// The data sheet; skipped where there is none.
+    pub(in crate::check) fn sheet(&self) -> Outcome<Eds> {
+        self.setup.sheet.clone().ok_or_else(|| skip("no data sheet: give it with --eds"))
+    }
+
+    /// The entries of the data sheet that are wanted.
+    pub(in crate::check) fn entries(&self, is_wanted: impl Fn(&Entry) -> bool) -> Outcome<Vec<Entry>> {
+        Ok(self.sheet()?.entries().filter(|entry| is_wanted(entry)).cloned().collect())
+    }
+
+    /// The first entry of the data sheet that is wanted; skipped where there is none.
+    pub(in crate::check) fn entry(&self, what: &str, is_wanted: impl Fn(&Entry) -> bool) -> Outcome<Entry> {
+        let sheet = self.sheet()?;
+        sheet
+            .entries()
+            .find(|entry| is_wanted(entry))
+            .cloned()
+            .ok_or_else(|| skip(format!("the data sheet has no {what}")))
+    }
+}
+
+/// The bytes that a value of a number type has; `None` for text and bytes.
+pub(in crate::check) fn size(entry: &Entry) -> Option<usize> {
+    match entry.data_type.class() {
+        Class::Signed(bits) | Class::Unsigned(bits) | Class::Real(bits) => {
+            Some(usize::from(bits).div_ceil(8))
+        }
+        Class::Text | Class::Bytes => None,
+    }
+}

@@ -1,0 +1,160 @@
+//! Each switch makes the device wrong in one way, and names the checks that are red then. Every check is red for at least one switch,
+//! and green without ([`reference`](super::reference)); the table of both is docs/check-switches.md.
+
+mod emcy;
+mod lss;
+mod network;
+mod objects;
+mod pdo;
+mod robustness;
+mod sdo;
+mod sheet;
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::path::Path;
+
+use eds::Eds;
+use nodectl::check::{self, Profile, Run};
+
+use super::faulty::{Faulty, Layer};
+use super::{complaints, device, judge};
+use crate::wire::Wire;
+
+/// A way to be wrong.
+struct Switch {
+    /// What the device does, in words.
+    name: &'static str,
+    /// The checks that tell.
+    red: &'static [&'static str],
+    /// What is different in the data sheet.
+    sheet: fn(&mut Eds),
+    /// What is different on the bus.
+    layer: Layer,
+}
+
+/// A fault of the device.
+fn fault(name: &'static str, red: &'static [&'static str], layer: Layer) -> Switch {
+    Switch { name, red, sheet: |_| (), layer }
+}
+
+/// A fault of the data sheet.
+fn misprint(name: &'static str, red: &'static [&'static str], sheet: fn(&mut Eds)) -> Switch {
+    Switch { name, red, sheet, layer: Box::new(|_| ()) }
+}
+
+fn all() -> Vec<Switch> {
+    let groups = [
+        sheet::switches(),
+        objects::switches(),
+        sdo::switches(),
+        network::switches(),
+        emcy::switches(),
+        pdo::switches(),
+        lss::switches(),
+        robustness::switches(),
+    ];
+    groups.into_iter().flatten().collect()
+}
+
+/// The profile that a check belongs to.
+fn profile_of(id: &str) -> Option<Profile> {
+    match id.split('-').next() {
+        Some("P401") => Some(Profile::Io),
+        Some("P404") => Some(Profile::Measuring),
+        Some("P406") => Some(Profile::Encoder),
+        Some("P417") => Some(Profile::Lift),
+        _ => None,
+    }
+}
+
+impl Switch {
+    /// Runs checks against the device with this fault.
+    fn judge(self, only: &[&str]) -> Run {
+        let profile = self.red.first().and_then(|id| profile_of(id));
+        let mut sheet = device::sheet(profile);
+        (self.sheet)(&mut sheet);
+        judge(&Wire::new(Faulty::new(profile, self.layer)), Some(sheet), profile, only)
+    }
+}
+
+/// The checks that told something.
+fn red(run: &Run) -> Vec<&'static str> {
+    let told = run.results.iter().filter(|result| result.verdict.deviation().is_some());
+    told.map(|result| result.check.id).collect()
+}
+
+#[test]
+fn every_switch_is_told_by_its_checks() {
+    let mut wrong = Vec::new();
+    for switch in all() {
+        let (name, expected) = (switch.name, switch.red);
+        let run = switch.judge(expected);
+        let green: Vec<&&str> = expected.iter().filter(|id| !red(&run).contains(id)).collect();
+        if !green.is_empty() {
+            wrong.push(format!("{name}: not told by {green:?}: {:?}", complaints(&run)));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_check_is_red_for_a_switch() {
+    let switches = all();
+    assert!(switches.len() >= 60, "{} switches", switches.len());
+    let names: BTreeSet<&str> = switches.iter().map(|switch| switch.name).collect();
+    assert_eq!(names.len(), switches.len(), "two switches have one name");
+    let told: BTreeSet<&str> = switches.iter().flat_map(|switch| switch.red).copied().collect();
+    let known: BTreeSet<&str> = every_check().into_iter().map(|check| check.id).collect();
+    let never: Vec<&&str> = known.difference(&told).collect();
+    assert!(never.is_empty(), "red for no switch: {never:?}");
+    let mut ids: Vec<&str> = check::all(None).iter().map(|check| check.id).collect();
+    ids.sort_unstable();
+    assert!(ids.len() >= 180 && ids.windows(2).all(|pair| pair[0] != pair[1]), "{} checks", ids.len());
+    let unknown: Vec<&&str> = told.difference(&known).collect();
+    assert!(unknown.is_empty(), "no such check: {unknown:?}");
+}
+
+fn every_check() -> Vec<check::Check> {
+    let mut checks: Vec<check::Check> =
+        Profile::ALL.into_iter().flat_map(|profile| check::all(Some(profile))).collect();
+    checks.sort_by_key(|check| check.id);
+    checks.dedup_by_key(|check| check.id);
+    checks
+}
+
+/// A switch says one thing: it does not make most of the checks red. In a thorough run, all checks against all switches.
+#[test]
+fn a_switch_is_told_by_few_checks() {
+    if std::env::var("THOROUGH").is_ok_and(|value| value == "1") {
+        for switch in all() {
+            let name = switch.name;
+            let run = switch.judge(&[]);
+            let (red, count) = (red(&run).len(), run.results.len());
+            println!("{red:3} of {count}: {name}");
+            assert!(red * 2 < count, "{name}: {:?}", complaints(&run));
+        }
+    }
+}
+
+#[test]
+fn the_table_of_the_switches_is_up_to_date() {
+    let mut page = String::from(
+        "# Checks and switches\n\nGenerated by the test `the_table_of_the_switches` of `tools/nodectl` (`UPDATE_TABLE=1`). How each check of `nodectl check` was shown to tell: the faults of a \
+         device in process for which the check is red. Without a fault each is green.\n\n| Check | Rule | Red for a device that …|\n\
+         |---|---|---|\n",
+    );
+    let switches = all();
+    for check in every_check() {
+        let red = switches.iter().filter(|switch| switch.red.contains(&check.id)).map(|switch| switch.name);
+        writeln!(page, "| {} | {} | {} |", check.id, check.title, red.collect::<Vec<&str>>().join("; "))
+            .expect("a string");
+    }
+    let _ = writeln!(page, "\n{} checks, {} switches.", every_check().len(), switches.len());
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/check-switches.md");
+    if std::env::var("UPDATE_TABLE").is_ok_and(|value| value == "1") {
+        std::fs::write(&path, &page).expect("the page can be written");
+    }
+    let old = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(old == page, "docs/check-switches.md is not what the switches say: UPDATE_TABLE=1 writes it");
+}
