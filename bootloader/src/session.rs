@@ -10,7 +10,7 @@ use bsp::can::Controller;
 use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
-use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
+use canopen::{Action, CanId, Duration, Instant, NodeId, ServiceDevice};
 use update::{Decision, Next, Phase, Start, Updater};
 
 use crate::dictionary::{DICTIONARY, ROWS};
@@ -29,7 +29,7 @@ const FAREWELL: Duration = Duration::from_millis(20);
 
 /// Everything but the queues.
 pub(crate) struct Session {
-    device: canopen::device!(Program, ROWS),
+    device: canopen::service_device!(Program, ROWS),
     can: Controller,
     timing: BitTiming,
     back_off: BackOff,
@@ -64,7 +64,7 @@ impl Session {
             let _ = updater.install();
         }
         Session {
-            device: Device::new(&DICTIONARY, identity.node_id, Program::new(updater, TARGET)),
+            device: ServiceDevice::new(&DICTIONARY, identity.node_id, Program::new(updater, TARGET)),
             can,
             timing: identity.timing.unwrap_or(BitTiming::FASTEST),
             back_off: BackOff::default(),
