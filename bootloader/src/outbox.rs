@@ -20,7 +20,7 @@ impl Outbox {
 
     /// Drops what waits.
     pub(crate) fn clear(&mut self) {
-        *self = Outbox::new();
+        self.frames.iter_mut().for_each(|place| *place = None);
     }
 
     pub(crate) fn is_empty(&self) -> bool {

@@ -37,8 +37,6 @@ impl Run {
             let then = self.session.step(&mut self.queue);
             if visit.is_on_bus() {
                 self.queue.pump(&mut self.transmitter);
-            } else {
-                self.queue.clear();
             }
             self.led.set(blink(Clock::now()));
             match then {

@@ -11,7 +11,7 @@ use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
 use canopen::{Action, CanId, Duration, Instant, NodeId, ServiceDevice};
-use update::{Decision, Next, Phase, Start, Updater};
+use update::{Decision, Next, Phase, Proof, Start, Updater};
 
 use crate::dictionary::{DICTIONARY, ROWS};
 use crate::identity::Identity;
@@ -80,14 +80,11 @@ impl Session {
             Step::Found(timing) => {
                 self.timing = timing;
                 self.join(out);
-                self.can.watch_errors();
             }
-            Step::Listen(timing) => {
-                self.can.listen(timing);
-                self.can.watch_errors();
-            }
+            Step::Listen(timing) => self.can.listen(timing),
             Step::Stay => (),
         }
+        self.can.watch_errors();
     }
 
     /// What the controller has heard since the last call.
@@ -145,7 +142,7 @@ impl Session {
 
     /// What was left to copy is copied or was refused: the application starts in either case, if it is good.
     fn start_if_good(&mut self, now: Instant) {
-        let start = Start { stay: false, trial: retained::trial() };
+        let start = Start { stay: false, trial: retained::trial(), proof: Proof::Waived };
         let flash = self.device.application_mut().updater().flash();
         if matches!(update::boot(flash, &TARGET, start), Decision::Start(_)) {
             self.reset = Some(now);

@@ -4,7 +4,7 @@ use bsp::handover::Handover;
 use bsp::loader::Loader;
 use bsp::vectors::Vectors;
 use bsp::{application, retained};
-use update::{Decision, Start, Status, Stay};
+use update::{Decision, Reset, Start, Status, Stay};
 
 use crate::target::TARGET;
 
@@ -33,9 +33,15 @@ pub(crate) fn decide(loader: &mut Loader) -> Outcome {
     }
     let trial = retained::trial().after(loader.reset);
     retained::set_trial(trial);
-    let start = Start { stay: note.is_some_and(|note| note.stay), trial };
+    if loader.reset == Reset::Power {
+        retained::forget_proof();
+    }
+    let start = Start { stay: note.is_some_and(|note| note.stay), trial, proof: retained::proof() };
     match update::boot(&mut loader.flash, &TARGET, start) {
-        Decision::Start(_) => application::vectors().map_or(stay(Stay::Asked, note), Outcome::Application),
+        Decision::Start(header) => {
+            retained::set_proof(&header);
+            application::vectors().map_or(stay(Stay::Asked, note), Outcome::Application)
+        }
         Decision::Copy => Outcome::Stay(Reason::Copy, note),
         Decision::Stay(why @ Stay::NoProgram(_)) => unsigned().map_or(stay(why, note), Outcome::Application),
         Decision::Stay(why) => stay(why, note),

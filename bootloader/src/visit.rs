@@ -38,13 +38,10 @@ impl Visit {
         let heard = session.heard();
         let step = self.0.step(if has_frame { Heard::Frame } else { heard }, Clock::now());
         if step != Step::Stay {
-            // A frame of the old rate may end now; whoever goes on the bus answers all that comes from now on.
-            if matches!(step, Step::Listen(_)) {
-                session.go(step, out);
+            session.go(step, out);
+            // A frame of the old rate may have ended meanwhile. Whoever goes on the bus answers all that comes from then on.
+            if self.0.is_listening() {
                 drop_all(frames);
-            } else {
-                drop_all(frames);
-                session.go(step, out);
             }
         }
     }

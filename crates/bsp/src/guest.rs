@@ -3,7 +3,7 @@
 //! | state | on the bus | it ends with |
 //! |---|---|---|
 //! | trying | yes, at a rate that was stored; nothing was understood yet | a frame that is understood: it stays. The first error: it searches |
-//! | searching | listens, one rate after the other | a frame that is understood: it stays, at that rate. Long silence: it rests |
+//! | searching | listens, one rate after the other | a frame that is understood: it stays, at that rate. |
 //! | resting | listens at 250 kbit/s | a frame that is understood: it stays. An error and no such frame soon: it searches |
 //! | staying | yes | nothing |
 //!
@@ -20,8 +20,6 @@ const ASSUMED: u16 = 250;
 /// So long the frame of a sender that is alone may look like an error: 16 attempts of 135 bits and an error flag at 250 kbit/s
 /// make the sender error passive.
 const ATTEMPTS: Duration = Duration::from_millis(12);
-/// A search that hears nothing for so long has begun with a disturbance. Longer than two rounds at the longest patience of a rate.
-const SEARCH: Duration = Duration::from_millis(25_000);
 
 /// The guest.
 #[derive(Debug)]
@@ -30,8 +28,7 @@ pub struct Guest(State);
 #[derive(Debug)]
 enum State {
     Trying,
-    /// When something was heard last; `None` for a search that never rests.
-    Searching(Detector, Option<Instant>),
+    Searching(Detector),
     /// Since the first error.
     Resting(Option<Instant>),
     Staying,
@@ -50,14 +47,14 @@ impl Guest {
     /// A guest that searches until it understands a frame, whatever the silence (automatic detection). It listens first.
     #[must_use]
     pub fn searching(now: Instant) -> (Guest, Step) {
-        let (_, step) = search(now);
-        (Guest(State::Searching(Detector::new(now), None)), step)
+        let (state, step) = search(now);
+        (Guest(state), step)
     }
 
     /// Whether it only listens.
     #[must_use]
     pub fn is_listening(&self) -> bool {
-        matches!(self.0, State::Searching(..) | State::Resting(_))
+        matches!(self.0, State::Searching(_) | State::Resting(_))
     }
 
     /// Whether it has understood a frame and stays as it is.
@@ -77,14 +74,11 @@ impl Guest {
             (State::Resting(None), _) => (State::Resting(Some(now)), Step::Stay),
             (State::Resting(Some(since)), _) if now < *since + ATTEMPTS => return Step::Stay,
             (State::Trying, Heard::Error) | (State::Resting(_), _) => search(now),
-            (State::Searching(_, Some(last)), Heard::Silence) if now >= *last + SEARCH => rest(),
-            (State::Searching(detector, last), heard) => {
-                *last = last.map(|last| if heard == Heard::Silence { last } else { now });
-                match detector.step(heard, now) {
-                    Step::Found(timing) => (State::Staying, Step::Found(timing)),
-                    step => return step,
-                }
-            }
+            (State::Searching(detector), heard) => match detector.step(heard, now) {
+                Step::Found(timing) => (State::Staying, Step::Found(timing)),
+                step => return step,
+            },
+            (State::Trying, Heard::Error) | (State::Resting(_), _) => search(now),
         };
         self.0 = state;
         step
@@ -94,11 +88,7 @@ impl Guest {
 fn search(now: Instant) -> (State, Step) {
     let detector = Detector::new(now);
     let timing = detector.timing();
-    (State::Searching(detector, Some(now)), Step::Listen(timing))
-}
-
-fn rest() -> (State, Step) {
-    (State::Resting(None), Step::Listen(assumed()))
+    (State::Searching(detector), Step::Listen(timing))
 }
 
 fn assumed() -> BitTiming {
@@ -181,21 +171,8 @@ mod tests {
         for i in 0..10_000_u64 {
             let step = guest.step(Heard::Silence, Instant(i * 10_000));
             assert!(!matches!(step, Step::Found(_)));
-            assert!(matches!(guest.0, State::Searching(..)));
+            assert!(matches!(guest.0, State::Searching(_)));
         }
         assert!(matches!(guest.step(Heard::Frame, Instant(100_000_000)), Step::Found(_)));
-    }
-
-    /// A pulse on the line is no bus.
-    #[test]
-    fn a_search_that_hears_nothing_comes_to_rest_and_does_not_speak() {
-        let mut guest = with(Some(500));
-        assert_eq!(guest.step(Heard::Error, NOW), Step::Listen(at(250)));
-        let rests = (0..3_000_u64).map(|i| Instant(i * 10_000)).find(|&now| {
-            let step = guest.step(Heard::Silence, now);
-            assert!(!matches!(step, Step::Found(_)));
-            matches!(guest.0, State::Resting(_))
-        });
-        assert_eq!(rests, Some(Instant(25_000_000)));
     }
 }

@@ -11,7 +11,7 @@ use crate::view::follows;
 /// The device record that was saved last and is intact; `None` where there is none. Other groups are not looked at, and nothing
 /// is said of damage: what a [`View`](crate::View) reads is the same where nothing is damaged.
 ///
-/// Only what was saved to its end counts: its closing mark is there and its check is right.
+/// After a cut in a save this may be the new record where the store still reads the old one, until the next start of the store.
 pub fn device_record<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Option<DeviceRecord> {
     let [first, second] = pages.split::<F::Error>(flash.capacity(), WORD as usize).ok()?;
     let (a, b) = (newest(flash, first), newest(flash, second));
@@ -25,15 +25,9 @@ pub fn device_record<F: ReadNorFlash>(flash: &mut F, pages: Pages) -> Option<Dev
     DeviceRecord::decode(record.version, &value)
 }
 
-/// The last record of the device in a page. A transaction names its groups in order, and the device is the first of them.
+/// The last record of the device in a page: each record vouches for itself, with its place.
 fn newest<F: ReadNorFlash>(flash: &mut F, page: Page) -> Option<StoredRecord> {
-    let (mut at, mut newest) = (page.format.first(), None);
-    while let Ok(Some((groups, end))) = page.head(flash, at) {
-        if groups.contains(Group::Device) && matches!(page.is_closed(flash, end), Ok(true)) {
-            let record = page.record(flash, at + page.format.head(), end).ok().flatten();
-            newest = record.filter(|record| record.is_value_of(Group::Device)).or(newest);
-        }
-        at = end + page.format.tail();
-    }
-    newest
+    let places = (page.format.first()..page.size).step_by(WORD as usize);
+    let records = places.filter_map(|at| page.record(flash, at, page.size).ok().flatten());
+    records.filter(|record| record.is_value_of(Group::Device)).last()
 }

@@ -3,7 +3,7 @@
 use crate::commit::{Commit, Record};
 use crate::flash::Flash;
 use crate::header::Header;
-use crate::image::{self, CrcCheck};
+use crate::image::{self, FullCheck};
 use crate::refusal::Refusal;
 use crate::status::Status;
 use crate::target::Target;
@@ -16,6 +16,20 @@ pub struct Start {
     pub stay: bool,
     /// The crashes of the application, this reset counted.
     pub trial: Trial,
+    /// What is known of the signature of the application.
+    pub proof: Proof,
+}
+
+/// What is known of the signature of the application.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Proof {
+    /// Nothing, as after power-on: it is checked.
+    #[default]
+    None,
+    /// It was found good since power-on, of the image whose header has this CRC: for that image the CRC of the code is enough.
+    Of(u32),
+    /// It does not matter now, as another start will decide.
+    Waived,
 }
 
 /// What to do.
@@ -47,14 +61,16 @@ impl Stay {
     pub fn status(self) -> Status {
         match self {
             Stay::Asked => Status::GOOD,
+            Stay::NoProgram(Refusal::Signature) => Status::refused(Refusal::Signature),
             Stay::NoProgram(_) => Status::refused(Refusal::NoProgram),
             Stay::Crashes(count) => Status::refused(Refusal::Crashes { count }),
         }
     }
 }
 
-/// Decides at every start. It reads the application once for its CRC, so the clock should be fast by then; the signature
-/// was checked before the image came to where it is. It writes only where a commit was cut: a record that may read
+/// Decides at every start. It reads the application once for its CRC and, without a [`Proof`], for its signature, so the clock
+/// should be fast by then: whoever has put an application there, and whatever has become of it since, only one that is signed
+/// starts. It writes only where a commit was cut: a record that may read
 /// otherwise next time is revoked, so what this start decides holds for good.
 ///
 /// `flash` must not be busy.
@@ -70,7 +86,7 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
     if crashes >= Trial::LIMIT {
         return Decision::Stay(Stay::Crashes(crashes));
     }
-    match application(flash, target) {
+    match application(flash, target, start.proof) {
         Ok(header) => Decision::Start(header),
         // The mark that the copy is done may have been cut, read as not programmed, and the copy begun again. Now it
         // reads as programmed, but the image that it speaks of is still in staging.
@@ -90,15 +106,19 @@ fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
     commit
 }
 
-/// The header of the application, when all of it is there and it is one of this node.
+/// The header of the application, when all of it is there, it is one of this node, and its signature is or was found good.
 ///
 /// # Errors
 /// Why it may not be started.
-pub fn application<F: Flash>(flash: &mut F, target: &Target) -> Result<Header, Refusal> {
+pub fn application<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Result<Header, Refusal> {
     let area = target.layout.application();
     let header = image::header(flash, area)?;
     target.admit(&header)?;
-    let mut check = CrcCheck::new(&header, area);
-    while !check.step(flash, |_| ())? {}
-    Ok(header)
+    let is_proven = proof == Proof::Waived || proof == Proof::Of(header.crc());
+    let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
+    loop {
+        if let Some(header) = check.step(flash, &target.key)? {
+            return Ok(header);
+        }
+    }
 }

@@ -64,19 +64,30 @@ impl CrcCheck {
     }
 }
 
-/// A check of everything that can be said of the staged image under way: what is in it, then who has signed it.
+/// A check of everything that can be said of an image under way: what is in it, then who has signed it.
 pub(crate) struct FullCheck {
     header: Header,
     crc: CrcCheck,
-    message: Message,
+    /// `None` where the signature does not matter.
+    message: Option<Message>,
     signature: Option<Verification>,
 }
 
 impl FullCheck {
+    /// Of the staged image.
     pub(crate) fn new<F: Flash>(flash: &mut F, target: &Target) -> Result<FullCheck, Refusal> {
-        let header = candidate(flash, target)?;
-        let crc = CrcCheck::new(&header, target.layout.staging());
-        Ok(FullCheck { header, crc, message: Message::of(&header), signature: None })
+        Ok(FullCheck::of(candidate(flash, target)?, target.layout.staging()))
+    }
+
+    /// Of the image with this header in an area.
+    pub(crate) fn of(header: Header, area: Area) -> FullCheck {
+        let crc = CrcCheck::new(&header, area);
+        FullCheck { header, crc, message: Some(Message::of(&header)), signature: None }
+    }
+
+    /// The same without the signature.
+    pub(crate) fn of_sum(header: Header, area: Area) -> FullCheck {
+        FullCheck { message: None, ..FullCheck::of(header, area) }
     }
 
     /// The header, once all is known to be good.
@@ -86,7 +97,7 @@ impl FullCheck {
         key: &[u8; KEY_LEN],
     ) -> Result<Option<Header>, Refusal> {
         match &mut self.signature {
-            None => self.read(flash, key).map(|()| None),
+            None => self.read(flash, key),
             Some(signature) => match signature.step() {
                 None => Ok(None),
                 Some(true) => Ok(Some(self.header)),
@@ -95,11 +106,14 @@ impl FullCheck {
         }
     }
 
-    fn read<F: Flash>(&mut self, flash: &mut F, key: &[u8; KEY_LEN]) -> Result<(), Refusal> {
-        if self.crc.step(flash, |bytes| self.message.add(bytes))? {
-            let signature = self.message.end(self.header.signature(), key);
-            self.signature = Some(signature.ok_or(Refusal::Signature)?);
+    fn read<F: Flash>(&mut self, flash: &mut F, key: &[u8; KEY_LEN]) -> Result<Option<Header>, Refusal> {
+        let message = &mut self.message;
+        if !self.crc.step(flash, |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {
+            return Ok(None);
         }
-        Ok(())
+        let Some(message) = message else { return Ok(Some(self.header)) };
+        let signature = message.end(self.header.signature(), key);
+        self.signature = Some(signature.ok_or(Refusal::Signature)?);
+        Ok(None)
     }
 }

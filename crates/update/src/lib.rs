@@ -68,7 +68,7 @@ mod trial;
 mod updater;
 
 pub use area::{Area, Layout};
-pub use boot::{Decision, Start, Stay, application, boot};
+pub use boot::{Decision, Proof, Start, Stay, application, boot};
 pub use flash::Flash;
 pub use header::{Description, HEADER_LEN, Header, SIGNATURE_LEN, SIGNED_LEN, Version};
 pub use refusal::Refusal;

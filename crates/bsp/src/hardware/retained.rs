@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use update::Trial;
+use update::{Header, Proof, Trial};
 
 use crate::crash_record::{self, WORDS};
 use crate::handover::{self, Handover};
@@ -13,6 +13,7 @@ struct Retained {
     handover: [AtomicU32; 2],
     trial: AtomicU32,
     crash: [AtomicU32; WORDS],
+    proven: [AtomicU32; 2],
 }
 
 /// `used` keeps the compiler from taking the initial values for granted: a reset does not write them.
@@ -22,6 +23,7 @@ static RETAINED: Retained = Retained {
     handover: [const { AtomicU32::new(0) }; 2],
     trial: AtomicU32::new(0),
     crash: [const { AtomicU32::new(0) }; WORDS],
+    proven: [const { AtomicU32::new(0) }; 2],
 };
 
 /// The note of the other image; `None` when there is none since power-on.
@@ -45,6 +47,24 @@ pub fn trial() -> Trial {
 /// Stores the count of crashes.
 pub fn set_trial(trial: Trial) {
     RETAINED.trial.store(trial.word(), Ordering::Relaxed);
+}
+
+/// The image whose signature was found good since power-on, by the CRC of its header.
+#[must_use]
+pub fn proof() -> Proof {
+    let [crc, complement] = load(&RETAINED.proven);
+    if complement == !crc { Proof::Of(crc) } else { Proof::None }
+}
+
+/// Keeps that the signature of the image with this header was found good.
+pub fn set_proof(header: &Header) {
+    let crc = header.crc();
+    store(&RETAINED.proven, [crc, !crc]);
+}
+
+/// Power came: nothing is proven.
+pub fn forget_proof() {
+    store(&RETAINED.proven, [0, 0]);
 }
 
 /// The words of the crash record.

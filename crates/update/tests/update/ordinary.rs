@@ -7,7 +7,8 @@ use crate::bench::{
 use embedded_storage::nor_flash::{ErrorType, ReadNorFlash};
 use update::mock::{MockFlash, PowerCut};
 use update::{
-    Decision, Flash, Next, Phase, Refusal, Reset, Start, Status, Stay, Trial, Updater, application, boot,
+    Decision, Flash, Header, Next, Phase, Proof, Refusal, Reset, Start, Status, Stay, Trial, Updater,
+    application, boot,
 };
 
 #[test]
@@ -176,9 +177,9 @@ fn a_program_for_other_hardware_does_not_start_even_when_it_is_there() {
     let mut flash = flash_with(&image_a(), 1);
     let mut other = target();
     other.hardware = 5;
-    assert_eq!(application(&mut flash, &other), Err(Refusal::Hardware { revision: 5 }));
+    assert_eq!(application(&mut flash, &other, Proof::Waived), Err(Refusal::Hardware { revision: 5 }));
     other.hardware = 32;
-    assert_eq!(application(&mut flash, &other), Err(Refusal::Hardware { revision: 32 }));
+    assert_eq!(application(&mut flash, &other, Proof::Waived), Err(Refusal::Hardware { revision: 32 }));
 }
 
 #[test]
@@ -195,7 +196,7 @@ fn the_security_counter_may_grow_or_stay_and_never_goes_back() {
 fn an_application_that_keeps_crashing_keeps_the_node_in_the_bootloader() {
     let mut flash = flash_with(&image_a(), 1);
     let mut trial = Trial::default();
-    let mut after = |trial| boot(&mut flash, &target(), Start { stay: false, trial });
+    let mut after = |trial| boot(&mut flash, &target(), Start { trial, ..Start::default() });
     for _ in 1..Trial::LIMIT {
         trial = trial.after(Reset::Crash);
         assert_eq!(after(trial), Decision::Start(image_a().header));
@@ -305,4 +306,54 @@ fn downloads_one_after_the_other_need_no_restart() {
     updater.install().unwrap();
     run(&mut updater).unwrap();
     assert_starts(&mut flash, &image_b());
+}
+
+/// Whoever has put it there: code and header are whole, all sums are right, and nobody has signed it.
+#[test]
+fn an_application_that_nobody_has_signed_is_not_started() {
+    let mut flash = flash_with(&image_a(), 1);
+    let forged = Image { header: Header::describe(description(1, 5), &image_b().code).unwrap(), ..image_b() };
+    put(&mut flash, &forged);
+    let start = |flash: &mut MockFlash, proof| boot(flash, &target(), Start { proof, ..Start::default() });
+    let refused = Stay::NoProgram(Refusal::Signature);
+    // The image that was copied last is still in staging, and takes its place.
+    assert_eq!(start(&mut flash, Proof::None), Decision::Copy);
+    clear(&mut flash);
+    for proof in [Proof::None, Proof::Of(0), Proof::Of(image_a().header.crc())] {
+        assert_eq!(start(&mut flash, proof), Decision::Stay(refused), "{proof:?}");
+    }
+    assert_eq!(refused.status(), Status::refused(Refusal::Signature));
+    assert_eq!(start(&mut flash, Proof::Of(forged.header.crc())), Decision::Start(forged.header));
+}
+
+#[test]
+fn a_proof_spares_the_signature_and_not_the_sum() {
+    let mut flash = flash_with(&image_a(), 1);
+    clear(&mut flash);
+    let mut damaged = image_a();
+    damaged.code[100] ^= 1;
+    put(&mut flash, &damaged);
+    for proof in [Proof::None, Proof::Of(image_a().header.crc()), Proof::Waived] {
+        let decision = boot(&mut flash, &target(), Start { proof, ..Start::default() });
+        assert_eq!(decision, Decision::Stay(Stay::NoProgram(Refusal::CodeCrc)), "{proof:?}");
+    }
+}
+
+/// Erases staging.
+fn clear(flash: &mut MockFlash) {
+    let mut updater = Updater::new(flash, target(), Status::GOOD);
+    updater.clear().unwrap();
+    run(&mut updater).unwrap();
+}
+
+/// Puts an image into the application area past the bootloader, as a debugger does.
+fn put(flash: &mut MockFlash, image: &Image) {
+    for sector in target().layout.application().sectors() {
+        flash.start_erase(sector.start).unwrap();
+        while flash.is_busy().unwrap() {}
+    }
+    let start = target().layout.application().start();
+    let mut bytes = image.bytes();
+    bytes.resize(bytes.len().next_multiple_of(4), 0xFF);
+    flash.program(start, &bytes).unwrap();
 }

@@ -19,6 +19,9 @@ use bench::{
     BOOT, Bench, CONTROL, DEVICE_TYPE, HEADER, IDENTIFICATION, PROMPT, START, signed, version_a, version_b,
 };
 
+/// What 1F57h reads where the signature is not good.
+const SIGNATURE: u8 = 67;
+
 #[test]
 fn the_application_reads_its_identification_from_its_header() {
     let mut bench = Bench::running();
@@ -98,6 +101,24 @@ fn without_an_application_the_node_is_where_its_record_says() {
     assert_eq!(bench.wait_for_flash(), Status::GOOD);
     bench.command(START).unwrap();
     assert_eq!(bench.identification_of_running(), version_a().header.code_crc());
+}
+
+/// Put there with a debugger: its sums are right, and nobody has signed it. Neither power nor a master starts it.
+#[test]
+fn an_application_that_nobody_has_signed_does_not_start() {
+    let mut bench = Bench::running();
+    let image = version_b(0);
+    let unsigned = [&image.header.with_signature([0; 64]).encode()[..], &image.code].concat();
+    bench.machine().write(HEADER, &unsigned).unwrap();
+    bench.power_cycle();
+    bench.run(SECOND);
+    assert_eq!(bench.read(DEVICE_TYPE).unwrap(), BOOT);
+    assert_eq!(bench.status().code, SIGNATURE);
+    bench.command(START).unwrap();
+    bench.run(SECOND);
+    assert_eq!((bench.read(DEVICE_TYPE).unwrap(), bench.status().code), (BOOT.to_vec(), SIGNATURE));
+    bench.machine().write(HEADER, &version_a().to_bytes()).unwrap();
+    assert_eq!(bench.start(), version_a().header.code_crc());
 }
 
 #[test]
