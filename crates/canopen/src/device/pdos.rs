@@ -158,9 +158,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
-            let is_synchronous = settings.transmission.is_synchronous();
+            let sends_values = settings.transmission.is_synchronous() && settings.events_of.is_none();
             self.first_tpdos.prepend(Chain::Valid, place);
-            if is_synchronous {
+            if sends_values {
                 self.first_tpdos.prepend(Chain::Synchronous, place);
             }
         }

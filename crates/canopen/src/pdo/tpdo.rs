@@ -192,9 +192,10 @@ impl Tpdo {
         }
     }
 
-    /// The same of a TPDO that tells events: its number. A SYNC sends one event, whatever the type counts.
+    /// The number of a TPDO that tells events and may send one with a SYNC, whatever the type counts.
     pub(crate) fn asks_with_sync(&self) -> Option<u16> {
-        self.settings.events_of.filter(|_| !self.pending)
+        let is_asked = self.settings.transmission.is_synchronous() && !self.pending;
+        self.settings.events_of.filter(|_| is_asked)
     }
 
     /// Whether it is the turn of a cyclic synchronous PDO, with every n-th SYNC.
