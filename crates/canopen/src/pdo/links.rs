@@ -5,8 +5,8 @@
 pub(crate) enum Chain {
     /// All that are valid.
     Valid,
-    /// Of these, what the SYNC concerns: RPDOs whose data waits for the SYNC, and TPDOs whose values are sent or sampled with
-    /// it.
+    /// The valid PDOs that the SYNC concerns: RPDOs whose data waits for the SYNC, and TPDOs whose values the SYNC sends or
+    /// samples.
     Synchronous,
 }
 
