@@ -78,7 +78,6 @@ impl Guest {
                 Step::Found(timing) => (State::Staying, Step::Found(timing)),
                 step => return step,
             },
-            (State::Trying, Heard::Error) | (State::Resting(_), _) => search(now),
         };
         self.0 = state;
         step
