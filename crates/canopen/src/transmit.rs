@@ -15,7 +15,8 @@ impl core::fmt::Display for QueueFull {
 
 impl core::error::Error for QueueFull {}
 
-/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others.
+/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others, and that of a
+/// [`ServiceDevice`](crate::ServiceDevice) for two.
 pub trait Transmit {
     /// Queues one frame.
     ///
@@ -47,7 +48,7 @@ pub trait Transmit {
 
 /// One call of the device: when it is, and the way to the queue. That can be shut: it then takes nothing, and the senders
 /// try again later.
-pub(crate) struct Turn<'a, T> {
+pub struct Turn<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,

@@ -3,7 +3,7 @@
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
 use profiles::board::Outputs;
-use profiles::{IMAGE_SIZE, Parameters, Snapshot};
+use profiles::{Parameters, ROOM, Snapshot};
 
 use crate::application::NodeApplication;
 use crate::faults::Shown;
@@ -16,7 +16,7 @@ const OLDER_SAMPLES: u8 = 3;
 /// call returns what follows from it: see [`Next`].
 #[derive(Debug)]
 pub struct Protocol {
-    pub(crate) device: Device<NodeApplication, IMAGE_SIZE>,
+    pub(crate) device: canopen::device!(NodeApplication, room: ROOM),
     /// As last published: most samples change nothing.
     pub(crate) shown: Shown,
     /// What `Action::Store` is about.

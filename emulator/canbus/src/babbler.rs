@@ -2,7 +2,9 @@
 
 use fastrand::Rng;
 
-use crate::{Attachment, Controller, ErrorReport, ExtendedId, Frame, StandardId, Time, frame_bits};
+use crate::{
+    Attachment, BitTiming, Controller, ErrorReport, ExtendedId, Frame, StandardId, Time, frame_bits,
+};
 
 /// Sends frames of random content, one after the other, at a chosen share of the bus.
 ///
@@ -73,7 +75,7 @@ fn draw(rng: &mut Rng, identifiers: &[embedded_can::Id], bytes: Option<usize>) -
 /// It repeats what fails and is beyond error confinement: a test wants its load whatever happens.
 impl Controller for Babbler {
     fn attachment(&mut self, _at: Time) -> Attachment {
-        Attachment::Active { bit: self.bit }
+        Attachment::Active { timing: BitTiming::nominal(self.bit) }
     }
 
     fn requested(&self) -> Option<Time> {

@@ -121,9 +121,9 @@ impl Bus {
             let wish = self.wish(n, participant.requested());
             if attachment.can_send()
                 && wish.is_some_and(|wish| wish <= start)
-                && let (Some(bit), Some(frame)) = (attachment.bit(), participant.pending(start))
+                && let (Some(timing), Some(frame)) = (attachment.timing(), participant.pending(start))
             {
-                contenders.push(Contender { participant: n, bit, frame });
+                contenders.push(Contender { participant: n, timing, frame });
             }
         }
         contenders

@@ -1,6 +1,6 @@
 //! What the bus asks of everything that is wired to it.
 
-use crate::{Frame, Time};
+use crate::{BitTiming, Frame, Time};
 
 /// How a controller takes part in the traffic at a given moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,29 +9,39 @@ pub enum Attachment {
     Off,
     /// Hears everything, sends and acknowledges nothing (silent mode).
     Silent {
-        /// Length of its nominal bit.
-        bit: Time,
+        /// Its bit.
+        timing: BitTiming,
     },
     /// Takes part; its error flags destroy a frame that it sees as faulty.
     Active {
-        /// Length of its nominal bit.
-        bit: Time,
+        /// Its bit.
+        timing: BitTiming,
     },
     /// Takes part, but signals errors only recessively.
     Passive {
-        /// Length of its nominal bit.
-        bit: Time,
+        /// Its bit.
+        timing: BitTiming,
     },
 }
 
 impl Attachment {
-    /// The length of its bit; `None` off the bus.
-    pub fn bit(self) -> Option<Time> {
+    /// Its bit; `None` off the bus.
+    pub fn timing(self) -> Option<BitTiming> {
         match self {
             Attachment::Off => None,
-            Attachment::Silent { bit } | Attachment::Active { bit } | Attachment::Passive { bit } => {
-                Some(bit)
-            }
+            Attachment::Silent { timing }
+            | Attachment::Active { timing }
+            | Attachment::Passive { timing } => Some(timing),
+        }
+    }
+
+    /// The same with another bit.
+    pub(crate) fn with(self, timing: BitTiming) -> Attachment {
+        match self {
+            Attachment::Off => Attachment::Off,
+            Attachment::Silent { .. } => Attachment::Silent { timing },
+            Attachment::Active { .. } => Attachment::Active { timing },
+            Attachment::Passive { .. } => Attachment::Passive { timing },
         }
     }
 

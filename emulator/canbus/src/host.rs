@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::confinement::{Confinement, ErrorState};
 use crate::monitor::Monitor;
-use crate::{Attachment, Controller, ErrorReport, Frame, Time};
+use crate::{Attachment, BitTiming, Controller, ErrorReport, Frame, Time};
 
 /// Which of the waiting frames is sent first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub struct Stamped {
 /// its queue over it.
 #[derive(Clone, Debug)]
 pub struct HostNode {
-    bit: Time,
+    timing: BitTiming,
     silent: bool,
     order: Order,
     transmit: Vec<Stamped>,
@@ -43,10 +43,10 @@ pub struct HostNode {
 }
 
 impl HostNode {
-    /// A node with bits of this length; see [`Time::of_cycle`].
+    /// A node with bits of this length, sampled at 87.5 %; see [`Time::of_cycle`].
     pub fn new(bit: Time) -> HostNode {
         HostNode {
-            bit,
+            timing: BitTiming::nominal(bit),
             silent: false,
             order: Order::default(),
             transmit: Vec::new(),
@@ -57,6 +57,13 @@ impl HostNode {
             confinement: Confinement::default(),
             monitor: Monitor::new(),
         }
+    }
+
+    /// Gives it another bit.
+    #[must_use]
+    pub fn with_timing(mut self, timing: BitTiming) -> HostNode {
+        self.timing = timing;
+        self
     }
 
     /// Chooses the order of transmission.
@@ -82,7 +89,7 @@ impl HostNode {
 
     /// Changes the bit rate, between two frames.
     pub fn set_bit(&mut self, bit: Time) {
-        self.bit = bit;
+        self.timing = BitTiming::nominal(bit);
     }
 
     /// Queues a frame that may go out from `at` on.
@@ -133,21 +140,21 @@ impl HostNode {
 
 impl Controller for HostNode {
     fn attachment(&mut self, at: Time) -> Attachment {
-        if self.is_off() && self.monitor.poll(at, self.bit) {
+        if self.is_off() && self.monitor.poll(at, self.timing.bit()) {
             self.confinement = Confinement::default();
         }
-        let bit = self.bit;
+        let timing = self.timing;
         match self.confinement.state() {
             ErrorState::BusOff => Attachment::Off,
-            _ if self.silent => Attachment::Silent { bit },
-            ErrorState::Passive => Attachment::Passive { bit },
-            ErrorState::Active => Attachment::Active { bit },
+            _ if self.silent => Attachment::Silent { timing },
+            ErrorState::Passive => Attachment::Passive { timing },
+            ErrorState::Active => Attachment::Active { timing },
         }
     }
 
     fn requested(&self) -> Option<Time> {
         let oldest = self.transmit.iter().map(|queued| queued.at).min().filter(|_| !self.silent)?;
-        Some(oldest.max(self.monitor.ready(self.bit)))
+        Some(oldest.max(self.monitor.ready(self.timing.bit())))
     }
 
     fn pending(&mut self, at: Time) -> Option<Frame> {
@@ -156,7 +163,7 @@ impl Controller for HostNode {
 
     fn start_of_frame(&mut self, transmitting: bool, at: Time) {
         self.on_wire = if transmitting { self.choose(at) } else { None };
-        self.monitor.busy(at, self.bit);
+        self.monitor.busy(at, self.timing.bit());
     }
 
     fn lost(&mut self, _at: Time) {

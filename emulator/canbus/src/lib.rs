@@ -55,7 +55,8 @@
 //! # Simplifications
 //!
 //! * A controller begins at the instant of its request when the bus is idle, not at the next edge of its bit clock.
-//! * Propagation takes no time; resynchronisation is perfect for bit rates within 1 % and absent beyond.
+//! * Propagation takes no time, and an edge is seen in the quantum in which it comes. So the sample point of participants with the same
+//!   clock does not matter; with clocks that differ every participant samples where its [`BitTiming`] says and resynchronises.
 //! * A participant at another bit rate than the transmitter begins afresh with each frame, and delays the next one
 //!   by its error flag only.
 //! * At most one overload frame follows a frame and none an error frame; a disturbed delimiter is waited out and
@@ -76,6 +77,7 @@ mod receiver;
 mod slot;
 mod station;
 mod time;
+mod timing;
 mod wire;
 
 pub use babbler::Babbler;
@@ -90,3 +92,4 @@ pub use frame::{ExtendedId, Frame, Id, StandardId};
 pub use host::{HostNode, Order, Stamped};
 pub use monitor::Monitor;
 pub use time::Time;
+pub use timing::BitTiming;

@@ -7,13 +7,13 @@ use crate::bits::encode;
 use crate::faults::{Flip, SeenBy};
 use crate::station::Notice;
 use crate::wire::{Course, Happening, Nature, Tap, run};
-use crate::{Attachment, BusError, Controller, ErrorReport, Event, Frame, Time};
+use crate::{Attachment, BitTiming, BusError, Controller, ErrorReport, Event, Frame, Time};
 
 /// A participant that begins a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Contender {
     pub(crate) participant: usize,
-    pub(crate) bit: Time,
+    pub(crate) timing: BitTiming,
     pub(crate) frame: Frame,
 }
 
@@ -44,8 +44,8 @@ impl Slot {
     ) -> Option<Slot> {
         let winner = *contenders.iter().min_by_key(|contender| contender.frame.arbitration())?;
         let flips = flips(encode(&winner.frame).len());
-        let mut taps = taps(contenders, attachments, winner.bit, &flips);
-        let course = run(&mut taps, start, winner.bit, &flips);
+        let mut taps = taps(contenders, attachments, winner.timing, &flips);
+        let course = run(&mut taps, start, winner.timing, &flips);
         let key = winner.frame.arbitration();
         let transmitters = contenders.iter().filter(|contender| contender.frame.arbitration() == key);
         let mut slot = Slot {
@@ -76,7 +76,7 @@ impl Slot {
 
     /// The length of a bit of the frame.
     pub(crate) fn bit(&self) -> Time {
-        self.winner.bit
+        self.winner.timing.bit()
     }
 
     /// Those who won the arbitration: one, unless several sent the same identifier.
@@ -154,14 +154,17 @@ impl Slot {
     }
 }
 
-/// One tap for all participants that are alike: attached in the same way, and sending the same frame or none. One for
-/// each victim of a bit error.
-fn taps(contenders: &[Contender], attachments: &[Attachment], bit: Time, flips: &[Flip]) -> Vec<Tap> {
+/// One tap for all participants that are alike: attached in the same way, with bits of the same length, and sending the same
+/// frame or none. One for each victim of a bit error.
+fn taps(contenders: &[Contender], attachments: &[Attachment], timing: BitTiming, flips: &[Flip]) -> Vec<Tap> {
     let mut taps: Vec<Tap> = Vec::new();
     for (n, attachment) in attachments.iter().enumerate() {
-        let Some(own) = attachment.bit().map(|own| locked(own, bit)) else { continue };
+        let Some(own) = attachment.timing() else { continue };
+        // In step with the transmitter all edges come at the begin of a bit: where in the bit it is sampled makes no difference.
+        let own = if own.bit() == timing.bit() { timing } else { own };
         let contender = contenders.iter().find(|contender| contender.participant == n);
-        let nature = Nature { attachment: *attachment, frame: contender.map(|contender| contender.frame) };
+        let nature =
+            Nature { attachment: attachment.with(own), frame: contender.map(|contender| contender.frame) };
         let is_victim = flips.iter().any(|flip| flip.seen_by == SeenBy::Participant(n));
         match taps.iter_mut().find(|tap| !is_victim && tap.nature == Some(nature)) {
             Some(tap) => tap.members.push(n),
@@ -169,11 +172,6 @@ fn taps(contenders: &[Contender], attachments: &[Attachment], bit: Time, flips: 
         }
     }
     taps
-}
-
-/// Within about one per cent resynchronisation keeps a receiver in step with the transmitter.
-fn locked(own: Time, transmitter: Time) -> Time {
-    if own.0.abs_diff(transmitter.0) * 100 <= transmitter.0 { transmitter } else { own }
 }
 
 fn tell(participants: &mut [&mut dyn Controller], n: usize, notice: &Notice, at: Time) {

@@ -12,6 +12,7 @@ use crate::figures;
 use crate::flash;
 use crate::image::Image;
 use crate::log::{Line, Log, Ram};
+use crate::oscillator::Oscillator;
 use crate::personality::Personality;
 use crate::status::NodeStatus;
 use crate::stimuli::Stimulus;
@@ -77,10 +78,12 @@ impl Board {
     pub(crate) fn new(
         id: u8,
         personality: Personality,
+        oscillator: Oscillator,
         contents: Contents,
         images: Rc<Images>,
     ) -> Result<Board> {
-        let mut chip = Stm32f4::new(Variant::F446, wiring(id));
+        let wiring = Wiring { hse: oscillator.hertz(), ..wiring(id) };
+        let mut chip = Stm32f4::new(Variant::F446, wiring);
         contents.backup.into_iter().for_each(|backup| chip.set_kept_by_battery(backup));
         let mut machine = Machine::new(Model::stm32f4(flash::SIZE as u32), chip)?;
         machine.set_flash(contents.flash)?;

@@ -8,6 +8,7 @@ use canbus::Time;
 use clap::{Parser, ValueEnum};
 use storage::DeviceRecord;
 
+use crate::oscillator::Oscillator;
 use crate::personality::Personality;
 use crate::stimuli::{Stimulus, Targeted};
 
@@ -98,6 +99,10 @@ pub struct Options {
     /// A fault from a time on, e.g. open-sensor@2.5.
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("fault", text))]
     pub fault: Vec<Targeted<Stimulus>>,
+
+    /// How far the board's oscillator is off, in ppm: what the CAN controller makes of it, to within 100 ppm at 1 Mbit/s.
+    #[arg(long, value_name = "[ID=]PPM", allow_negative_numbers = true)]
+    pub oscillator: Vec<Targeted<Oscillator>>,
 
     /// Load the bus with foreign frames of the lowest priority, in percent of its time.
     #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
@@ -220,7 +225,7 @@ mod tests {
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
-             --reflash --interleave 7 --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --load 50 --json --socketcan vcan0";
+             --reflash --interleave 7 --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --load 50 --json --socketcan vcan0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));
@@ -244,6 +249,7 @@ mod tests {
             ("--reflash", "--flash"),
             ("--temperature const:25", "temperatures are in K"),
             ("--pressure 1=nonsense", "nonsense"),
+            ("--oscillator 1=30000", "20000 ppm"),
             ("--speed warp", "real, max"),
             ("--wings", "--wings"),
         ];

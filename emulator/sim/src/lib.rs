@@ -14,6 +14,7 @@ pub mod gateway;
 pub mod host_time;
 pub mod image;
 pub mod log;
+pub mod oscillator;
 pub mod personality;
 pub mod port;
 pub mod setup;

@@ -9,6 +9,7 @@ use crate::board::{Board, Contents, Images};
 use crate::cli::{Node, Options, UNCONFIGURED};
 use crate::flash;
 use crate::image::Image;
+use crate::oscillator::Oscillator;
 use crate::world::World;
 
 /// The two pages of the parameter store: sectors 2 and 3 (memory.x).
@@ -34,6 +35,9 @@ pub fn world(options: &Options) -> Result<World> {
         (0..options.nodes.len())
             .try_for_each(|board| world.machine(board).interleave(Some(seed + board as u64)))?;
     }
+    for oscillator in &options.oscillator {
+        ensure!(options.nodes.iter().any(|node| oscillator.is_for(node.id)), "an oscillator is for nobody");
+    }
     let Options { pressure, temperature, thermistor, shaft, button, fault, .. } = options;
     let stimuli = [pressure, temperature, thermistor, shaft, button, fault].into_iter().flatten();
     for stimulus in stimuli {
@@ -51,7 +55,13 @@ fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
     provision(&mut contents, node, options.bitrate)?;
     let backup = options.flash.as_deref().map(|dir| flash::load_backup(dir, node.id)).transpose()?.flatten();
     let contents = Contents { flash: &contents, backup: backup.as_deref(), writes_images };
-    Board::new(node.id, node.personality, contents, Rc::clone(images))
+    Board::new(node.id, node.personality, oscillator(node, options), contents, Rc::clone(images))
+}
+
+/// The last one that is meant for the board.
+fn oscillator(node: &Node, options: &Options) -> Oscillator {
+    let own = options.oscillator.iter().rfind(|oscillator| oscillator.is_for(node.id));
+    own.map_or_else(Oscillator::default, |oscillator| oscillator.what)
 }
 
 /// Tells a fresh board what it is. A board that knows it already, because its flash was kept, is left as it is.

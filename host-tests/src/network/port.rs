@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use bsp::transmit_queue::{Mailboxes, Offer, TransmitQueue};
-use canbus::{Attachment, Confinement, Controller, ErrorReport, ErrorState, Id, StandardId, Time};
+use canbus::{Attachment, BitTiming, Confinement, Controller, ErrorReport, ErrorState, Id, StandardId, Time};
 use canopen::{Frame, QueueFull, Transmit};
 
 /// Transmit mailboxes of bxCAN.
@@ -120,10 +120,10 @@ impl Transmit for Port {
 
 impl Controller for Port {
     fn attachment(&mut self, _at: Time) -> Attachment {
-        let bit = self.bit;
+        let timing = BitTiming::nominal(self.bit);
         match self.confinement.state() {
-            ErrorState::Active => Attachment::Active { bit },
-            ErrorState::Passive => Attachment::Passive { bit },
+            ErrorState::Active => Attachment::Active { timing },
+            ErrorState::Passive => Attachment::Passive { timing },
             ErrorState::BusOff => Attachment::Off,
         }
     }

@@ -14,6 +14,7 @@ mod faults;
 mod lift;
 mod lost_events;
 mod measuring;
+mod oscillators;
 mod position_faults;
 mod power_cycles;
 mod races;

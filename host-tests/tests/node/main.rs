@@ -1,6 +1,7 @@
 //! The node, and the objects of all its personalities, in this process: no emulated board, no clock. One program, for the time that
 //! each program takes to link.
 
+mod bit_timing;
 mod calibration;
 mod cia404_chain;
 mod cia404_edges;

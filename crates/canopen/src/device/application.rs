@@ -12,10 +12,6 @@ use crate::sdo::{Abort, Multiplexer};
 /// `image` is the memory of all values of the dictionary; a [`Field`](crate::dictionary::Field) reads and writes one of
 /// them. A value that a method changes is sent as any other change is.
 pub trait Application {
-    /// A device without PDO, SYNC, EMCY, heartbeat consumer, stored parameters and block upload, such as a bootloader. Its
-    /// dictionary has none of their objects, and the code for them is left out of the image.
-    const SERVICES_ONLY: bool = false;
-
     /// The faults of the application itself, at most 32. [`Fault::Application`] names one by its place here.
     const CONDITIONS: &'static [Condition] = &[];
 

@@ -2,11 +2,13 @@
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
+use super::body::Body;
+use super::full::Full;
 use super::state::Scope;
-use super::{Action, Application, Core, Device, Next, STALE};
+use super::{Action, Application, Device, Next};
 use crate::dictionary::{Entry, Group, Groups, Rule};
 use crate::emcy::Fault;
-use crate::lss::{self, Configuration, Slave};
+use crate::lss::Configuration;
 use crate::sdo::Abort;
 use crate::{Instant, Transmit};
 
@@ -58,8 +60,6 @@ pub enum Soundness {
 #[derive(Debug)]
 pub(super) struct Jobs {
     running: Option<Job>,
-    /// The caller has not been told of it yet.
-    is_untold: bool,
     /// The request that has just been served began it or waits for it.
     is_deferred: bool,
     lss_waits: bool,
@@ -67,27 +67,7 @@ pub(super) struct Jobs {
 
 impl Jobs {
     pub(super) const fn new() -> Jobs {
-        Jobs { running: None, is_untold: false, is_deferred: false, lss_waits: false }
-    }
-
-    /// A second request for the same job waits for the first; for another one there is no room.
-    fn begin(&mut self, job: Job) -> Result<(), Abort> {
-        match self.running {
-            Some(running) if running != job => return Err(Abort::DeviceState),
-            Some(_) => (),
-            None => (self.running, self.is_untold) = (Some(job), true),
-        }
-        Ok(())
-    }
-
-    /// Whether the caller has not been told of the job.
-    pub(super) fn is_untold(&self) -> bool {
-        self.running.is_some() && self.is_untold
-    }
-
-    /// The job, once.
-    pub(super) fn take_untold(&mut self) -> Option<Job> {
-        self.running.filter(|_| core::mem::take(&mut self.is_untold))
+        Jobs { running: None, is_deferred: false, lss_waits: false }
     }
 
     /// Whether the response to the request just served has to wait.
@@ -101,15 +81,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 {
     /// The job is done, or cannot be: whoever waits for it is answered.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
-        let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
-        let turn = &mut self.turn(now, out);
-        if lss_waits {
-            self.respond_lss(Slave::stored(result.is_ok()), turn);
-        }
-        if self.server.release(result, now) {
-            self.respond(turn);
-        }
-        self.core.services_due = STALE;
+        let lss_waits = core::mem::take(&mut self.body.jobs).lss_waits;
+        let turn = &mut self.services.turn(now, out);
+        self.finish_job(result, lss_waits, turn);
         self.process_next()
     }
 }
@@ -121,8 +95,21 @@ impl Default for Jobs {
 }
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
+    /// Hands a job to the caller. A second request for the same job waits for the first; for another one there is no room.
+    fn begin(&mut self, job: Job) -> Result<(), Abort> {
+        match self.jobs.running {
+            Some(running) if running != job => Err(Abort::DeviceState),
+            Some(_) => Ok(()),
+            None => {
+                self.jobs.running = Some(job);
+                self.basic.pending.ask_for(job);
+                Ok(())
+            }
+        }
+    }
+
     /// Begins the job that a write to 1010h or 1011h asks for.
     pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;
@@ -140,19 +127,17 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
     }
 
-    /// Begins to store what LSS has configured. The response, unless it waits for the end.
-    pub(super) fn store_configuration(&mut self, configuration: Configuration) -> Option<lss::Response> {
-        let is_begun = !A::SERVICES_ONLY && self.jobs.begin(Job::Configure(configuration)).is_ok();
+    /// Begins to store what LSS has configured; whether that is possible.
+    pub(super) fn begin_configuration(&mut self, configuration: Configuration) -> bool {
+        let is_begun = self.begin(Job::Configure(configuration)).is_ok();
         self.jobs.lss_waits |= is_begun;
-        self.pending.has_job();
-        (!is_begun).then_some(Slave::stored(false))
+        is_begun
     }
 
     /// Begins a job for whose end the answer to the client waits.
     pub(super) fn begin_deferred(&mut self, job: Job) -> Result<(), Abort> {
-        self.jobs.begin(job)?;
+        self.begin(job)?;
         self.jobs.is_deferred = true;
-        self.pending.has_job();
         Ok(())
     }
 
@@ -160,7 +145,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
         match value {
             STOP_PROGRAM | RESET_PROGRAM => {
-                self.pending.ask(Action::Bootloader);
+                self.basic.pending.ask(Action::Bootloader);
                 self.jobs.is_deferred = true;
                 Ok(())
             }
@@ -171,18 +156,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Takes what is stored of a group; where that is damaged or does not fit, the defaults stay as a whole.
     pub(super) fn load_stored(&mut self, group: Group) {
-        if A::SERVICES_ONLY {
-            return;
-        }
-        let Stored { packed, soundness } = self.application.stored(group);
-        let fits =
-            self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
+        let Stored { packed, soundness } = self.basic.application.stored(group);
+        let fits = self.basic.dictionary.unpack(group, packed, &mut self.basic.image).is_ok()
+            && self.mappings_are_sound();
         if !fits {
-            self.load_defaults(Scope::Group(group));
+            self.basic_mut().load_defaults(Scope::Group(group));
         }
         self.lost.set(group, !fits || soundness == Soundness::Lost);
         self.older.set(group, fits && soundness == Soundness::Older);
-        self.application.loaded(group, fits && soundness == Soundness::Whole);
+        self.basic.application.loaded(group, fits && soundness == Soundness::Whole);
     }
 
     /// Says on the bus what could not be loaded.

@@ -11,6 +11,9 @@ use heapless::Deque;
 /// the newest.
 const WAITING: usize = 8;
 
+/// The COB-ID of a device without EMCY: bit 31 is set.
+pub(crate) const OFF: u32 = 1 << 31;
+
 /// Faults, their history and the messages about them.
 #[derive(Debug)]
 pub(crate) struct Producer {

@@ -3,7 +3,7 @@
 mod loop_back;
 mod modes;
 
-use canbus::{ErrorState, Frame, Monitor, Time};
+use canbus::{BitTiming, ErrorState, Frame, Monitor, Time};
 
 use self::loop_back::Loop;
 use self::modes::Mode;
@@ -213,6 +213,12 @@ impl BxCan {
         let cycles = u64::from(quanta * (field(self.timing, 0, 10) + 1));
         let clock = self.clock.max(1);
         Time((Time::PER_SECOND * cycles + clock / 2) / clock)
+    }
+
+    /// The bit with its sample point and its resynchronisation jump width.
+    pub(super) fn bit_timing(&self) -> BitTiming {
+        let part = |from, width| field(self.timing, from, width) as u8 + 1;
+        BitTiming::new(self.bit(), part(16, 4), part(20, 3), part(24, 2))
     }
 
     pub(super) fn is_set(&self, bit_of_mcr: u32) -> bool {

@@ -7,12 +7,12 @@ use super::BxCan;
 impl Controller for BxCan {
     fn attachment(&mut self, at: Time) -> Attachment {
         self.advance(at);
-        let bit = self.bit();
+        let timing = self.bit_timing();
         match () {
             () if !self.is_on_bus() => Attachment::Off,
-            () if self.is_silent() => Attachment::Silent { bit },
-            () if self.is_passive() => Attachment::Passive { bit },
-            () => Attachment::Active { bit },
+            () if self.is_silent() => Attachment::Silent { timing },
+            () if self.is_passive() => Attachment::Passive { timing },
+            () => Attachment::Active { timing },
         }
     }
 

@@ -1,6 +1,6 @@
 //! Operating modes, test modes, bit timing, errors and bus-off.
 
-use canbus::{Attachment, Controller, Fault, HostNode, Position, SeenBy, Time, frame_bits};
+use canbus::{Attachment, BitTiming, Controller, Fault, HostNode, Position, SeenBy, Time, frame_bits};
 use chip::can::BxCan;
 
 use crate::rig::*;
@@ -88,7 +88,8 @@ fn the_clock_makes_the_bit_rate() {
     can.write(MCR, 0, Time::ZERO);
     let later = Time::from_millis(1);
     let bit = Time::of_cycle(45_000_000 / 18 / 16);
-    assert_eq!(can.attachment(later), Attachment::Active { bit });
+    let timing = BitTiming::new(bit, 12, 3, 1);
+    assert_eq!(can.attachment(later), Attachment::Active { timing });
     can.set_clock(0);
     assert_eq!(can.attachment(later), Attachment::Off);
 }

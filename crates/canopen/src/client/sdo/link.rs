@@ -94,8 +94,7 @@ impl Link {
 
     /// The data of a frame from the server, if it can be an answer: everything that was to be sent has been.
     pub(super) fn response(&self, frame: &Frame) -> Option<[u8; 8]> {
-        let is_answer = frame.id() == self.node.service(FROM_SERVER).get() && self.outgoing.is_none();
-        frame.full().copied().filter(|_| is_answer)
+        frame.full(self.node.service(FROM_SERVER)).copied().filter(|_| self.outgoing.is_none())
     }
 
     /// Whether a frame is one more copy of the newest.

@@ -1,0 +1,25 @@
+//! Boards whose oscillators are off: within what docs/board.md promises they understand each other.
+
+use crate::support::{SECOND, run, world};
+
+/// Errors on the bus and boot-up messages: two boards at a bit rate, their oscillators so many ppm off in opposite directions, on a bus
+/// that is half full.
+fn heard(bit_rate: u16, ppm: i32) -> (u64, u64) {
+    let flags = format!(
+        "--bitrate {bit_rate} --load 50 --node 1:pressure --node 2:encoder --oscillator 1={ppm} --oscillator 2=-{ppm}"
+    );
+    let report = run(&mut world(&flags), SECOND * 3);
+    (report.bus.errors, report.nodes.iter().map(|node| node.heard.boot_ups).sum())
+}
+
+#[test]
+fn boards_with_oscillators_a_thousandth_off_understand_each_other_at_every_bit_rate() {
+    for bit_rate in [1000, 800, 500, 250, 125, 50, 20, 10] {
+        assert_eq!(heard(bit_rate, 1000), (0, 2), "{bit_rate} kbit/s");
+    }
+}
+
+#[test]
+fn boards_with_oscillators_one_per_cent_off_do_not() {
+    assert!(heard(1000, 10_000).0 > 0);
+}
