@@ -71,8 +71,9 @@ pub(super) fn update(world: &Shared, nodes: &str, image: &Image, outage: Option<
     let cli = Cli::try_parse_from(line.into_iter().chain(file.to_str())).unwrap();
 
     let mut outage = outage;
-    let (printed, result) =
-        run(world, &cli, move |world| drop(outage.take_if(|outage| outage.is_over(world))));
+    let (printed, result) = run(world, &cli, move |world| {
+        outage.take_if(|outage| outage.is_over(world));
+    });
     result.unwrap_or_else(|failure| panic!("{failure}: {printed}"));
     println!("{:6.2} s: {printed}", world.borrow().now().as_secs_f64());
     printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
