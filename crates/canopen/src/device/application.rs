@@ -1,4 +1,4 @@
-//! What a device does beyond CANopen, as the device sees it.
+//! The interface between a device and the product's own code.
 
 use super::{Soundness, Stored};
 use crate::dictionary::{Entry, Group, Groups};
@@ -95,7 +95,7 @@ pub trait Application {
         true
     }
 
-    /// What is stored of a group, for every reset that covers it.
+    /// The stored values of a group. Asked for at every reset that covers the group.
     fn stored(&self, _group: Group) -> Stored<'_> {
         Stored { packed: &[], soundness: Soundness::Whole }
     }

@@ -1,4 +1,4 @@
-//! What the services serve: a device without its SDO server and its LSS slave.
+//! The interface between the services and the device that they serve: the inner device, or the outer one around it.
 
 use super::basic::Basic;
 use super::{Application, STALE};
@@ -85,7 +85,7 @@ pub trait Body: Sized {
         if entry.rule().is_command() { Err(Abort::NotStored) } else { Ok(()) }
     }
 
-    /// What follows from the new value of an entry with a rule.
+    /// Takes note of the new value of an entry with a rule.
     fn follow(&mut self, _entry: &Entry, _value: u32, _now: Instant) {}
 
     /// An SDO client has written the entry: stores what the application says is stored at once.

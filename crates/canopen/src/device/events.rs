@@ -50,7 +50,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// A SYNC sends one event of each TPDO that the SYNC concerns.
     pub(super) fn send_events_with_sync(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let mut links = self.first_tpdos;
-        while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Synchronous)) {
+        while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Valid)) {
             links = tpdo.links;
             if let Some(number) = tpdo.asks_with_sync() {
                 let is_event = self.basic.application.next_event(number, &mut self.basic.image);

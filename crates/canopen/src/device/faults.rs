@@ -9,11 +9,11 @@ use crate::nmt::State;
 
 /// Error behaviour.
 const ERROR_BEHAVIOUR: u16 = 0x1029;
-/// What 1029h says: to Pre-operational, no change, to Stopped.
+/// Values of 1029h: 0 leads to Pre-operational, 2 to Stopped; 1 changes nothing.
 const TO_PRE_OPERATIONAL: u32 = 0;
 const TO_STOPPED: u32 = 2;
 
-/// What the CAN controller reports.
+/// An event that the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BusEvent {

@@ -47,8 +47,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// Of these, what the application tells and what is mapped into no TPDO. One that is switched off counts too: who does not
-    /// want its content sent does not want it in another way.
+    /// Selects the objects to send: those that the application broadcasts and that no TPDO carries. Objects of a TPDO that is
+    /// switched off are not sent either: whoever switches a TPDO off does not want its objects in another frame.
     fn choose_watched(&mut self) {
         let (application, image) = (&self.basic.application, &self.basic.image);
         self.scanner.choose(|at| application.broadcasts(at, image));
@@ -56,7 +56,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.scanner.forget_others();
     }
 
-    /// What the scanner list names: blocks of sub-indexes of one object.
+    /// Watches the objects of the scanner list: each line is a block of sub-indexes of one object.
     fn watch_listed(&mut self) {
         let [count, ..] = self.basic().number(SCANNER_LIST, 0).to_le_bytes();
         for line in 0..count {

@@ -130,7 +130,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// What follows from a new value.
+    /// Hands a new value to the protocol that uses it.
     pub(super) fn follow_value(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
             Rule::Application => self.follow_application(now),

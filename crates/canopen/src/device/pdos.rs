@@ -46,7 +46,7 @@ impl Pdo {
         if self.communication & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive }
     }
 
-    /// Those that a dictionary has, one way.
+    /// The PDOs of a dictionary in one direction, by ascending number.
     fn all(dictionary: &'static Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
         let communication = (0..).map_while(move |place| dictionary.pdo(direction, place));
         communication.map(|communication| Pdo { communication })
@@ -119,7 +119,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         ranked.find(|(_, other)| other.communication == pdo.communication).map(|(place, _)| place)
     }
 
-    /// The same for a TPDO by its number, 1 to 512.
+    /// The place of a TPDO by its number, 1 to 512.
     pub(super) fn tpdo_place(&self, number: u16) -> Option<u16> {
         self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
     }
@@ -158,9 +158,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
-            let is_synchronous = settings.transmission.is_synchronous();
+            let sends_values = settings.transmission.is_synchronous() && settings.events_of.is_none();
             self.first_tpdos.prepend(Chain::Valid, place);
-            if is_synchronous {
+            if sends_values {
                 self.first_tpdos.prepend(Chain::Synchronous, place);
             }
         }
@@ -224,7 +224,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         })
     }
 
-    /// What the mapping makes of the PDO; `None` when it names what cannot be mapped.
+    /// The content that the mapping of a PDO describes; `None` when an entry of the mapping cannot be mapped.
     fn content(&self, pdo: Pdo) -> Option<Content> {
         let count = self.mapped(pdo);
         match Addressing::from_count(count) {
@@ -233,7 +233,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// What is mapped into each TPDO, whether it is valid or not, is not for the multiplexed one.
+    /// Takes the objects of all TPDOs, valid or not, out of the multiplexed one.
     pub(super) fn leave_out_mapped(&mut self) {
         for pdo in Pdo::all(self.basic.dictionary, Direction::Transmit) {
             if let Some(Content::Objects(layout)) = self.content(pdo) {

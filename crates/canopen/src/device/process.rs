@@ -24,7 +24,7 @@ impl<B: Body> Node<B> {
     }
 
     /// Takes a frame with one of the [`process_ids`](Device::process_ids). Any other is ignored.
-    // What follows is put together where the caller needs it; the work has its place once.
+    // Inlined, so that a caller that drops a part of `Next` does not pay for it; the work itself is a function of its own.
     #[inline]
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         self.take_process_frame(frame, now, out);
@@ -111,7 +111,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.own_process_ids().chain(all_nodes)
     }
 
-    /// The same for acceptance filters: identifiers, and the bits of them that count. With an RPDO for all nodes
+    /// The identifiers as acceptance filters: each with a mask of the bits to compare. With an RPDO for all nodes
     /// ([`Application::takes_all_nodes`]) they are fewer by far.
     pub fn process_filters(&self) -> impl Iterator<Item = (CanId, u16)> {
         let all_nodes = self.body.all_nodes.map(|(id, _)| (id, CanId::FUNCTION));

@@ -62,8 +62,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.basic.application.received((index & 0x1FF) + 1, &mut self.basic.image);
     }
 
-    /// The same where objects have limits or rules: each value is checked as a write by SDO is, and one that is refused is
-    /// left out.
+    /// Takes the data of an RPDO whose objects have limits or rules: each value is checked as in an SDO download, and a value
+    /// that is refused is left out.
     #[inline(never)]
     fn store_checked(&mut self, communication: u16, data: [u8; 8]) {
         let (mapping, mut rest) = (communication | 0x0200, data.as_slice());

@@ -13,7 +13,7 @@ const SDO_RESPONSE: u16 = 0x580;
 const SDO_REQUEST: u16 = 0x600;
 const ERROR_CONTROL: u16 = 0x700;
 
-/// What serves a device: the SDO server and the LSS slave, with their responses.
+/// The SDO server and the LSS slave of a device, with the responses that wait for the queue.
 #[derive(Debug)]
 pub(super) struct Services {
     server: Server,

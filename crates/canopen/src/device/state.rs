@@ -12,14 +12,14 @@ use crate::{Instant, Transmit};
 /// 1F80h: the one value that makes the node start by itself.
 pub(super) const SELF_START: u32 = 0x08;
 
-/// What [`Node::start`] has to initialise.
+/// The part of the device that [`Node::start`] initialises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reset {
     Communication,
     Node,
 }
 
-/// Whose default values are loaded.
+/// The entries whose default values are loaded.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Scope {
     Everything,
@@ -38,13 +38,13 @@ impl Scope {
     }
 }
 
-/// What waits for the caller.
+/// Actions that wait for the caller.
 #[derive(Debug)]
 #[allow(clippy::struct_excessive_bools)] // Each waits for its own.
 pub(super) struct Pending {
     /// An action waits to be handed over.
     is_waiting: bool,
-    /// What the next start covers; told to the caller once.
+    /// Covered by the next start; the caller is told once (`reset_untold`).
     reset: Reset,
     reset_untold: bool,
     identifiers: bool,
@@ -170,14 +170,14 @@ impl<B: Body> Node<B> {
         self.silence_services();
     }
 
-    /// What follows from a call of the process half.
+    /// Result of a call of the process half: deadlines only.
     #[inline]
     pub(super) fn process_next(&self) -> Next {
         let Basic { process_due, services_due, .. } = *self.body.basic();
         Next { process: process_due, services: services_due, action: None, parameters: false }
     }
 
-    /// What follows from a call of the services half.
+    /// Result of a call of the services half, with one action that waits.
     #[inline]
     pub(super) fn services_next(&mut self) -> Next {
         let basic = self.body.basic_mut();

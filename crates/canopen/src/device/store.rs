@@ -1,4 +1,4 @@
-//! What the memory has to do with: objects 1010h, 1011h and 1F51h, settings, the configuration of LSS, and what a start finds stored.
+//! Storing and restoring: objects 1010h, 1011h and 1F51h, settings, the configuration of LSS, and loading at the start.
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
@@ -12,11 +12,11 @@ use crate::lss::Configuration;
 use crate::sdo::Abort;
 use crate::{Instant, Transmit};
 
-/// What 1010h and 1011h take: "save" and "load".
+/// Signatures that 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
 
-/// What 1F51h takes (CiA 302-3); to clear a program is a matter of the bootloader.
+/// Commands of 1F51h (CiA 302-3). The bootloader alone can clear a program.
 const STOP_PROGRAM: u32 = 0;
 const START_PROGRAM: u32 = 1;
 const RESET_PROGRAM: u32 = 2;
@@ -35,24 +35,24 @@ pub enum Job {
     Setting(u8),
 }
 
-/// What is stored of a group.
+/// The stored values of a group, with their soundness.
 #[derive(Clone, Copy, Debug)]
 pub struct Stored<'a> {
-    /// As [`Dictionary::pack`](crate::dictionary::Dictionary::pack) has made it; empty for the defaults.
+    /// The values as [`Dictionary::pack`](crate::dictionary::Dictionary::pack) has made it; empty for the defaults.
     pub packed: &'a [u8],
-    /// Whether it is what was stored last.
+    /// Whether these are the newest values that were stored.
     pub soundness: Soundness,
 }
 
-/// How far what is stored of a group can be trusted.
+/// Whether the newest stored values of a group could be read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Soundness {
-    /// It is what was stored last, or nothing was.
+    /// The newest stored values were read, or nothing has ever been stored.
     #[default]
     Whole,
-    /// What was stored last is damaged; this was stored before it.
+    /// The newest stored values are damaged; these are from the save before.
     Older,
-    /// What was stored is damaged, and nothing older is left.
+    /// The stored values are damaged, and no older ones are left.
     Lost,
 }
 
@@ -121,7 +121,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.begin_deferred(job)
     }
 
-    /// The same for the calibration. There is no way back to the defaults: they are those of no device.
+    /// Begins to store the calibration. The calibration cannot be restored: its defaults fit no real transducer.
     pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
         let job = Job::Store(Groups::one(Group::Calibration));
         if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }

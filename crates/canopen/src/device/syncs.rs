@@ -39,11 +39,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             }
         }
         self.basic.application.synchronised(sync.counter, &mut self.basic.image);
-        self.each_tpdo(Chain::Synchronous, |tpdo, image| {
-            if tpdo.events_of().is_none() {
-                tpdo.on_sync(sync, image, turn);
-            }
-        });
+        self.each_tpdo(Chain::Synchronous, |tpdo, image| tpdo.on_sync(sync, image, turn));
         if self.tells_events {
             self.send_events_with_sync(turn);
         }

@@ -43,7 +43,7 @@ macro_rules! dictionary {
     }};
 }
 
-/// The same of several tables, as an array: what the dictionaries have in common is there once.
+/// The run-time dictionaries of several tables of rows, as an array. Parts that the dictionaries have in common exist once.
 #[macro_export]
 macro_rules! dictionaries {
     ($all:expr) => {{
@@ -78,7 +78,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Of the dictionaries of these tables.
+    /// The room that the dictionaries of these tables of rows need.
     ///
     /// # Panics
     /// During compilation, when a table is wrong: see [`check`](super::check).
@@ -321,7 +321,7 @@ macro_rules! device {
     };
 }
 
-/// The same for a [`ServiceDevice`](crate::ServiceDevice).
+/// The type of a [`ServiceDevice`](crate::ServiceDevice) with just the room that a table of rows needs.
 ///
 /// ```
 /// use canopen::{NodeId, ServiceDevice, objects};

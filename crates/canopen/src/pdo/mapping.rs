@@ -87,7 +87,7 @@ pub(crate) fn locate(
     if fits && same_length { Ok(located) } else { Err(Abort::NotMappable) }
 }
 
-/// What a PDO carries.
+/// Content of a PDO.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Content {
     /// Mapped objects.
@@ -109,7 +109,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// That of a PDO that carries nothing.
+    /// The layout of a PDO without objects.
     pub(crate) const EMPTY: Layout =
         Layout { len: 0, count: 0, is_checked: false, places: [Field { offset: 0, size: 0 }; 8] };
 

@@ -6,7 +6,7 @@
 use super::{Addressing, Content, Layout, Links, Transmission};
 use crate::{CanId, Duration, Frame, Instant};
 
-/// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
+/// Settings of a valid RPDO, from the objects 1400h.. and 1600h...
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RpdoSettings {
     id: CanId,
@@ -60,7 +60,7 @@ pub(crate) enum Reception {
     Multiplexed(Addressing),
 }
 
-/// What can be wrong with the reception of an RPDO.
+/// Faults of the reception of an RPDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum RpdoFault {
@@ -126,7 +126,7 @@ impl Rpdo {
         self.is_valid.then_some(self.settings.id)
     }
 
-    /// The same of one that is in a chain.
+    /// Whether a frame has the CAN-ID of this RPDO, which is in a chain.
     pub(crate) fn is_of(&self, frame: &Frame) -> bool {
         self.settings.id.get() == frame.id()
     }

@@ -12,7 +12,7 @@ use crate::sync::Sync;
 use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
-/// What the objects 1800h.. and 1A00h.. say about a TPDO that is valid.
+/// Settings of a valid TPDO, from the objects 1800h.. and 1A00h...
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     pub(crate) id: CanId,
@@ -31,7 +31,7 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// Of a TPDO that is not valid.
+    /// The settings of a TPDO that is not valid.
     const UNUSED: Settings = Settings {
         id: CanId::NMT,
         answers_remote: false,
@@ -67,7 +67,7 @@ pub(crate) struct Tpdo {
     event_due: Instant,
     /// Before this, an event waits.
     inhibited_until: Instant,
-    /// Of a TPDO that tells events.
+    /// When to ask for events; used by a TPDO that tells events only.
     events: Events,
 }
 
@@ -137,7 +137,7 @@ impl Tpdo {
         self.settings.events_of
     }
 
-    /// The same, if the application may be asked for an event now.
+    /// The number of a TPDO that tells events, if the application may be asked for an event now.
     pub(crate) fn asks_for_event(&mut self, turn: &Turn<'_, impl Transmit>) -> Option<u16> {
         let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
@@ -192,9 +192,10 @@ impl Tpdo {
         }
     }
 
-    /// The same of a TPDO that tells events: its number. A SYNC sends one event, whatever the type counts.
+    /// The number of a TPDO that tells events and may send one with a SYNC, whatever the type counts.
     pub(crate) fn asks_with_sync(&self) -> Option<u16> {
-        self.settings.events_of.filter(|_| !self.pending)
+        let is_asked = self.settings.transmission.is_synchronous() && !self.pending;
+        self.settings.events_of.filter(|_| is_asked)
     }
 
     /// Whether it is the turn of a cyclic synchronous PDO, with every n-th SYNC.

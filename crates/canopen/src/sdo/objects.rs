@@ -1,4 +1,4 @@
-//! What the server serves, and the two ends of a transfer: where data comes from and where it goes.
+//! The objects as the server sees them, and the two ends of a transfer: the source of an upload and the sink of a download.
 
 use super::{Abort, Bytes, Multiplexer, crc};
 use crate::copy::copy;
@@ -145,7 +145,7 @@ impl Sink {
         Ok(())
     }
 
-    /// The same for a whole segment, if it needs no room made: with a length that the compiler knows, the copy is two words.
+    /// Takes a whole segment if the buffer has room for it. With a length that the compiler knows, the copy is two words.
     #[inline]
     pub(super) fn append_segment(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
         let end = self.held + data.len();

@@ -21,7 +21,13 @@ impl Server {
         objects: &mut impl Objects,
         now: Instant,
     ) -> Answer {
-        let Some(request) = Request::parse(frame) else { return Err(Abort::Command) };
+        let Some(request) = Request::parse(frame) else {
+            // No transfer is under way: the abort names the object of this frame, and not that of the last transfer.
+            if self.is_idle() {
+                self.multiplexer = Multiplexer::parse(frame);
+            }
+            return Err(Abort::Command);
+        };
         match request {
             Request::Upload(at) => self.upload(at, objects),
             Request::Download(at, initiate) => self.download(at, initiate, objects, now),
