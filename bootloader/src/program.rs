@@ -85,8 +85,6 @@ impl Readings {
 }
 
 impl Application for Program {
-    const SERVICES_ONLY: bool = true;
-
     fn initialise(&mut self, image: &mut [u8]) {
         HARDWARE.set(image, board::NAME.as_bytes());
         let identity = [VENDOR, PRODUCT, REVISION, factory::serial_number()];

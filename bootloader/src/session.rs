@@ -9,7 +9,7 @@ use bsp::can::Controller;
 use bsp::filters;
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
-use canopen::{Action, CanId, Device, Duration, Instant, NodeId};
+use canopen::{Action, CanId, Duration, Instant, NodeId, ServiceDevice};
 use update::{Next, Phase, Updater};
 
 use crate::dictionary::{DICTIONARY, ROWS};
@@ -31,7 +31,7 @@ const FAREWELL: Duration = Duration::from_millis(20);
 
 /// Everything but the queues.
 pub(crate) struct Session {
-    device: canopen::device!(Program, ROWS),
+    device: canopen::service_device!(Program, ROWS),
     can: Controller,
     timing: BitTiming,
     back_off: BackOff,
@@ -69,7 +69,7 @@ impl Session {
         let timing =
             note.map(|note| note.timing).or_else(|| BitTiming::of(KBIT)).unwrap_or(BitTiming::FASTEST);
         Session {
-            device: Device::new(&DICTIONARY, node_id, Program::new(updater, TARGET)),
+            device: ServiceDevice::new(&DICTIONARY, node_id, Program::new(updater, TARGET)),
             can,
             timing,
             back_off: BackOff::default(),

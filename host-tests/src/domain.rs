@@ -1,6 +1,6 @@
 //! A small device with what the pressure node has not: an object of several KiB, for long transfers.
 
-use canopen::dictionary::{self, Access, Dictionary, Object, Type};
+use canopen::dictionary::{Access, Dictionary, Object, Type};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Action, Application, CanId, Device, Frame, Instant, NodeId, Part, Transmit};
 
@@ -30,7 +30,6 @@ const ROWS: &[Object] = &[
     parameter(TEXT, Type::VisibleString(TEXT_CAPACITY)),
     parameter(WORD, Type::Unsigned32),
 ];
-const SIZE: usize = dictionary::image_size(ROWS);
 const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 /// The content of the domain. A download replaces it when it is complete.
@@ -63,7 +62,7 @@ impl Application for Store {
 /// The device.
 #[derive(Debug)]
 pub struct DomainDevice {
-    device: Device<Store, SIZE>,
+    device: canopen::device!(Store, ROWS),
     asked: Asked,
 }
 

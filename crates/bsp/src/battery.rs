@@ -3,7 +3,7 @@
 use crate::kept::Found;
 use crate::reset_cause::ResetCause;
 
-/// What is known after a start.
+/// State of the battery as a start can tell it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Battery {
     /// The main supply never went: nothing can be said.

@@ -14,7 +14,7 @@ const RATES: [u16; 8] = [250, 500, 125, 1000, 50, 20, 800, 10];
 const FIRST: Duration = Duration::from_millis(40);
 const LONGEST: Duration = Duration::from_millis(1_280);
 
-/// What the controller has heard since the last look.
+/// Frames and errors that the controller has seen since the last look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
     /// Nothing at all.
@@ -25,7 +25,7 @@ pub enum Heard {
     Error,
 }
 
-/// What to do now.
+/// The next step of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Go on listening.

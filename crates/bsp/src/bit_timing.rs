@@ -38,7 +38,7 @@ const _: () = {
 };
 
 impl BitTiming {
-    /// That of 1 Mbit/s.
+    /// Bit timing of 1 Mbit/s.
     pub const FASTEST: BitTiming = TABLE[0];
 
     /// The timing for a bit rate in kbit/s; `None` when it is none of CiA 301.

@@ -1,6 +1,6 @@
 //! The state of the fault confinement, from `CAN_ESR` (RM0390, 30.9.2).
 
-/// How far the error counters have climbed.
+/// Error state of the controller, by its error counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BusState {
     /// Both counters below 96.

@@ -89,7 +89,7 @@ mod tests {
         ids.into_iter().map(|id| (id, 0x7FF))
     }
 
-    /// What the hardware does with a frame.
+    /// The FIFO into which the hardware puts a frame, computed as the hardware does.
     fn route(banks: &Banks, id: u16) -> Option<Fifo> {
         let passes = |pair: &Pair| (id ^ pair.id) & pair.mask == 0;
         banks.iter().find(|bank| bank.pairs.iter().any(passes)).map(|bank| bank.fifo)

@@ -27,12 +27,12 @@ pub struct Slot {
 /// The places of both.
 pub type Slots = [Slot; 2];
 
-/// What the memory held at the start.
+/// Content of the memory at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
     /// No trace of a copy: nothing was ever written, or the battery was empty.
     Nothing,
-    /// What was written last.
+    /// The record that was written last.
     Kept(Content),
     /// A copy was there, and none is good.
     Damaged,
@@ -137,7 +137,7 @@ mod tests {
 
     static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_MPEG_2);
 
-    /// What the unit of the chip computes.
+    /// The CRC as the unit of the chip computes it.
     struct Software(Digest<'static, u32>);
 
     impl Checksum for Software {
@@ -185,7 +185,7 @@ mod tests {
         open(slots).1
     }
 
-    /// What `write` with this number keeps.
+    /// The record that `write` makes of this number.
     fn content(number: u32) -> Content {
         core::array::from_fn(|n| number.wrapping_mul(0x9E37_79B9).rotate_left(u32::try_from(n).unwrap()))
     }

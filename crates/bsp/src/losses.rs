@@ -5,7 +5,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// What can be lost.
+/// Kinds of events that can get lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A received frame that found no place in the FIFO or in the queue behind it.

@@ -20,12 +20,12 @@ use heapless::Vec;
 /// Most frames that wait.
 pub const CAPACITY: usize = 32;
 
-/// What became of a frame that was offered to the mailboxes.
+/// The outcome of offering a frame to the mailboxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Offer {
-    /// It is in a mailbox that was free.
+    /// The frame is in a mailbox that was free.
     Taken,
-    /// It is in the mailbox of this less urgent frame, which must be queued again.
+    /// The frame is in the mailbox of this less urgent frame, which must be queued again.
     Replaced(Frame),
     /// It has to wait.
     Refused,
@@ -48,7 +48,7 @@ struct Waiting {
     is_state: bool,
 }
 
-/// What has become of the boot-up message.
+/// State of the boot-up message, before which no other frame may be on the bus.
 #[derive(Clone, Copy, Debug, Default)]
 enum BootUp {
     /// The message was sent, or there was none yet.

@@ -17,7 +17,7 @@ use core::fmt::{Result, Write};
 
 use crate::dictionary::{Access, DefaultValue, Mapping, Object, Type};
 
-/// What the data sheet says and the rows do not.
+/// Entries of the data sheet that do not follow from the rows.
 #[derive(Clone, Copy, Debug)]
 pub struct DeviceInfo<'a> {
     /// Name of the vendor.
@@ -32,7 +32,7 @@ const BIT_RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 /// Writes the data sheet of a device.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub fn write(rows: &[Object], device: &DeviceInfo<'_>, out: &mut impl Write) -> Result {
     info(rows, device, out)?;
     lists(rows, out)?;
@@ -113,7 +113,7 @@ fn write_object(rows: &[Object], out: &mut impl Write) -> Result {
     Ok(())
 }
 
-/// What CiA 301 calls a record: identity and PDO parameters.
+/// Whether CiA 301 defines the object as a record: identity and PDO parameters.
 const fn is_record(index: u16) -> bool {
     matches!(index, 0x1018 | 0x1400..=0x1BFF)
 }

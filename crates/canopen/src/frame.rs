@@ -4,14 +4,17 @@ use crate::CanId;
 use crate::copy::copy;
 
 /// A frame on the wire. CANopen services of this node use the CAN base frame format only (CiA 301, 7.3.5).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    id: u16,
-    remote: bool,
-    len: u8,
+    /// CAN-ID, data length code and remote transmission request in one word, which is compared at once.
+    head: u32,
     data: [u8; 8],
 }
+
+/// Where the data length code is in the head.
+const LEN: u32 = 16;
+/// The remote transmission request in the head.
+const REMOTE: u32 = 1 << 24;
 
 impl Frame {
     /// A data frame; `None` for an identifier above 7FFh or more than eight bytes.
@@ -20,12 +23,12 @@ impl Frame {
         let mut data = [0; 8];
         copy(data.get_mut(..bytes.len())?, bytes);
         let len = u8::try_from(bytes.len()).ok()?;
-        (id <= 0x7FF).then_some(Frame { id, remote: false, len, data })
+        Some(Frame::data_frame(CanId::new(id)?, len, data))
     }
 
     /// A data frame of the first `len` bytes, at most eight.
     pub(crate) fn data_frame(id: CanId, len: u8, data: [u8; 8]) -> Frame {
-        Frame { id: id.get(), remote: false, len, data }
+        Frame { head: head(id.get(), len), data }
     }
 
     /// The data bytes, then zeros.
@@ -33,44 +36,73 @@ impl Frame {
         self.data
     }
 
-    /// All eight bytes of a full data frame; `None` for any other.
-    pub(crate) fn full(&self) -> Option<&[u8; 8]> {
-        (self.len == 8 && !self.remote).then_some(&self.data)
+    /// All eight bytes, if this is a full data frame with this identifier.
+    #[inline]
+    pub(crate) fn full(&self, id: CanId) -> Option<&[u8; 8]> {
+        (self.head == head(id.get(), 8)).then_some(&self.data)
     }
 
     /// A remote frame; `None` for an identifier above 7FFh or a length above eight.
     #[must_use]
     pub fn remote(id: u16, len: u8) -> Option<Frame> {
-        (id <= 0x7FF && len <= 8).then_some(Frame { id, remote: true, len, data: [0; 8] })
+        (id <= 0x7FF && len <= 8).then_some(Frame { head: head(id, len) | REMOTE, data: [0; 8] })
     }
 
     /// The CAN-ID.
     #[must_use]
     pub fn id(&self) -> u16 {
-        self.id
+        let [low, high, ..] = self.head.to_le_bytes();
+        u16::from_le_bytes([low, high])
     }
 
     /// Whether it is a remote frame (RTR).
     #[must_use]
     pub fn is_remote(&self) -> bool {
-        self.remote
+        self.head & REMOTE != 0
     }
 
     /// The data length code.
     #[must_use]
     pub fn len(&self) -> usize {
-        usize::from(self.len)
+        let [_, _, len, _] = self.head.to_le_bytes();
+        usize::from(len)
     }
 
     /// Whether it carries no data.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.len == 0
+        self.len() == 0
     }
 
     /// The data bytes; empty for a remote frame.
     #[must_use]
     pub fn data(&self) -> &[u8] {
-        if self.remote { &[] } else { self.data.get(..self.len()).unwrap_or(&[]) }
+        if self.is_remote() { &[] } else { self.data.get(..self.len()).unwrap_or(&[]) }
+    }
+}
+
+/// The head of a data frame.
+fn head(id: u16, len: u8) -> u32 {
+    u32::from(id) | u32::from(len) << LEN
+}
+
+impl core::fmt::Debug for Frame {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let mut frame = f.debug_struct("Frame");
+        frame.field("id", &self.id()).field("remote", &self.is_remote());
+        frame.field("len", &self.len()).field("data", &self.data()).finish()
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Frame {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "Frame {=u16:03x} remote {=bool} {=[u8]:02x}",
+            self.id(),
+            self.is_remote(),
+            self.data()
+        );
     }
 }

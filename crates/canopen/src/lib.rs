@@ -26,7 +26,10 @@ mod time;
 mod transmit;
 
 pub use can_id::{CanId, CobId};
-pub use device::{Action, Application, BusEvent, Device, ErrorClass, Job, Next, Part, Soundness, Stored};
+pub use device::{
+    Action, Application, BusEvent, Device, ErrorClass, Job, Next, Node, Part, ServiceDevice, Soundness,
+    Stored,
+};
 pub use emcy::{Condition, Fault};
 pub use frame::Frame;
 pub use node_id::NodeId;

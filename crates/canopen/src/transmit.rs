@@ -15,7 +15,8 @@ impl core::fmt::Display for QueueFull {
 
 impl core::error::Error for QueueFull {}
 
-/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others.
+/// A transmit queue. It never blocks. It should hold some twenty frames: a block upload leaves room for ten others, and that of a
+/// [`ServiceDevice`](crate::ServiceDevice) for two.
 pub trait Transmit {
     /// Queues one frame.
     ///
@@ -23,11 +24,11 @@ pub trait Transmit {
     /// `QueueFull` when there is no room; the frame is then not queued.
     fn send(&mut self, frame: Frame) -> Result<(), QueueFull>;
 
-    /// Queues a frame that tells how things are now: a heartbeat, a PDO. A newer one of its identifier may take its place as
-    /// long as it waits, for then it tells how things were. A queue that does not know the difference sends all of them.
+    /// Queues a frame with a present state: a heartbeat or a PDO. While the frame waits, a newer frame with the same identifier
+    /// may replace it. A queue without that feature sends both.
     ///
     /// # Errors
-    /// As [`send`](Transmit::send).
+    /// `QueueFull` when there is no room; the frame is then not queued.
     fn send_state(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.send(frame)
     }
@@ -36,7 +37,7 @@ pub trait Transmit {
     /// says nothing before it has booted up (CiA 301, 7.3.2.2). A queue that keeps the order of its frames needs nothing for it.
     ///
     /// # Errors
-    /// As [`send`](Transmit::send).
+    /// `QueueFull` when there is no room; the frame is then not queued.
     fn send_boot_up(&mut self, frame: Frame) -> Result<(), QueueFull> {
         self.send(frame)
     }
@@ -45,9 +46,9 @@ pub trait Transmit {
     fn room(&self) -> usize;
 }
 
-/// One call of the device: when it is, and the way to the queue. That can be shut: it then takes nothing, and the senders
-/// try again later.
-pub(crate) struct Turn<'a, T> {
+/// One call of the device: its time, and the transmit queue. While the bit rate changes the queue is shut: it takes nothing,
+/// and the senders try again later.
+pub struct Turn<'a, T> {
     pub(crate) now: Instant,
     pub(crate) out: &'a mut T,
     pub(crate) is_open: bool,
@@ -59,12 +60,12 @@ impl<T: Transmit> Turn<'_, T> {
         self.is_open && self.out.send(frame).is_ok()
     }
 
-    /// The same for the boot-up message.
+    /// Queues the boot-up message; whether there was room.
     pub(crate) fn send_boot_up(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send_boot_up(frame).is_ok()
     }
 
-    /// The same for a frame of which only the newest counts.
+    /// Queues a frame that a newer one may replace; whether there was room.
     pub(crate) fn send_state(&mut self, frame: Frame) -> bool {
         self.is_open && self.out.send_state(frame).is_ok()
     }

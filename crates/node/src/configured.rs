@@ -1,4 +1,4 @@
-//! What the parameter store has of the device itself: what it is to be after the next reset.
+//! The device record in the parameter store: personality, node-ID and bit rate of the next start.
 
 use crate::Setup;
 use canopen::lss::Configuration;

@@ -13,7 +13,7 @@ const fn fault(name: &'static str, code: u16, flags: Flags) -> Fault {
 pub const PARAMETER_STORE: Fault = fault("ParameterStore", 0x5003, Flags::system(2));
 /// The device record (node-ID, bit rate, personality) could not be read: the defaults hold.
 pub const BOOT_DATA: Fault = with_detail("BootData", DEFAULTS_HOLD);
-/// What was stored last of the device record could not be read: the record before holds.
+/// The newest device record could not be read: the record before holds.
 pub const OLDER_BOOT_DATA: Fault = with_detail("OlderBootData", OLDER_HOLDS);
 /// The node restarted without having been told to.
 pub const UNEXPECTED_RESET: Fault = fault("UnexpectedReset", 0x6101, Flags::system(6));
@@ -28,7 +28,7 @@ const fn with_detail(name: &'static str, holds: u8) -> Fault {
     Fault { name, condition, flags: Flags::system(3) }
 }
 
-/// Those that no profile finds.
+/// The faults that no profile finds.
 const OWN: &[Fault] = &[PARAMETER_STORE, BOOT_DATA, OLDER_BOOT_DATA, UNEXPECTED_RESET];
 
 const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
@@ -36,7 +36,7 @@ const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
 /// All faults, in the order of their numbers ([`canopen::Fault::Application`]).
 pub static FAULTS: [Fault; count(LISTS)] = gather(LISTS);
 
-/// What they look like on the bus, in the same order.
+/// The faults as the bus shows them, in the same order.
 pub(crate) const CONDITIONS: [Condition; count(LISTS)] = {
     let faults: [Fault; count(LISTS)] = gather(LISTS);
     let mut conditions = [Condition::new(0); count(LISTS)];

@@ -1,4 +1,4 @@
-//! What the parameter store knows of the device itself, and whether that can be trusted.
+//! The identity of the device as the parameter store has it, and whether the record could be read.
 
 use embedded_storage::nor_flash::ReadNorFlash;
 use storage::{DeviceRecord, Group, Health, View};

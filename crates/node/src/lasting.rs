@@ -32,7 +32,7 @@ impl LastingRecord {
         LastingRecord { stored: found.map(Lasting::from_words), start: None }
     }
 
-    /// What is stored; `None` where nothing is, or nothing that can be read.
+    /// The stored value; `None` where nothing is stored, or nothing that can be read.
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Option<[u32; LASTING_WORDS]> {
         let mut value: Value = [0; DeviceRecord::ROOM];
         let loaded = view.load(Group::Device, &mut value);
@@ -45,7 +45,7 @@ impl LastingRecord {
     /// `device` is the device record as it is stored or would be. Whether it has written.
     ///
     /// # Errors
-    /// As [`Store::save`]. It is tried again when it is due again.
+    /// Errors of [`Store::save`]. The next due time tries again.
     pub fn keep<F: NorFlash>(
         &mut self,
         retained: &[u32; RETAINED_WORDS],
@@ -77,7 +77,7 @@ pub(crate) fn replace_device<F: NorFlash>(
     save(device, tail(loaded, &value).unwrap_or_default(), store)
 }
 
-/// What lies behind the device record.
+/// The bytes behind the device record.
 fn tail<E>(loaded: Result<Option<Loaded>, Error<E>>, value: &Value) -> Option<&[u8]> {
     let loaded = loaded.ok()??;
     let is_whole = (loaded.version, loaded.len) == (DeviceRecord::VERSION, WHOLE);

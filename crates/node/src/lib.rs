@@ -2,7 +2,7 @@
 //!
 //! [`Protocol`] is the CANopen device, [`Measurement`] the sampling half of its profile. A [`Snapshot`] goes from the second
 //! to the first once a millisecond, [`Parameters`] go back when they have changed; each is one consistent set of values.
-//! What a node measures, and what its objects mean, is in the crate `profiles`.
+//! Measuring, and the meaning of the profile objects, are in the crate `profiles`.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]

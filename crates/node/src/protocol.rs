@@ -3,7 +3,7 @@
 use canopen::nmt::State;
 use canopen::{Action, CanId, Device, Frame, Instant, Job, NodeId, Transmit};
 use profiles::board::Outputs;
-use profiles::{IMAGE_SIZE, Parameters, Snapshot};
+use profiles::{Parameters, ROOM, Snapshot};
 
 use crate::application::NodeApplication;
 use crate::faults::Shown;
@@ -16,10 +16,10 @@ const OLDER_SAMPLES: u8 = 3;
 /// call returns what follows from it: see [`Next`].
 #[derive(Debug)]
 pub struct Protocol {
-    pub(crate) device: Device<NodeApplication, IMAGE_SIZE>,
+    pub(crate) device: canopen::device!(NodeApplication, room: ROOM),
     /// As last published: most samples change nothing.
     pub(crate) shown: Shown,
-    /// What `Action::Store` is about.
+    /// The job of the last `Action::Store`.
     pub(crate) job: Option<Job>,
     /// Samples that may still come from before the parameters that hold now.
     pub(crate) older_samples: u8,
@@ -117,7 +117,7 @@ impl Protocol {
         self.device.application().profile.parameters(self.device.image())
     }
 
-    /// What the board has to show. To be asked after each frame.
+    /// The outputs of the board. To be asked for after each frame.
     #[must_use]
     pub fn outputs(&self) -> Outputs {
         self.device.application().profile.outputs(self.device.image())
@@ -128,7 +128,7 @@ impl Protocol {
         self.device.process_ids().map(CanId::get)
     }
 
-    /// The same for its filters: identifiers, and the bits of them that count.
+    /// The identifiers as acceptance filters: each with a mask of the bits to compare.
     pub fn process_filters(&self) -> impl Iterator<Item = (u16, u16)> {
         self.device.process_filters().map(|(id, mask)| (id.get(), mask))
     }

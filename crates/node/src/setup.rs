@@ -1,4 +1,4 @@
-//! What a node must know before it starts.
+//! The values that a node needs before it starts.
 
 use canopen::NodeId;
 use canopen::lss::BitRate;

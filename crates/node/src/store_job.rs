@@ -43,7 +43,7 @@ impl StoreJob {
     /// Does the job: all of it or nothing. It takes as long as the flash does, some 16 us a word.
     ///
     /// # Errors
-    /// What to tell the client: `Hardware` when the flash has failed, `DeviceState` when there is no room left until the
+    /// The abort code for the client: `Hardware` when the flash has failed, `DeviceState` when there is no room left until the
     /// node is restarted.
     pub fn run<F: NorFlash>(&mut self, store: &mut Store<F>) -> Result<(), Abort> {
         self.pack();

@@ -79,7 +79,7 @@ impl Stored {
 fn read<F: ReadNorFlash>(group: Group, layout: u16, view: &mut View<F>, bytes: &mut [u8]) -> Option<usize> {
     match view.load(record_of(group), bytes) {
         Ok(Some(loaded)) if loaded.version == layout => Some(loaded.len).filter(|len| *len > 0),
-        // What another personality has stored is nothing to this one.
+        // The values that another personality has stored are not for this one.
         Ok(Some(loaded)) => (loaded.version.to_le_bytes()[0] == FORM).then_some(0),
         Ok(None) => Some(0),
         Err(_) => None,

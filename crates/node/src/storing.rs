@@ -20,7 +20,7 @@ impl Protocol {
         self.parameters()
     }
 
-    /// The same for a node whose store cannot be read.
+    /// Loads the defaults, for a node whose store cannot be read.
     pub fn load_defaults(&mut self) -> Parameters {
         self.device.load();
         self.parameters()

@@ -118,12 +118,13 @@ macro_rules! personalities {
         static DICTIONARIES: [canopen::dictionary::Dictionary; COUNT] =
             canopen::dictionaries!([$(&tables::$module::ROWS),+]);
 
-        /// Bytes of the image of all values, large enough for every personality.
-        pub const IMAGE_SIZE: usize = {
-            let mut size = 0;
-            $(size = $crate::table::larger(size, canopen::dictionary::image_size(&tables::$module::ROWS));)+
-            size
-        };
+        /// The room of a device, enough for every personality.
+        #[allow(long_running_const_eval)]
+        pub const ROOM: canopen::dictionary::Sizes =
+            canopen::dictionary::Sizes::of_any(&[$(&tables::$module::ROWS),+]);
+
+        /// Bytes of the image of all values, enough for every personality.
+        pub const IMAGE_SIZE: usize = ROOM.image;
 
         /// Bytes of the packed values of a storage group, large enough for every personality.
         #[must_use]

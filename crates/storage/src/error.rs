@@ -1,4 +1,4 @@
-//! What can go wrong.
+//! Errors of the parameter store.
 
 use core::fmt;
 

@@ -91,7 +91,7 @@ pub(crate) fn guarded(value: u16) -> u32 {
 /// How many bits of [`Contents`] are the number of words: enough for four values of [`crate::MAX_VALUE`].
 const WORDS: u32 = 12;
 
-/// What a transaction says of itself: how many words its records have, and which groups they are of.
+/// Head of a transaction: the number of words of its records, and the groups that they belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Contents {
     pub(crate) words: u16,

@@ -32,16 +32,16 @@ impl Group {
     }
 }
 
-/// How far the stored state of a group can be trusted, as found when the store was opened. Anything but
+/// Whether the newest values of a group could be read, as found when the store was opened. Anything but
 /// `Good` is worth an EMCY: 6301h for the device, 6302h for the communication and 6303h for the application group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Health {
-    /// What was last saved is what is read; a save that a power cut kept from completing counts as not made.
+    /// The newest saved value is read; a save that a power cut kept from completing counts as not made.
     #[default]
     Good,
-    /// What was saved last of this group is damaged: the value before it is read.
+    /// The newest saved value of this group is damaged: the value before it is read.
     FellBack,
-    /// What was saved of this group is damaged, and there is no older value: nothing is read, the defaults hold.
+    /// The saved value of this group is damaged, and there is no older one: nothing is read, the defaults hold.
     Lost,
 }
 
@@ -71,7 +71,7 @@ impl Change<'_> {
     }
 }
 
-/// What `load` has put into the caller's buffer.
+/// The value that `load` has put into the caller's buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Loaded {
     /// Version of the layout, as given when the value was saved.

@@ -22,7 +22,7 @@ impl Pages {
         Pages { start, size, unit: WORD }
     }
 
-    /// The same pages in a flash that programs `bytes` as one: 4, 8, 16 or 32, a multiple of its `WRITE_SIZE`.
+    /// These pages in a flash that programs `bytes` as one: 4, 8, 16 or 32, a multiple of its `WRITE_SIZE`.
     #[must_use]
     pub const fn with_words(self, bytes: u32) -> Pages {
         Pages { unit: bytes, ..self }

@@ -1,4 +1,4 @@
-//! What the factory and `cargo sim` do before a node runs for the first time.
+//! Writing the device record of a new board, for the factory and for `cargo sim`.
 
 use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
 
@@ -13,7 +13,7 @@ use crate::view::View;
 /// Erases both pages, whatever they hold, and stores a device record.
 ///
 /// # Errors
-/// As [`View::open`], [`Store::prepare`] and [`Store::save`].
+/// Errors of [`View::open`], [`Store::prepare`] and [`Store::save`].
 pub fn provision<F: NorFlash>(
     mut flash: F,
     pages: Pages,
@@ -30,7 +30,7 @@ pub fn provision<F: NorFlash>(
 /// Reads one group from a dump of the flash. To read several, or their health, use a [`View`] of a [`Memory`].
 ///
 /// # Errors
-/// As [`View::open`] and [`View::load`].
+/// Errors of [`View::open`] and [`View::load`].
 pub fn read(
     flash: &[u8],
     pages: Pages,

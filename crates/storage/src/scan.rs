@@ -18,7 +18,7 @@ pub(crate) struct Slot {
     pub(crate) len: u32,
 }
 
-/// What the records say of a group; the last one counts.
+/// The state of a group after all records; the last one counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Content {
     #[default]

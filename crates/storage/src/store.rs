@@ -67,7 +67,7 @@ impl<F: NorFlash> Store<F> {
             |change: &Change<'_>| matches!(change, Change::Set { value, .. } if value.len() > MAX_VALUE);
         let mut new = PerGroup::from_fn(|group| last_change(changes, group));
         let whole = PerGroup::from_fn(|group| new.get(group).or(*self.kept().get(group)));
-        // What a page could not hold alone could never be moved, so it is refused while there is still room for it.
+        // A value that a page could not hold alone could never be moved, so it is refused while there is still room for it.
         if changes.iter().any(too_long) || size(&whole, self.format()) > self.current().page.room() {
             return Err(Error::TooLong);
         }
@@ -84,7 +84,7 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// What is stored already wears out nothing: a master that saves after every start costs no flash.
+    /// Values that are stored already are not written again: a master that saves after every start costs no flash.
     fn drop_unchanged(&mut self, records: &mut Records<'_>) -> Result<(), F::Error> {
         for group in Group::ALL {
             let is_same = match (records.get(group), self.current_content(group)) {
@@ -101,29 +101,29 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// What the next start would read of the group. Of a page that is damaged nothing counts: it is written anew.
+    /// The value of the group that the next start would read. Nothing of a damaged page counts: the page is written anew.
     fn current_content(&self, group: Group) -> Content {
         let entry = self.view.state.groups.get(group);
         if entry.suspect { Content::Unnamed } else { entry.content }
     }
 
-    /// As [`View::load`].
+    /// Loads a group: see [`View::load`].
     ///
     /// # Errors
-    /// As [`View::load`].
+    /// Errors of [`View::load`].
     pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         self.view.load(group, buf)
     }
 
-    /// As [`View::device`].
+    /// Loads the device record: see [`View::device`].
     ///
     /// # Errors
-    /// As [`View::load`].
+    /// Errors of [`View::load`].
     pub fn device(&mut self) -> Result<Option<DeviceRecord>, Error<F::Error>> {
         self.view.device()
     }
 
-    /// As [`View::health`]: what the view found, also after `prepare` has mended it.
+    /// The [`View::health`] that the view found, also after `prepare` has mended the store.
     #[must_use]
     pub fn health(&self, group: Group) -> Health {
         self.view.health(group)

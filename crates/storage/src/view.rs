@@ -18,7 +18,7 @@ pub struct View<F> {
     health: PerGroup<Health>,
 }
 
-/// What both pages say together.
+/// The state of the store from both pages.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State {
     /// The page in use; when `generation` is `None` no page is in use.
@@ -58,7 +58,7 @@ impl<F: ReadNorFlash> View<F> {
     /// The device record; `None` when none is stored or it is of a layout that this program does not know.
     ///
     /// # Errors
-    /// As [`View::load`].
+    /// Errors of [`View::load`].
     pub fn device(&mut self) -> Result<Option<DeviceRecord>, Error<F::Error>> {
         let mut buf = [0; DeviceRecord::ROOM];
         match self.load(Group::Device, &mut buf) {
@@ -70,7 +70,7 @@ impl<F: ReadNorFlash> View<F> {
         }
     }
 
-    /// How far the stored state of a group could be trusted when the store was opened.
+    /// Whether the newest values of a group could be read when the store was opened.
     #[must_use]
     pub fn health(&self, group: Group) -> Health {
         *self.health.get(group)

@@ -8,7 +8,7 @@ use crate::group::{Change, Group, GroupSet, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};
 
-/// What a transaction will say of a group.
+/// The record of a group in a transaction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Record<'a> {
     Set { version: u16, value: &'a [u8] },
@@ -62,9 +62,9 @@ pub(crate) struct Writer<'f, F> {
     flash: &'f mut F,
     page: Page,
     at: u32,
-    /// Of the transaction.
+    /// Check of the transaction.
     check: Check,
-    /// Of the record under way.
+    /// Check of the record under way.
     record_check: Check,
     /// The words of a unit that is not full yet, and zeros.
     unit: [u8; LARGEST_UNIT as usize],

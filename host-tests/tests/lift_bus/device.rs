@@ -4,15 +4,15 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use canopen::dictionary::Dictionary;
+use canopen::dictionary::{Dictionary, Sizes};
 use canopen::{Action, CanId, Device, Duration, Frame, Instant, NodeId, Transmit};
 use host_tests::asked::Asked;
 use host_tests::network::Unit;
 
 use crate::world::World;
 
-/// Bytes for the values of any of the dictionaries.
-const SIZE: usize = 512;
+/// Enough for any of the dictionaries.
+const ROOM: Sizes = Sizes { image: 512, tpdos: 8, rpdos: 8, watches: 4, scanned: 48 };
 pub(crate) const TICK: Duration = Duration::from_millis(1);
 
 /// What a device does besides CANopen.
@@ -50,7 +50,7 @@ impl Values<'_> {
 
 /// The device.
 pub(crate) struct VirtualDevice {
-    device: Device<(), SIZE>,
+    device: canopen::device!((), room: ROOM),
     dictionary: &'static Dictionary,
     behaviour: Box<dyn Behaviour>,
     world: Rc<RefCell<World>>,
@@ -65,7 +65,7 @@ impl VirtualDevice {
         behaviour: impl Behaviour + 'static,
         world: &Rc<RefCell<World>>,
     ) -> VirtualDevice {
-        assert!(dictionary.image_size() <= SIZE);
+        assert!(dictionary.image_size() <= ROOM.image);
         VirtualDevice {
             device: Device::new(dictionary, NodeId::new(node_id), ()),
             dictionary,

@@ -1,7 +1,7 @@
 //! Each of the 290 PDOs of the table, produced and consumed by a device of the stack: at its number, with its CAN-ID, and
 //! laid out as the table says.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Tables, Type};
+use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Sizes, Tables, Type};
 use canopen::{Device, Duration, Frame, Instant, NodeId};
 use host_tests::bench::Queue;
 use host_tests::lift417::{Pdo, pdos};
@@ -13,6 +13,8 @@ const ID: u8 = 33;
 /// Rows of a dictionary: those of one PDO and its objects, and some that fill it up.
 const ROWS: usize = 24;
 const SIZE: usize = 128;
+/// One PDO, or one object in a multiplexed one.
+type Node = canopen::device!((), room: Sizes { image: SIZE, tpdos: 1, rpdos: 1, watches: 0, scanned: 8 });
 
 /// The objects; of a multiplexed PDO the one that it carries in these tests.
 fn carried(pdo: &Pdo) -> Vec<(u16, u8, u8)> {
@@ -71,7 +73,7 @@ fn kind(bits: u8) -> Type {
 }
 
 /// The objects of a PDO, and the dictionary of a device with nothing else.
-fn device(row: &Pdo) -> (&'static Dictionary, Device<(), SIZE>) {
+fn device(row: &Pdo) -> (&'static Dictionary, Node) {
     let (access, mapping) =
         if row.is_produced { (Access::ReadOnly, Mapping::Tpdo) } else { (Access::ReadWrite, Mapping::Rpdo) };
     let mapped = carried(row).into_iter().filter(|(index, ..)| *index >= 0x1000);
@@ -92,7 +94,7 @@ fn device(row: &Pdo) -> (&'static Dictionary, Device<(), SIZE>) {
 }
 
 /// A device in Operational, with what it has sent on the way there.
-fn operational(row: &Pdo) -> (&'static Dictionary, Device<(), SIZE>, Vec<Frame>) {
+fn operational(row: &Pdo) -> (&'static Dictionary, Node, Vec<Frame>) {
     let (dictionary, mut device) = device(row);
     let mut out = Queue::default();
     let _ = device.start(NOW, &mut out);

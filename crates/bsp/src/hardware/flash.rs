@@ -7,7 +7,7 @@ use stm32f4xx_hal::pac::FLASH;
 
 use crate::flash_area::FlashArea;
 
-/// What unlocks the control register (RM0390, 3.5.1).
+/// Key sequence that unlocks the control register (RM0390, 3.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// The error flags of SR; writing 1 clears one.
 const ERRORS: u32 = 0b1_1111_0010;

@@ -25,9 +25,9 @@ pub struct FrontEnd {
 /// One millisecond of both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reading {
-    /// Of the analogue inputs.
+    /// Readings of the analogue inputs.
     pub sums: Sums,
-    /// Of the incremental encoder.
+    /// Readings of the incremental encoder.
     pub counted: Counted,
 }
 

@@ -88,7 +88,7 @@ pub struct TimeInterrupt {
     told: [u32; 2],
 }
 
-/// What became of an alarm.
+/// State of an alarm after a look at the counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ring {
     /// Its time has not come, or was reported before.

@@ -23,7 +23,7 @@ impl Heartbeat {
     }
 }
 
-/// What the supervision of a node has found.
+/// A change that the supervision of a node has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The node has booted up.

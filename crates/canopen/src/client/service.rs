@@ -1,13 +1,13 @@
-//! What drives everything that takes more than one frame.
+//! The interface of every client service that takes more than one frame.
 
 use crate::{Duration, Frame, Instant};
 
 /// A service under way. It ends by itself: each has a bound on how long it takes, whatever the devices do.
 pub trait Service {
-    /// What it comes to.
+    /// Result of the service.
     type Output;
 
-    /// What to do now. Received frames are to be handed over before: the answer to a request that is asked for here may
+    /// The next step. Received frames are to be handed over before: the answer to a request that is asked for here may
     /// be among them.
     ///
     /// After [`Step::Done`] it says `Done` again.
@@ -17,7 +17,7 @@ pub trait Service {
     fn on_frame(&mut self, frame: &Frame, now: Instant) -> Taken;
 }
 
-/// What a service wants.
+/// A step that a service asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum Step<T> {
@@ -25,11 +25,11 @@ pub enum Step<T> {
     Send(Frame),
     /// Hand over the frames that arrive, and ask again at this instant at the latest.
     Wait(Instant),
-    /// It is over.
+    /// The service has ended.
     Done(T),
 }
 
-/// What a service has made of a frame.
+/// How a service has used a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Taken {
     /// The frame has brought the service forward.

@@ -1,4 +1,4 @@
-//! What a device does beyond CANopen, as the device sees it.
+//! The interface between a device and the product's own code.
 
 use super::{Soundness, Stored};
 use crate::dictionary::{Entry, Group, Groups};
@@ -12,10 +12,6 @@ use crate::sdo::{Abort, Multiplexer};
 /// `image` is the memory of all values of the dictionary; a [`Field`](crate::dictionary::Field) reads and writes one of
 /// them. A value that a method changes is sent as any other change is.
 pub trait Application {
-    /// A device without PDO, SYNC, EMCY, heartbeat consumer, stored parameters and block upload, such as a bootloader. Its
-    /// dictionary has none of their objects, and the code for them is left out of the image.
-    const SERVICES_ONLY: bool = false;
-
     /// The faults of the application itself, at most 32. [`Fault::Application`] names one by its place here.
     const CONDITIONS: &'static [Condition] = &[];
 
@@ -99,7 +95,7 @@ pub trait Application {
         true
     }
 
-    /// What is stored of a group, for every reset that covers it.
+    /// The stored values of a group. Asked for at every reset that covers the group.
     fn stored(&self, _group: Group) -> Stored<'_> {
         Stored { packed: &[], soundness: Soundness::Whole }
     }

@@ -1,26 +1,31 @@
 //! TPDOs that tell events: the application has the events, and gives one whenever the TPDO may be sent.
 
-use super::{Application, Core, STALE};
+use super::full::Full;
+use super::{Application, STALE};
 use crate::pdo::Chain;
 use crate::transmit::Turn;
 use crate::{Instant, Transmit};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
     /// The TPDO at this place can be sent from now on.
     pub(super) fn begin_events(&mut self, place: usize) {
         let number = self.tpdos.get(place).and_then(crate::pdo::Tpdo::events_of);
-        if let Some(number) = number.filter(|_| self.state.has_pdos()) {
-            self.application.begin_events(number, &mut self.image);
-            self.process_due = STALE;
+        if let Some(number) = number.filter(|_| self.basic.state.has_pdos()) {
+            self.basic.application.begin_events(number, &mut self.basic.image);
+            self.basic.process_due = STALE;
         }
     }
 
     /// Sends what waits with the application, as far as it may be sent. When to ask again.
     #[inline]
     pub(super) fn send_events(&mut self, turn: &mut Turn<'_, impl Transmit>) -> Instant {
-        if self.tells_events && self.state.has_pdos() { self.ask_for_events(turn) } else { Instant::NEVER }
+        if self.tells_events && self.basic.state.has_pdos() {
+            self.ask_for_events(turn)
+        } else {
+            Instant::NEVER
+        }
     }
 
     #[inline(never)]
@@ -37,19 +42,19 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     fn tell_event(&mut self, place: usize, turn: &mut Turn<'_, impl Transmit>) -> bool {
         let Some(tpdo) = self.tpdos.get_mut(place) else { return false };
         let Some(number) = tpdo.asks_for_event(turn) else { return false };
-        let is_event = self.application.next_event(number, &mut self.image);
-        tpdo.take_event(is_event, &self.image, turn);
+        let is_event = self.basic.application.next_event(number, &mut self.basic.image);
+        tpdo.take_event(is_event, &self.basic.image, turn);
         is_event
     }
 
     /// A SYNC sends one event of each TPDO that the SYNC concerns.
     pub(super) fn send_events_with_sync(&mut self, turn: &mut Turn<'_, impl Transmit>) {
         let mut links = self.first_tpdos;
-        while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Synchronous)) {
+        while let Some(tpdo) = self.tpdos.get_mut(links.next(Chain::Valid)) {
             links = tpdo.links;
             if let Some(number) = tpdo.asks_with_sync() {
-                let is_event = self.application.next_event(number, &mut self.image);
-                tpdo.take_event(is_event, &self.image, turn);
+                let is_event = self.basic.application.next_event(number, &mut self.basic.image);
+                tpdo.take_event(is_event, &self.basic.image, turn);
             }
         }
     }

@@ -1,17 +1,19 @@
 //! Faults in the device: those of the bus and of the application, and what follows from an error (object 1029h).
 
-use super::{Application, Core, Device, ErrorClass, Next, STALE};
+use super::body::Body;
+use super::full::Full;
+use super::{Application, Device, ErrorClass, Next, STALE};
 use crate::Instant;
 use crate::emcy::Fault;
 use crate::nmt::State;
 
 /// Error behaviour.
 const ERROR_BEHAVIOUR: u16 = 0x1029;
-/// What 1029h says: to Pre-operational, no change, to Stopped.
+/// Values of 1029h: 0 leads to Pre-operational, 2 to Stopped; 1 changes nothing.
 const TO_PRE_OPERATIONAL: u32 = 0;
 const TO_STOPPED: u32 = 2;
 
-/// What the CAN controller reports.
+/// An event that the CAN controller reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BusEvent {
@@ -33,18 +35,16 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Takes what the CAN controller reports: sets and clears the faults 8110h, 8120h and 8140h, and treats bus-off as a
     /// communication error. A warning has no emergency code: the node works, and error passive would follow.
     pub fn on_bus(&mut self, event: BusEvent, now: Instant) -> Next {
+        let body = &mut self.body;
         match event {
             BusEvent::Warning => (),
-            BusEvent::Overrun => {
-                self.core.raise(Fault::Overrun, now);
-                self.core.clear(Fault::Overrun, now);
-            }
-            BusEvent::Passive => self.core.raise(Fault::ErrorPassive, now),
+            BusEvent::Overrun => body.report(Fault::Overrun, now),
+            BusEvent::Passive => body.raise(Fault::ErrorPassive, now),
             BusEvent::BusOff => {
-                self.core.is_bus_off = true;
-                self.apply_error(ErrorClass::COMMUNICATION);
+                body.is_bus_off = true;
+                return self.error(ErrorClass::COMMUNICATION);
             }
-            BusEvent::Recovered => self.core.recover(now),
+            BusEvent::Recovered => body.recover(now),
         }
         self.process_next()
     }
@@ -52,33 +52,33 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Sets or clears a fault of the application, by its number in [`Application::CONDITIONS`]. It is signalled once, until
     /// it is cleared.
     pub fn set_condition(&mut self, number: u8, active: bool, now: Instant) -> Next {
-        self.core.set_fault(Fault::Application(number), active, now);
+        self.body.set_fault(Fault::Application(number), active, now);
         self.process_next()
     }
 
     /// Reacts to an error of the application as object 1029h says.
     pub fn error(&mut self, class: ErrorClass) -> Next {
-        self.apply_error(class);
-        self.process_next()
-    }
-
-    pub(super) fn apply_error(&mut self, class: ErrorClass) {
-        self.core.application.error(class, &mut self.core.image);
-        let ErrorClass(sub) = class;
-        match self.core.number(ERROR_BEHAVIOUR, sub) {
-            TO_PRE_OPERATIONAL if self.core.state == State::Operational => {
-                self.core.enter(State::PreOperational);
-            }
-            TO_STOPPED if self.core.state.has_services() => self.core.enter(State::Stopped),
-            _ => (),
-        }
+        self.body.apply_error(class);
         self.silence_services();
+        self.process_next()
     }
 }
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
+    pub(super) fn apply_error(&mut self, class: ErrorClass) {
+        self.basic.application.error(class, &mut self.basic.image);
+        let ErrorClass(sub) = class;
+        match self.basic().number(ERROR_BEHAVIOUR, sub) {
+            TO_PRE_OPERATIONAL if self.basic.state == State::Operational => {
+                self.enter(State::PreOperational);
+            }
+            TO_STOPPED if self.basic.state.has_services() => self.enter(State::Stopped),
+            _ => (),
+        }
+    }
+
     /// That the node was off the bus can only be said afterwards.
     fn recover(&mut self, now: Instant) {
         if core::mem::take(&mut self.is_bus_off) {
@@ -86,6 +86,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
         self.clear(Fault::ErrorPassive, now);
         self.clear(Fault::BusOffRecovered, now);
+    }
+
+    /// Reports a fault that is over at once.
+    #[inline(never)]
+    pub(super) fn report(&mut self, fault: Fault, now: Instant) {
+        self.raise(fault, now);
+        self.clear(fault, now);
     }
 
     // Called from many places that are in no hurry.
@@ -109,13 +116,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     fn fault_changed(&mut self, fault: Fault, active: bool) {
         self.update_error_register();
-        self.application.fault(fault, active, &mut self.image);
-        self.services_due = STALE;
+        self.basic.application.fault(fault, active, &mut self.basic.image);
+        self.basic.services_due = STALE;
     }
 
     pub(super) fn update_error_register(&mut self) {
-        if let Ok(entry) = self.dictionary.find(0x1001, 0) {
-            entry.field.store(&mut self.image, [self.emcy.register()]);
+        if let Ok(entry) = self.basic.dictionary.find(0x1001, 0) {
+            entry.field.store(&mut self.basic.image, [self.emcy.register()]);
         }
     }
 }

@@ -1,16 +1,14 @@
 //! LSS in the device: it works in every NMT state, and without a node-ID it is all there is.
 
-use super::{Action, Application, Core, Device, STALE};
-use crate::lss::{Identity, Outcome, RESPONSE, Request, Response, Switch};
+use super::body::Body;
+use super::{Action, STALE};
+use crate::lss::{BitRate, Configuration, Outcome, REQUEST, RESPONSE, Request, Response, Slave, Switch};
 use crate::transmit::{RETRY, Turn};
-use crate::{Frame, Instant, Transmit};
-
-/// Identity object.
-const IDENTITY: u16 = 0x1018;
+use crate::{Frame, Instant, NodeId, Transmit};
 
 /// A change of the bit rate (CiA 305, activate bit timing parameters).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Switching {
+enum Switching {
     No,
     /// The delay before it: nothing is sent, the bus becomes quiet.
     Before(Switch),
@@ -18,19 +16,63 @@ pub(super) enum Switching {
     After,
 }
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
-{
+/// The LSS slave and its last response.
+#[derive(Debug)]
+pub(super) struct Layer {
+    slave: Slave,
+    reply: [u8; 8],
+    /// When to try again, if the response found the queue full.
+    reply_due: Instant,
+    switching: Switching,
+    /// When the next step of the switching is due.
+    switching_due: Instant,
+}
+
+impl Layer {
+    pub(super) fn new(node_id: Option<NodeId>) -> Layer {
+        Layer {
+            slave: Slave::new(Configuration { node_id, bit_rate: BitRate::FASTEST }),
+            reply: [0; 8],
+            reply_due: Instant::NEVER,
+            switching: Switching::No,
+            switching_due: Instant::NEVER,
+        }
+    }
+
+    pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
+        self.slave = Slave::new(Configuration { bit_rate, ..self.slave.pending() });
+    }
+
+    /// A reset of the device.
+    pub(super) fn restart(&mut self) {
+        self.slave.reset();
+    }
+
+    /// The node-ID with which the device starts.
+    pub(super) fn node_id(&self) -> Option<NodeId> {
+        self.slave.pending().node_id
+    }
+
+    /// Whether the bit rate changes: nothing is sent then.
+    pub(super) fn is_switching(&self) -> bool {
+        self.switching != Switching::No
+    }
+
     #[inline(never)]
-    pub(super) fn on_lss(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
-        let Some(request) = frame.full().copied().and_then(Request::parse) else { return };
-        let identity = self.core.identity();
-        let outcome = self.lss.take(request, &identity, self.core.node_id);
-        let response = match outcome {
+    pub(super) fn take_frame(
+        &mut self,
+        frame: &Frame,
+        turn: &mut Turn<'_, impl Transmit>,
+        body: &mut impl Body,
+    ) {
+        let Some(request) = frame.full(REQUEST).copied().and_then(Request::parse) else { return };
+        let basic = body.basic_mut();
+        let identity = basic.identity();
+        let response = match self.slave.take(request, &identity, basic.node_id) {
             Outcome::Silence => None,
             Outcome::Answer(response) => Some(response),
             Outcome::Join => {
-                self.core.begin_join();
+                basic.begin_join();
                 None
             }
             Outcome::Switch(switch) => {
@@ -38,66 +80,51 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 self.switching_due = turn.now + switch.delay();
                 None
             }
-            Outcome::Store(configuration) => self.core.store_configuration(configuration),
+            // The response waits for the end of the job.
+            Outcome::Store(configuration) if body.store_configuration(configuration) => None,
+            Outcome::Store(_) => Some(Slave::stored(false)),
         };
         if let Some(response) = response {
-            self.respond_lss(response, turn);
+            self.respond(response, turn);
         }
-        self.core.services_due = STALE;
+        body.basic_mut().services_due = STALE;
     }
 
     /// Sends a response. One that still waits is obsolete: its master has gone on.
-    pub(super) fn respond_lss(&mut self, response: Response, turn: &mut Turn<'_, impl Transmit>) {
-        self.lss_reply = response.encode();
-        self.send_lss(turn);
+    pub(super) fn respond(&mut self, response: Response, turn: &mut Turn<'_, impl Transmit>) {
+        self.reply = response.encode();
+        self.send(turn);
     }
 
     #[inline(never)]
-    fn send_lss(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        let is_sent = turn.send(Frame::data_frame(RESPONSE, 8, self.lss_reply));
-        self.lss_reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };
-        self.core.services_due = STALE;
+    fn send(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        let is_sent = turn.send(Frame::data_frame(RESPONSE, 8, self.reply));
+        self.reply_due = if is_sent { Instant::NEVER } else { turn.now + RETRY };
     }
 
-    pub(super) fn poll_lss(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.lss_reply_due {
-            self.send_lss(turn);
+    /// Sends a response that found the queue full.
+    pub(super) fn poll(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now >= self.reply_due {
+            self.send(turn);
         }
     }
 
     /// Goes on with a change of the bit rate. What was held back is sent after it.
-    pub(super) fn poll_switching(&mut self, now: Instant) {
+    pub(super) fn poll_switching(&mut self, now: Instant, body: &mut impl Body) {
         if now < self.switching_due {
             return;
         }
         (self.switching, self.switching_due) = match self.switching {
             Switching::Before(switch) => {
-                self.core.pending.ask(Action::BitRate(switch.bit_rate));
+                body.basic_mut().ask(Action::BitRate(switch.bit_rate));
                 (Switching::After, now + switch.delay())
             }
             Switching::No | Switching::After => (Switching::No, Instant::NEVER),
         };
     }
 
-    pub(super) fn next_lss(&self) -> Instant {
-        self.switching_due.min(self.lss_reply_due)
-    }
-
-    /// One call. The way to the queue is shut while the bit rate changes.
-    pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
-        Turn { now, out, is_open: self.switching == Switching::No }
-    }
-}
-
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
-{
-    fn identity(&self) -> Identity {
-        Identity {
-            vendor: self.number(IDENTITY, 1),
-            product: self.number(IDENTITY, 2),
-            revision: self.number(IDENTITY, 3),
-            serial: self.number(IDENTITY, 4),
-        }
+    /// When `poll` or `poll_switching` has something to do.
+    pub(super) fn due(&self) -> Instant {
+        self.switching_due.min(self.reply_due)
     }
 }

@@ -1,6 +1,8 @@
 //! Multiplexed PDOs in the device: which objects the producer watches, and where a received one goes.
 
-use super::{Application, Core};
+use super::Application;
+use super::body::Body;
+use super::full::Full;
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::pdo::{Address, Addressing, Mpdo, ScannerSettings, Watched};
@@ -15,7 +17,7 @@ const DISPATCHING_LIST: u16 = 0x1FD0;
 const LONGEST: u8 = 4;
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
     /// Gives the producer its settings and its objects, after any change that may concern it. A change of another PDO sends
     /// nothing: what was sent is still so.
@@ -33,34 +35,34 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if addressing == Some(Addressing::Destination) {
             self.choose_watched();
         }
-        if is_new && self.state.has_pdos() {
+        if is_new && self.basic.state.has_pdos() {
             self.scanner.start();
         }
     }
 
     /// All that can be sent.
     fn watch_all(&mut self) {
-        for entry in self.dictionary.entries() {
+        for entry in self.basic.dictionary.entries() {
             self.watch_entry(&entry);
         }
     }
 
-    /// Of these, what the application tells and what is mapped into no TPDO. One that is switched off counts too: who does not
-    /// want its content sent does not want it in another way.
+    /// Selects the objects to send: those that the application broadcasts and that no TPDO carries. Objects of a TPDO that is
+    /// switched off are not sent either: whoever switches a TPDO off does not want its objects in another frame.
     fn choose_watched(&mut self) {
-        let (application, image) = (&self.application, &self.image);
+        let (application, image) = (&self.basic.application, &self.basic.image);
         self.scanner.choose(|at| application.broadcasts(at, image));
         self.leave_out_mapped();
         self.scanner.forget_others();
     }
 
-    /// What the scanner list names: blocks of sub-indexes of one object.
+    /// Watches the objects of the scanner list: each line is a block of sub-indexes of one object.
     fn watch_listed(&mut self) {
-        let [count, ..] = self.number(SCANNER_LIST, 0).to_le_bytes();
+        let [count, ..] = self.basic().number(SCANNER_LIST, 0).to_le_bytes();
         for line in 0..count {
-            let [first, low, high, size] = self.number(SCANNER_LIST, line + 1).to_le_bytes();
+            let [first, low, high, size] = self.basic().number(SCANNER_LIST, line + 1).to_le_bytes();
             for sub in first..first.saturating_add(size) {
-                if let Ok(entry) = self.dictionary.find(u16::from_le_bytes([low, high]), sub) {
+                if let Ok(entry) = self.basic.dictionary.find(u16::from_le_bytes([low, high]), sub) {
                     self.watch_entry(&entry);
                 }
             }
@@ -79,7 +81,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let Some(mpdo) = Mpdo::parse(frame) else { return };
         match (mpdo.address, addressing) {
             (Address::Destination(node), Addressing::Destination)
-                if node.is_none() || node == self.node_id =>
+                if node.is_none() || node == self.basic.node_id =>
             {
                 self.take_addressed(&mpdo, node, now);
             }
@@ -92,14 +94,13 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     fn take_addressed(&mut self, mpdo: &Mpdo, node: Option<NodeId>, now: Instant) {
         let is_taken = self.store_mpdo(mpdo.at, mpdo.data);
         if !is_taken && node.is_some() {
-            self.raise(Fault::MpdoNotTaken, now);
-            self.clear(Fault::MpdoNotTaken, now);
+            self.report(Fault::MpdoNotTaken, now);
         }
     }
 
     /// Whether the object exists and takes process data.
     fn store_mpdo(&mut self, at: Multiplexer, data: [u8; 4]) -> bool {
-        let entry = self.dictionary.find(at.index, at.sub).ok();
+        let entry = self.basic.dictionary.find(at.index, at.sub).ok();
         let entry =
             entry.filter(|entry| entry.attributes.mapping.allows_rpdo() && entry.field.size <= LONGEST);
         if let Some(entry) = &entry {
@@ -110,7 +111,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn dispatch(&mut self, mpdo: &Mpdo, sender: NodeId) {
-        let count = self.number(DISPATCHING_LIST, 0).to_le_bytes()[0];
+        let count = self.basic().number(DISPATCHING_LIST, 0).to_le_bytes()[0];
         for line in 0..count {
             let target = self.dispatching_line(line + 1).and_then(|line| line.target(mpdo.at, sender));
             if let Some(at) = target {
@@ -121,8 +122,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn dispatching_line(&self, sub: u8) -> Option<DispatchingLine> {
-        let entry = self.dictionary.find(DISPATCHING_LIST, sub).ok()?;
-        let [node, remote_sub, a, b, sub, c, d, size] = entry.field.load(&self.image);
+        let entry = self.basic.dictionary.find(DISPATCHING_LIST, sub).ok()?;
+        let [node, remote_sub, a, b, sub, c, d, size] = entry.field.load(&self.basic.image);
         let remote = Multiplexer { index: u16::from_le_bytes([a, b]), sub: remote_sub };
         let local = Multiplexer { index: u16::from_le_bytes([c, d]), sub };
         Some(DispatchingLine { sender: NodeId::new(node)?, remote, local, size })

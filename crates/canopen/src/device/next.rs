@@ -1,10 +1,10 @@
-//! What follows from a call of the device.
+//! The result of every call of the device: the next deadlines, and an action for the caller.
 
 use super::Job;
 use crate::Instant;
 use crate::lss::BitRate;
 
-/// What follows from a call: when to call again, and what is left to the caller.
+/// Result of a call: when to call again, and an action that is left to the caller.
 ///
 /// A caller for both halves does three things with it: the action, new parameters, and a sleep until [`Next::due`] or
 /// the next frame. Of two callers, one for process data and one for services, each sleeps until the instant of its own
@@ -20,7 +20,7 @@ pub struct Next {
     pub process: Instant,
     /// When `poll_services` has something to do.
     pub services: Instant,
-    /// What the caller has to do now. Where more than one action waits, the services are due at once.
+    /// An action for the caller, to be done now. Where more than one action waits, the services are due at once.
     pub action: Option<Action>,
     /// Parameters of the application may have changed.
     pub parameters: bool,

@@ -1,37 +1,30 @@
 //! SDO access to the dictionary: the rules of the communication objects.
 
+use super::body::Body;
+use super::full::Full;
 use super::pdos::low_half;
-use super::{Application, Core, Job, Part, STALE};
-use crate::dictionary::{Entry, Field, Rule, Type, little_endian};
-use crate::nmt::State;
+use super::{Application, Job, Part, STALE};
+use crate::dictionary::{Entry, Rule, Type, little_endian};
 use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Instant, emcy, sync};
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> Objects
-    for Core<A, N, T, R, W, M>
-{
-    const IS_SMALL: bool = A::SERVICES_ONLY;
-
+impl<B: Body> Objects for B {
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
+        let basic = self.basic();
+        let entry = basic.dictionary.find(at.index, at.sub)?;
         if !entry.attributes.access.is_readable() {
             return Err(Abort::WriteOnly);
         }
-        match (entry.attributes.kind, entry.rule()) {
-            (Type::Domain, _) => self.application.read_domain(at),
-            (Type::VisibleString(_), _) => Ok(text(entry.field.get(&self.image))),
-            _ if A::SERVICES_ONLY => Ok(entry.field.get(&self.image)),
-            (_, Rule::ErrorCount) => Ok(core::slice::from_ref(self.emcy.history().count())),
-            (_, Rule::ErrorEntry) => {
-                let error = self.emcy.history().error(at.sub).ok_or(Abort::NoData)?;
-                Ok(error)
-            }
-            _ => Ok(entry.field.get(&self.image)),
+        match entry.attributes.kind {
+            Type::Domain => basic.application.read_domain(at),
+            Type::VisibleString(_) => Ok(text(entry.field.get(&basic.image))),
+            _ if entry.rule().is_computed() => self.computed(&entry),
+            _ => Ok(entry.field.get(&basic.image)),
         }
     }
 
     fn writable(&self, at: Multiplexer) -> Result<Writable, Abort> {
-        let entry = self.dictionary.find(at.index, at.sub)?;
+        let entry = self.basic().dictionary.find(at.index, at.sub)?;
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
@@ -39,93 +32,87 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn write(&mut self, at: Multiplexer, bytes: &[u8], now: Instant) -> Result<(), Abort> {
-        let found = self.dictionary.find(at.index, at.sub);
+        let found = self.basic().dictionary.find(at.index, at.sub);
         // By reference: to move it out of the result takes a dozen instructions.
         let entry = found.as_ref().map_err(|abort| *abort)?;
         if !entry.is_writable() {
             return Err(Abort::ReadOnly);
         }
         if entry.is_domain() {
-            return self.write_domain(at, bytes);
+            return write_domain(self, at, bytes);
         }
         entry.check_length(bytes.len())?;
         let value = little_endian(bytes);
         entry.check_value(value)?;
         match entry.rule() {
-            Rule::Plain => entry.field.set(&mut self.image, bytes),
-            _ => self.write_by_rule(entry, value, bytes, now)?,
+            Rule::Plain => entry.field.set(&mut self.basic_mut().image, bytes),
+            _ => write_by_rule(self, entry, value, bytes, now)?,
         }
+        let basic = self.basic_mut();
         if entry.is_parameter() {
-            self.pending.parameters_changed();
+            basic.pending.parameters_changed();
         }
-        self.application.written(entry, &mut self.image);
-        match self.application.stores(entry) {
-            Some(groups) if !A::SERVICES_ONLY => self.begin_deferred(Job::Store(groups)),
-            _ => Ok(()),
-        }
+        basic.application.written(entry, &mut basic.image);
+        self.store_at_once(entry)
     }
 
     fn take_deferred(&mut self) -> bool {
-        self.jobs.take_deferred()
+        Body::take_deferred(self)
     }
 
     fn stream(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
-        self.application.write_domain(at, part)
+        self.basic_mut().application.write_domain(at, part)
     }
 }
 
+/// A download to a domain that came in one piece.
+fn write_domain(body: &mut impl Body, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
+    let application = &mut body.basic_mut().application;
+    application.write_domain(at, Part::Begin(Some(bytes.len())))?;
+    application.write_domain(at, Part::Data(0, bytes))?;
+    application.write_domain(at, Part::End(bytes.len()))
+}
+
+/// Replaces the value of an entry that does more than holding one.
+#[inline(never)]
+fn write_by_rule(
+    body: &mut impl Body,
+    entry: &Entry,
+    value: u32,
+    bytes: &[u8],
+    now: Instant,
+) -> Result<(), Abort> {
+    let basic = body.basic_mut();
+    let rule = entry.rule();
+    if rule == Rule::Application {
+        basic.application.write(entry, bytes, &mut basic.image)?;
+        basic.pending.parameters_changed();
+    } else {
+        body.admit(entry, value)?;
+    }
+    let basic = body.basic_mut();
+    if !rule.is_computed() && !rule.is_command() {
+        entry.field.set(&mut basic.image, bytes);
+    }
+    if rule == Rule::HeartbeatTime {
+        basic.heartbeat.set_period(low_half(value), now);
+    }
+    body.follow(entry, value, now);
+    let basic = body.basic_mut();
+    (basic.process_due, basic.services_due) = (STALE, STALE);
+    Ok(())
+}
+
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
-    fn write_domain(&mut self, at: Multiplexer, bytes: &[u8]) -> Result<(), Abort> {
-        self.stream(at, Part::Begin(Some(bytes.len())))?;
-        self.stream(at, Part::Data(0, bytes))?;
-        self.stream(at, Part::End(bytes.len()))
-    }
-
-    pub(super) fn is_initialising(&self) -> bool {
-        self.state == State::Initialising
-    }
-
-    /// An integer of at most 32 bits; 0 where the dictionary has no such entry.
-    #[inline(never)]
-    pub(super) fn number(&self, index: u16, sub: u8) -> u32 {
-        self.number_or(index, sub, 0)
-    }
-
-    pub(super) fn number_or(&self, index: u16, sub: u8, absent: u32) -> u32 {
-        self.dictionary.find(index, sub).map_or(absent, |entry| self.word(entry.field))
-    }
-
-    /// The default value of an integer of at most 32 bits, with the node-ID where it counts from that.
-    pub(super) fn default_number(&self, entry: &Entry) -> u32 {
-        self.dictionary.default_number(entry, self.node_id)
-    }
-
-    fn word(&self, field: Field) -> u32 {
-        little_endian(field.get(&self.image))
-    }
-
-    /// Replaces the value of an entry that does more than holding one.
-    #[inline(never)]
-    fn write_by_rule(&mut self, entry: &Entry, value: u32, bytes: &[u8], now: Instant) -> Result<(), Abort> {
-        self.admit(entry, value, bytes)?;
-        if !entry.rule().is_computed() && !entry.rule().is_command() {
-            entry.field.set(&mut self.image, bytes);
-        }
-        self.follow(entry, value, now);
-        Ok(())
-    }
-
     /// Whether the rule of the entry allows the value.
-    fn admit(&mut self, entry: &Entry, value: u32, bytes: &[u8]) -> Result<(), Abort> {
+    pub(super) fn admit_value(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         match entry.rule() {
-            Rule::Application => self.application.write(entry, bytes, &mut self.image),
-            _ if A::SERVICES_ONLY => Ok(()),
             Rule::ErrorCount if value != 0 => Err(Abort::InvalidValue),
             Rule::SyncCobId => sync::check_cob_id(value),
-            Rule::SyncOverflow => sync::check_overflow(value, self.number(0x1006, 0)),
-            Rule::EmcyCobId => emcy::check_cob_id(self.word(entry.field), value),
+            Rule::SyncOverflow => sync::check_overflow(value, self.basic().number(0x1006, 0)),
+            Rule::EmcyCobId => emcy::check_cob_id(self.basic().word(entry.field), value),
             Rule::StartUp if value != 0 && value != super::state::SELF_START => Err(Abort::InvalidValue),
             Rule::Store | Rule::Restore => self.admit_store(entry, value),
             Rule::StoreCalibration => self.admit_store_calibration(value),
@@ -143,17 +130,10 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// What follows from a new value.
-    fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
+    /// Hands a new value to the protocol that uses it.
+    pub(super) fn follow_value(&mut self, entry: &Entry, value: u32, now: Instant) {
         match entry.rule() {
-            Rule::Application => {
-                self.pending.parameters_changed();
-                if !A::SERVICES_ONLY {
-                    self.follow_application(now);
-                }
-            }
-            Rule::HeartbeatTime => self.heartbeat.set_period(low_half(value), now),
-            _ if A::SERVICES_ONLY => (),
+            Rule::Application => self.follow_application(now),
             Rule::ErrorCount => self.emcy.clear_history(),
             Rule::SyncCobId | Rule::SyncPeriod | Rule::SyncWindow | Rule::SyncOverflow => {
                 self.configure_sync(now);
@@ -175,9 +155,8 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             entry.rule(),
             Rule::SyncCobId | Rule::PdoCobId | Rule::PdoPredefined | Rule::HeartbeatWatch
         ) {
-            self.pending.identifiers_changed();
+            self.basic.pending.identifiers_changed();
         }
-        (self.process_due, self.services_due) = (STALE, STALE);
     }
 }
 

@@ -3,8 +3,10 @@
 //! A new mapping takes five steps (CiA 301, 7.5.2.36) in which each object guards the next: COB-ID invalid, count 0,
 //! entries, count, COB-ID valid.
 
+use super::Application;
+use super::body::Body;
+use super::full::Full;
 use super::rpdos::filter_bit;
-use super::{Application, Core};
 use crate::dictionary::{Dictionary, Entry, Rule};
 use crate::pdo::{
     Addressing, Chain, Content, Direction, Layout, Links, MappedObject, RpdoSettings, ScannerSettings,
@@ -16,7 +18,7 @@ use crate::{CobId, Instant};
 /// A PDO of the dictionary, by the index of its communication object.
 ///
 /// A dictionary places its PDOs at any of the 512 numbers. In the device they have the first places, in the order of
-/// their numbers ([`Core::place`]).
+/// their numbers ([`Full::place`]).
 #[derive(Clone, Copy, Debug)]
 struct Pdo {
     communication: u16,
@@ -44,7 +46,7 @@ impl Pdo {
         if self.communication & 0x0800 != 0 { Direction::Transmit } else { Direction::Receive }
     }
 
-    /// Those that a dictionary has, one way.
+    /// The PDOs of a dictionary in one direction, by ascending number.
     fn all(dictionary: &'static Dictionary, direction: Direction) -> impl Iterator<Item = Pdo> {
         let communication = (0..).map_while(move |place| dictionary.pdo(direction, place));
         communication.map(|communication| Pdo { communication })
@@ -52,12 +54,12 @@ impl Pdo {
 }
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
     /// Gives every PDO its settings.
     pub(super) fn configure_pdos(&mut self, now: Instant) {
         for direction in [Direction::Transmit, Direction::Receive] {
-            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
+            for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
                 self.apply(pdo, place, now);
             }
         }
@@ -80,7 +82,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub(super) fn follow_application(&mut self, now: Instant) {
         let mut has_changed = false;
         for direction in [Direction::Transmit, Direction::Receive] {
-            for (place, pdo) in (0..).zip(Pdo::all(self.dictionary, direction)) {
+            for (place, pdo) in (0..).zip(Pdo::all(self.basic.dictionary, direction)) {
                 if self.is_valid(pdo) != self.is_used(pdo, place) {
                     self.apply(pdo, place, now);
                     has_changed = true;
@@ -89,7 +91,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
         if has_changed {
             self.link_pdos();
-            self.pending.identifiers_changed();
+            self.basic.pending.identifiers_changed();
         }
         self.configure_scanner(self.scanner_settings());
     }
@@ -113,11 +115,11 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Where the device keeps a PDO: the rank of its number among those that the dictionary has.
     fn place(&self, pdo: Pdo) -> Option<u16> {
-        let mut ranked = (0..).zip(Pdo::all(self.dictionary, pdo.direction()));
+        let mut ranked = (0..).zip(Pdo::all(self.basic.dictionary, pdo.direction()));
         ranked.find(|(_, other)| other.communication == pdo.communication).map(|(place, _)| place)
     }
 
-    /// The same for a TPDO by its number, 1 to 512.
+    /// The place of a TPDO by its number, 1 to 512.
     pub(super) fn tpdo_place(&self, number: u16) -> Option<u16> {
         self.place(Pdo { communication: 0x1800 | number.checked_sub(1)? })
     }
@@ -133,7 +135,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let settings = self.tpdo_settings(pdo);
         if let Some(tpdo) = self.tpdos.get_mut(usize::from(place)) {
             tpdo.configure(settings);
-            if self.state.has_pdos() {
+            if self.basic.state.has_pdos() {
                 tpdo.start();
             }
             self.begin_events(usize::from(place));
@@ -156,9 +158,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         for (place, tpdo) in self.tpdos.iter_mut().enumerate().rev() {
             tpdo.links = self.first_tpdos;
             let Some(settings) = tpdo.settings() else { continue };
-            let is_synchronous = settings.transmission.is_synchronous();
+            let sends_values = settings.transmission.is_synchronous() && settings.events_of.is_none();
             self.first_tpdos.prepend(Chain::Valid, place);
-            if is_synchronous {
+            if sends_values {
                 self.first_tpdos.prepend(Chain::Synchronous, place);
             }
         }
@@ -167,7 +169,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             rpdo.links = self.first_rpdos;
             let Some(id) = rpdo.id() else { continue };
             self.rpdo_filter |= filter_bit(id.get());
-            if rpdo.is_multiplexed() && self.application.takes_all_nodes((rpdo.index & 0x1FF) + 1) {
+            if rpdo.is_multiplexed() && self.basic.application.takes_all_nodes((rpdo.index & 0x1FF) + 1) {
                 self.rpdo_filter = u32::MAX;
                 self.all_nodes = u16::try_from(place).ok().map(|place| (id, place));
             }
@@ -188,7 +190,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
             inhibit: low_half(self.parameter(pdo, 3)),
             event: low_half(self.parameter(pdo, 5)),
             sync_start: low_byte(self.parameter(pdo, 6)),
-            events_of: Some(pdo.number()).filter(|number| self.application.sends_events(*number)),
+            events_of: Some(pdo.number()).filter(|number| self.basic.application.sends_events(*number)),
             layout,
         })
     }
@@ -207,22 +209,22 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     /// Whether every mapping names objects that can be mapped. A stored one may be of an older dictionary.
     pub(super) fn mappings_are_sound(&self) -> bool {
         let directions = [Direction::Transmit, Direction::Receive].into_iter();
-        let mut pdos = directions.flat_map(|direction| Pdo::all(self.dictionary, direction));
+        let mut pdos = directions.flat_map(|direction| Pdo::all(self.basic.dictionary, direction));
         pdos.all(|pdo| self.content(pdo).is_some())
     }
 
     /// The one multiplexed TPDO that there can be (CiA 301, 7.2.2.6): the first that is valid.
     fn scanner_settings(&self) -> Option<ScannerSettings> {
-        Pdo::all(self.dictionary, Direction::Transmit).find_map(|pdo| {
+        Pdo::all(self.basic.dictionary, Direction::Transmit).find_map(|pdo| {
             let Content::Multiplexed(addressing) = self.content(pdo)? else { return None };
             let (cob_id, _) = self.transmission(pdo)?;
             let inhibit = low_half(self.parameter(pdo, 3));
             let event = low_half(self.parameter(pdo, 5));
-            Some(ScannerSettings { id: cob_id.id, addressing, own: self.node_id?, inhibit, event })
+            Some(ScannerSettings { id: cob_id.id, addressing, own: self.basic.node_id?, inhibit, event })
         })
     }
 
-    /// What the mapping makes of the PDO; `None` when it names what cannot be mapped.
+    /// The content that the mapping of a PDO describes; `None` when an entry of the mapping cannot be mapped.
     fn content(&self, pdo: Pdo) -> Option<Content> {
         let count = self.mapped(pdo);
         match Addressing::from_count(count) {
@@ -231,9 +233,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         }
     }
 
-    /// What is mapped into each TPDO, whether it is valid or not, is not for the multiplexed one.
+    /// Takes the objects of all TPDOs, valid or not, out of the multiplexed one.
     pub(super) fn leave_out_mapped(&mut self) {
-        for pdo in Pdo::all(self.dictionary, Direction::Transmit) {
+        for pdo in Pdo::all(self.basic.dictionary, Direction::Transmit) {
             if let Some(Content::Objects(layout)) = self.content(pdo) {
                 self.scanner.leave_out(&layout);
             }
@@ -242,26 +244,26 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// The number of mapped objects.
     fn mapped(&self, pdo: Pdo) -> u8 {
-        low_byte(self.number(pdo.mapping(), 0))
+        low_byte(self.basic().number(pdo.mapping(), 0))
     }
 
     /// The layout of the first `count` mapping entries.
     fn layout(&self, pdo: Pdo, count: u8) -> Result<Layout, Abort> {
-        let mut layout = Layout::default();
+        let mut layout = Layout::EMPTY;
         for slot in 0..count {
-            let mapped = MappedObject::parse(self.number(pdo.mapping(), slot + 1));
-            layout.push(locate(self.dictionary, mapped, pdo.direction())?)?;
+            let mapped = MappedObject::parse(self.basic().number(pdo.mapping(), slot + 1));
+            layout.push(locate(self.basic.dictionary, mapped, pdo.direction())?)?;
         }
         Ok(layout)
     }
 
     fn parameter(&self, pdo: Pdo, sub: u8) -> u32 {
-        self.number(pdo.communication, sub)
+        self.basic().number(pdo.communication, sub)
     }
 
     /// The COB-ID of a PDO that is valid; one without objects is not.
     fn cob_id(&self, pdo: Pdo) -> Option<CobId> {
-        CobId::parse(self.number_or(pdo.communication, 1, u32::MAX)).filter(|cob_id| !cob_id.bit31)
+        CobId::parse(self.basic().number_or(pdo.communication, 1, u32::MAX)).filter(|cob_id| !cob_id.bit31)
     }
 
     /// Whether the rules of a PDO object allow a value: most change only while the PDO is not valid.
@@ -286,7 +288,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     fn admit_cob_id(&self, pdo: Pdo, present: Option<CobId>, entry: &Entry, value: u32) -> Result<(), Abort> {
         let new = CobId::parse(value).ok_or(Abort::InvalidValue)?;
         let is_predefined = entry.rule() == Rule::PdoPredefined;
-        if is_predefined && CobId::parse(self.default_number(entry)).is_none_or(|own| own.id != new.id) {
+        if is_predefined
+            && CobId::parse(self.basic().default_number(entry)).is_none_or(|own| own.id != new.id)
+        {
             return Err(Abort::InvalidValue);
         }
         let moves = present.is_some_and(|old| old.id != new.id);
@@ -317,7 +321,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if Addressing::from_count(count).is_some() {
             return Ok(());
         }
-        let has_room = count == 0 || self.dictionary.find(pdo.mapping(), count).is_ok();
+        let has_room = count == 0 || self.basic.dictionary.find(pdo.mapping(), count).is_ok();
         if has_room { self.layout(pdo, count).map(|_| ()) } else { Err(Abort::ValueTooHigh) }
     }
 
@@ -328,7 +332,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         if value == 0 {
             return Ok(());
         }
-        locate(self.dictionary, MappedObject::parse(value), pdo.direction()).map(|_| ())
+        locate(self.basic.dictionary, MappedObject::parse(value), pdo.direction()).map(|_| ())
     }
 }
 

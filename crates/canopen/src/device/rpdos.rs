@@ -1,30 +1,36 @@
 //! RPDOs in the device: reception, deadlines, and the faults of each.
 
-use super::{Application, Core, STALE};
+use super::body::Body;
+use super::full::Full;
+use super::{Application, STALE};
 use crate::dictionary::{Entry, Rule, little_endian};
 use crate::emcy::Fault;
 use crate::pdo::{Chain, MappedObject, Reception, RpdoFault};
 use crate::{Frame, Instant};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
     /// Takes a data frame that may be one of the RPDOs. A good one clears the faults of its PDO.
     pub(super) fn on_rpdo(&mut self, frame: &Frame, now: Instant) {
         if self.rpdo_filter & filter_bit(frame.id()) == 0 {
             return;
         }
-        let stands_in = self.all_nodes.filter(|(id, _)| id.is_of_same_service(frame.id()));
-        let is_own = |rpdo: &crate::pdo::Rpdo| rpdo.id().is_some_and(|id| id.get() == frame.id());
-        let stands_in =
-            stands_in.filter(|_| !self.rpdos.iter().any(is_own)).map(|(_, place)| usize::from(place));
-        let mut links = self.first_rpdos;
+        let (mut links, mut is_own) = (self.first_rpdos, false);
         while let Some(rpdo) = self.rpdos.get(links.next(Chain::Valid)) {
             let place = links.next(Chain::Valid);
             links = rpdo.links;
-            if is_own(rpdo) || stands_in == Some(place) {
+            if rpdo.is_of(frame) {
+                is_own = true;
                 self.take_rpdo(place, frame, now);
             }
+        }
+        // A node that has no RPDO of its own is left to the one for all nodes.
+        if let Some((id, place)) = self.all_nodes
+            && !is_own
+            && id.is_of_same_service(frame.id())
+        {
+            self.take_rpdo(place.into(), frame, now);
         }
     }
 
@@ -32,7 +38,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let Some(rpdo) = self.rpdos.get_mut(place) else { return };
         let late = rpdo.is_synchronous() && self.sync.is_window_over(now);
         let (reception, is_valid) = rpdo.take(frame, now, late);
-        self.process_due = self.process_due.min(rpdo.due());
+        self.basic.process_due = self.basic.process_due.min(rpdo.due());
         let has_faults = rpdo.has_faults();
         if is_valid {
             self.store_rpdo(place, frame.bytes());
@@ -50,21 +56,21 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         let Some(rpdo) = self.rpdos.get(place) else { return };
         let index = rpdo.index;
         match rpdo.layout() {
-            Some(layout) if !layout.is_checked() => layout.scatter(data, &mut self.image),
+            Some(layout) if !layout.is_checked() => layout.scatter(data, &mut self.basic.image),
             _ => self.store_checked(index, data),
         }
-        self.application.received((index & 0x1FF) + 1, &mut self.image);
+        self.basic.application.received((index & 0x1FF) + 1, &mut self.basic.image);
     }
 
-    /// The same where objects have limits or rules: each value is checked as a write by SDO is, and one that is refused is
-    /// left out.
+    /// Takes the data of an RPDO whose objects have limits or rules: each value is checked as in an SDO download, and a value
+    /// that is refused is left out.
     #[inline(never)]
     fn store_checked(&mut self, communication: u16, data: [u8; 8]) {
         let (mapping, mut rest) = (communication | 0x0200, data.as_slice());
-        let [count, ..] = self.number(mapping, 0).to_le_bytes();
+        let [count, ..] = self.basic().number(mapping, 0).to_le_bytes();
         for slot in 0..count {
-            let mapped = MappedObject::parse(self.number(mapping, slot + 1));
-            let entry = self.dictionary.find(mapped.index, mapped.sub);
+            let mapped = MappedObject::parse(self.basic().number(mapping, slot + 1));
+            let entry = self.basic.dictionary.find(mapped.index, mapped.sub);
             let size = usize::from(mapped.bits / 8);
             let Some((bytes, behind)) = rest.split_at_checked(size) else { return };
             if let Ok(entry) = entry {
@@ -78,14 +84,14 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub(super) fn store_process_value(&mut self, entry: &Entry, bytes: &[u8]) {
         let is_allowed = entry.check_value(little_endian(bytes)).is_ok()
             && (entry.rule() != Rule::Application
-                || self.application.write(entry, bytes, &mut self.image).is_ok());
+                || self.basic.application.write(entry, bytes, &mut self.basic.image).is_ok());
         if !is_allowed {
             return;
         }
-        entry.field.set(&mut self.image, bytes);
+        entry.field.set(&mut self.basic.image, bytes);
         if entry.rule() == Rule::Application || entry.is_parameter() {
-            self.pending.parameters_changed();
-            self.services_due = STALE;
+            self.basic.pending.parameters_changed();
+            self.basic.services_due = STALE;
         }
     }
 

@@ -1,165 +1,222 @@
-//! Services: SDO, heartbeat, EMCY and LSS.
+//! Services: the SDO server, the heartbeat and LSS, and when each of them is due.
 
-use super::{Application, Device, Next};
-use crate::lss;
+use super::body::Body;
+use super::lss::Layer;
+use super::{Next, Node, STALE};
+use crate::lss::{self, BitRate};
+use crate::sdo::{Abort, Server};
 use crate::transmit::{RETRY, Turn};
-use crate::{CanId, Frame, Instant, Transmit};
+use crate::{CanId, Frame, Instant, NodeId, Transmit};
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.5).
 const SDO_RESPONSE: u16 = 0x580;
 const SDO_REQUEST: u16 = 0x600;
 const ERROR_CONTROL: u16 = 0x700;
-/// Frames for which a block upload leaves room in the queue: all PDOs of a SYNC, a heartbeat, an EMCY.
-const RESERVED_ROOM: usize = 10;
 
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
-{
-    /// Takes a frame with one of the [`service_ids`](Device::service_ids). Any other is ignored.
+/// The SDO server and the LSS slave of a device, with the responses that wait for the queue.
+#[derive(Debug)]
+pub(super) struct Services {
+    server: Server,
+    /// When to try again to send a reply of the server that found the queue full.
+    reply_due: Instant,
+    /// When to go on with a block that found the queue full.
+    block_due: Instant,
+    lss: Layer,
+}
+
+impl Services {
+    pub(super) fn new(node_id: Option<NodeId>) -> Services {
+        Services {
+            server: Server::new(),
+            reply_due: Instant::NEVER,
+            block_due: Instant::NEVER,
+            lss: Layer::new(node_id),
+        }
+    }
+
+    pub(super) fn set_bit_rate(&mut self, bit_rate: BitRate) {
+        self.lss.set_bit_rate(bit_rate);
+    }
+
+    /// A reset of the device; the node-ID with which the device starts.
+    pub(super) fn restart(&mut self) -> Option<NodeId> {
+        self.forget_transfer();
+        self.lss.restart();
+        self.lss.node_id()
+    }
+
+    fn forget_transfer(&mut self) {
+        self.server.reset();
+        (self.reply_due, self.block_due) = (Instant::NEVER, Instant::NEVER);
+    }
+
+    /// One call. The way to the queue is shut while the bit rate changes.
+    pub(super) fn turn<'a, Q: Transmit>(&self, now: Instant, out: &'a mut Q) -> Turn<'a, Q> {
+        Turn { now, out, is_open: !self.lss.is_switching() }
+    }
+}
+
+impl<B: Body> Node<B> {
+    /// Takes a frame with one of the [`service_ids`](Node::service_ids). Any other is ignored.
     #[inline]
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        if self.services.server.takes_block() && self.take_segment(frame, now) {
+            return self.process_next();
+        }
         self.take_service_frame(frame, now, out);
         self.services_next()
     }
 
-    #[inline(never)]
-    fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        if frame.id() == self.core.service(SDO_REQUEST).get() {
-            self.on_sdo(frame, now, out);
-        } else if frame.id() == lss::REQUEST.get() {
-            self.on_lss(frame, &mut self.turn(now, out));
-        } else if frame.id() & 0x780 == ERROR_CONTROL && !A::SERVICES_ONLY {
-            self.core.on_heartbeat(frame, now);
-        }
-        if now >= self.core.services_due {
+    /// Sends what is due of the services, and hands over what is left to the caller.
+    #[inline]
+    pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
+        if now >= self.body.basic().services_due {
             self.send_services(now, out);
         }
+        self.services_next()
     }
 
-    /// A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
-    fn on_sdo(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-        let has_sdo = self.core.state.has_services();
-        let Some(request) = frame.full().filter(|_| has_sdo) else { return };
-        match self.server.take_next(request, &mut self.core, now) {
-            Some(false) => (),
-            Some(true) => self.respond(&mut self.turn(now, out)),
-            None => self.on_request(request, &mut self.turn(now, out)),
+    /// Identifiers of frames for [`on_service_frame`](Node::on_service_frame).
+    pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
+        let sdo = self.body.basic().node_id.map(|own| own.service(SDO_REQUEST));
+        [lss::REQUEST].into_iter().chain(sdo).chain(self.body.watched_ids())
+    }
+
+    /// The CAN-ID of requests to the SDO server.
+    fn sdo_request(&self) -> CanId {
+        self.body.basic().service(SDO_REQUEST)
+    }
+
+    /// Takes a frame if it is a segment of a block from which nothing follows. Without SDO, no transfer is under way.
+    #[inline(never)]
+    fn take_segment(&mut self, frame: &Frame, now: Instant) -> bool {
+        let request = frame.full(self.sdo_request());
+        request.is_some_and(|request| self.services.server.take_segment(request, now))
+    }
+
+    #[inline(never)]
+    fn take_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        // A request has eight bytes (CiA 301, 7.2.4.3); anything else is none.
+        if let Some(request) = frame.full(self.sdo_request()) {
+            if self.body.basic().state.has_services() {
+                self.on_request(request, &mut self.services.turn(now, out));
+            }
+        } else if frame.id() == lss::REQUEST.get() {
+            let turn = &mut self.services.turn(now, out);
+            self.services.lss.take_frame(frame, turn, &mut self.body);
+        } else if frame.id() & 0x780 == ERROR_CONTROL {
+            self.body.on_heartbeat(frame, now);
+        }
+        if now >= self.body.basic().services_due {
+            self.send_services(now, out);
         }
     }
 
     #[allow(clippy::trivially_copy_pass_by_ref)] // As in `sdo`.
     fn on_request(&mut self, request: &[u8; 8], turn: &mut Turn<'_, impl Transmit>) {
-        let was_idle = self.server.is_idle();
-        let has_reply = self.server.answer(request, &mut self.core, turn.now);
-        // A deadline that was there is later now, but for the pause within a block.
-        if was_idle && !self.server.is_idle() || self.server.is_within_block() {
-            self.core.services_due = self.core.services_due.min(self.server.deadline());
+        let Services { server, reply_due, .. } = &mut self.services;
+        let has_reply = server.answer(request, &mut self.body, turn.now);
+        if !server.is_idle() {
+            self.body.basic_mut().serve_until(server.deadline());
         }
         // Only a request without a reply starts a block.
         if has_reply {
             return self.respond(turn);
         }
         // A reply that still waits is obsolete: its client has gone on.
-        self.reply_due = Instant::NEVER;
-        if !A::SERVICES_ONLY && self.server.is_sending() {
+        *reply_due = Instant::NEVER;
+        if server.is_sending() {
             self.send_block(turn);
         }
     }
 
     /// Sends segments of a block upload while the queue is far from full: a transfer must not take the room of PDOs.
+    #[inline(never)]
     fn send_block(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        let id = self.core.service(SDO_RESPONSE);
-        let has_reply = self.server.send_block(&self.core, turn.now, |data| {
-            turn.room() > RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
+        let id = self.body.basic().service(SDO_RESPONSE);
+        let server = &mut self.services.server;
+        let has_reply = server.send_block(&self.body, turn.now, |data| {
+            turn.room() > B::RESERVED_ROOM && turn.send(Frame::data_frame(id, 8, data))
         });
+        let block_due = if server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
+        self.services.block_due = block_due;
+        self.body.basic_mut().serve_until(block_due);
         if has_reply {
             self.respond(turn);
         }
-        self.block_due = if self.server.is_sending() { turn.now + RETRY } else { Instant::NEVER };
-        self.core.services_due = self.core.services_due.min(self.block_due);
     }
 
     /// Sends the server's reply.
-    pub(super) fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        let id = self.core.service(SDO_RESPONSE);
-        if turn.send(Frame::data_frame(id, 8, self.server.reply())) {
-            self.reply_due = Instant::NEVER;
+    #[inline(never)]
+    fn respond(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        let basic = self.body.basic_mut();
+        let id = basic.service(SDO_RESPONSE);
+        if turn.send(Frame::data_frame(id, 8, self.services.server.reply())) {
+            self.services.reply_due = Instant::NEVER;
         } else {
-            self.reply_due = turn.now + RETRY;
-            self.core.services_due = self.core.services_due.min(self.reply_due);
+            self.services.reply_due = turn.now + RETRY;
+            basic.serve_until(self.services.reply_due);
         }
     }
 
-    /// Sends what is due of the services, and hands over what is left to the caller.
-    #[inline]
-    pub fn poll_services(&mut self, now: Instant, out: &mut impl Transmit) -> Next {
-        if now >= self.core.services_due {
-            self.send_services(now, out);
+    /// A job has come to its end: whoever waits for the end is answered, the LSS master if `lss_waits`.
+    pub(super) fn finish_job(
+        &mut self,
+        result: Result<(), Abort>,
+        lss_waits: bool,
+        turn: &mut Turn<'_, impl Transmit>,
+    ) {
+        if lss_waits {
+            self.services.lss.respond(lss::Slave::stored(result.is_ok()), turn);
         }
-        self.services_next()
+        if self.services.server.release(result, turn.now) {
+            self.respond(turn);
+        }
+        self.body.basic_mut().services_due = STALE;
+    }
+
+    /// A transfer does not survive a state without SDO.
+    pub(super) fn silence_services(&mut self) {
+        if !self.body.basic().state.has_services() {
+            self.services.forget_transfer();
+        }
     }
 
     #[inline(never)]
     fn send_services(&mut self, now: Instant, out: &mut impl Transmit) {
-        self.poll_switching(now);
-        let turn = &mut self.turn(now, out);
-        self.poll_lss(turn);
-        self.poll_heartbeat(turn);
-        if !A::SERVICES_ONLY {
-            self.poll_watches(now);
+        self.services.lss.poll_switching(now, &mut self.body);
+        let turn = &mut self.services.turn(now, out);
+        self.services.lss.poll(turn);
+        let basic = self.body.basic_mut();
+        if !basic.is_initialising() {
+            let id = basic.service(ERROR_CONTROL);
+            basic.heartbeat.poll(id, basic.state, turn);
+            self.body.poll_errors(turn);
+            self.silence_services();
         }
-        if self.core.state.has_services() {
-            if !A::SERVICES_ONLY {
-                self.core.emcy.poll(turn);
-            }
+        if self.body.basic().state.has_services() {
             self.poll_sdo(turn);
         }
-        self.core.services_due = self.next_service();
-    }
-
-    fn poll_heartbeat(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if !self.core.is_initialising() {
-            let id = self.core.service(ERROR_CONTROL);
-            self.core.heartbeat.poll(id, self.core.state, turn);
-        }
+        self.body.basic_mut().services_due = self.next_service();
     }
 
     fn poll_sdo(&mut self, turn: &mut Turn<'_, impl Transmit>) {
-        if turn.now >= self.reply_due {
+        if turn.now >= self.services.reply_due || self.services.server.expire(turn.now) {
             self.respond(turn);
         }
-        if self.server.expire(turn.now) {
-            self.respond(turn);
-        }
-        if !A::SERVICES_ONLY && turn.now >= self.block_due {
+        if turn.now >= self.services.block_due {
             self.send_block(turn);
         }
     }
 
     fn next_service(&self) -> Instant {
-        let core = &self.core;
-        let lss = self.next_lss();
-        if core.is_initialising() {
+        let (services, basic) = (&self.services, self.body.basic());
+        let lss = services.lss.due();
+        if basic.is_initialising() {
             return lss;
         }
-        let heartbeat = lss.min(core.heartbeat.due());
-        if A::SERVICES_ONLY {
-            return heartbeat.min(self.next_sdo());
-        }
-        let watched = heartbeat.min(core.watches.due());
-        if !core.state.has_services() {
-            return watched;
-        }
-        watched.min(core.emcy.due()).min(self.next_sdo()).min(self.block_due)
-    }
-
-    fn next_sdo(&self) -> Instant {
-        self.server.deadline().min(self.reply_due)
-    }
-
-    /// Identifiers of frames for [`on_service_frame`](Device::on_service_frame).
-    pub fn service_ids(&self) -> impl Iterator<Item = CanId> {
-        let sdo = self.core.node_id.map(|own| own.service(SDO_REQUEST));
-        [lss::REQUEST].into_iter().chain(sdo).chain(self.core.watches.ids())
+        let due = lss.min(basic.heartbeat.due()).min(self.body.errors_due());
+        // Without SDO, no transfer is under way, and nothing of the three is due.
+        due.min(services.server.deadline()).min(services.reply_due).min(services.block_due)
     }
 }

@@ -1,20 +1,22 @@
-//! What the memory has to do with: objects 1010h, 1011h and 1F51h, settings, the configuration of LSS, and what a start finds stored.
+//! Storing and restoring: objects 1010h, 1011h and 1F51h, settings, the configuration of LSS, and loading at the start.
 //!
 //! The device does not touch the memory. It hands a [`Job`] to its caller and answers the client when the job is done.
 
+use super::body::Body;
+use super::full::Full;
 use super::state::Scope;
-use super::{Action, Application, Core, Device, Next, STALE};
+use super::{Action, Application, Device, Next};
 use crate::dictionary::{Entry, Group, Groups, Rule};
 use crate::emcy::Fault;
-use crate::lss::{self, Configuration, Slave};
+use crate::lss::Configuration;
 use crate::sdo::Abort;
 use crate::{Instant, Transmit};
 
-/// What 1010h and 1011h take: "save" and "load".
+/// Signatures that 1010h and 1011h take: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
 
-/// What 1F51h takes (CiA 302-3); to clear a program is a matter of the bootloader.
+/// Commands of 1F51h (CiA 302-3). The bootloader alone can clear a program.
 const STOP_PROGRAM: u32 = 0;
 const START_PROGRAM: u32 = 1;
 const RESET_PROGRAM: u32 = 2;
@@ -33,24 +35,24 @@ pub enum Job {
     Setting(u8),
 }
 
-/// What is stored of a group.
+/// The stored values of a group, with their soundness.
 #[derive(Clone, Copy, Debug)]
 pub struct Stored<'a> {
-    /// As [`Dictionary::pack`](crate::dictionary::Dictionary::pack) has made it; empty for the defaults.
+    /// The values as [`Dictionary::pack`](crate::dictionary::Dictionary::pack) has made it; empty for the defaults.
     pub packed: &'a [u8],
-    /// Whether it is what was stored last.
+    /// Whether these are the newest values that were stored.
     pub soundness: Soundness,
 }
 
-/// How far what is stored of a group can be trusted.
+/// Whether the newest stored values of a group could be read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Soundness {
-    /// It is what was stored last, or nothing was.
+    /// The newest stored values were read, or nothing has ever been stored.
     #[default]
     Whole,
-    /// What was stored last is damaged; this was stored before it.
+    /// The newest stored values are damaged; these are from the save before.
     Older,
-    /// What was stored is damaged, and nothing older is left.
+    /// The stored values are damaged, and no older ones are left.
     Lost,
 }
 
@@ -58,8 +60,6 @@ pub enum Soundness {
 #[derive(Debug)]
 pub(super) struct Jobs {
     running: Option<Job>,
-    /// The caller has not been told of it yet.
-    is_untold: bool,
     /// The request that has just been served began it or waits for it.
     is_deferred: bool,
     lss_waits: bool,
@@ -67,27 +67,7 @@ pub(super) struct Jobs {
 
 impl Jobs {
     pub(super) const fn new() -> Jobs {
-        Jobs { running: None, is_untold: false, is_deferred: false, lss_waits: false }
-    }
-
-    /// A second request for the same job waits for the first; for another one there is no room.
-    fn begin(&mut self, job: Job) -> Result<(), Abort> {
-        match self.running {
-            Some(running) if running != job => return Err(Abort::DeviceState),
-            Some(_) => (),
-            None => (self.running, self.is_untold) = (Some(job), true),
-        }
-        Ok(())
-    }
-
-    /// Whether the caller has not been told of the job.
-    pub(super) fn is_untold(&self) -> bool {
-        self.running.is_some() && self.is_untold
-    }
-
-    /// The job, once.
-    pub(super) fn take_untold(&mut self) -> Option<Job> {
-        self.running.filter(|_| core::mem::take(&mut self.is_untold))
+        Jobs { running: None, is_deferred: false, lss_waits: false }
     }
 
     /// Whether the response to the request just served has to wait.
@@ -101,15 +81,9 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 {
     /// The job is done, or cannot be: whoever waits for it is answered.
     pub fn finish(&mut self, result: Result<(), Abort>, now: Instant, out: &mut impl Transmit) -> Next {
-        let lss_waits = core::mem::take(&mut self.core.jobs).lss_waits;
-        let turn = &mut self.turn(now, out);
-        if lss_waits {
-            self.respond_lss(Slave::stored(result.is_ok()), turn);
-        }
-        if self.server.release(result, now) {
-            self.respond(turn);
-        }
-        self.core.services_due = STALE;
+        let lss_waits = core::mem::take(&mut self.body.jobs).lss_waits;
+        let turn = &mut self.services.turn(now, out);
+        self.finish_job(result, lss_waits, turn);
         self.process_next()
     }
 }
@@ -121,8 +95,21 @@ impl Default for Jobs {
 }
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
+    /// Hands a job to the caller. A second request for the same job waits for the first; for another one there is no room.
+    fn begin(&mut self, job: Job) -> Result<(), Abort> {
+        match self.jobs.running {
+            Some(running) if running != job => Err(Abort::DeviceState),
+            Some(_) => Ok(()),
+            None => {
+                self.jobs.running = Some(job);
+                self.basic.pending.ask_for(job);
+                Ok(())
+            }
+        }
+    }
+
     /// Begins the job that a write to 1010h or 1011h asks for.
     pub(super) fn admit_store(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
         let groups = Groups::of_sub(entry.sub()).ok_or(Abort::Access)?;
@@ -134,25 +121,23 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
         self.begin_deferred(job)
     }
 
-    /// The same for the calibration. There is no way back to the defaults: they are those of no device.
+    /// Begins to store the calibration. The calibration cannot be restored: its defaults fit no real transducer.
     pub(super) fn admit_store_calibration(&mut self, value: u32) -> Result<(), Abort> {
         let job = Job::Store(Groups::one(Group::Calibration));
         if value == SAVE { self.begin_deferred(job) } else { Err(Abort::NotStored) }
     }
 
-    /// Begins to store what LSS has configured. The response, unless it waits for the end.
-    pub(super) fn store_configuration(&mut self, configuration: Configuration) -> Option<lss::Response> {
-        let is_begun = !A::SERVICES_ONLY && self.jobs.begin(Job::Configure(configuration)).is_ok();
+    /// Begins to store what LSS has configured; whether that is possible.
+    pub(super) fn begin_configuration(&mut self, configuration: Configuration) -> bool {
+        let is_begun = self.begin(Job::Configure(configuration)).is_ok();
         self.jobs.lss_waits |= is_begun;
-        self.pending.has_job();
-        (!is_begun).then_some(Slave::stored(false))
+        is_begun
     }
 
     /// Begins a job for whose end the answer to the client waits.
     pub(super) fn begin_deferred(&mut self, job: Job) -> Result<(), Abort> {
-        self.jobs.begin(job)?;
+        self.begin(job)?;
         self.jobs.is_deferred = true;
-        self.pending.has_job();
         Ok(())
     }
 
@@ -160,7 +145,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     pub(super) fn admit_program_control(&mut self, value: u32) -> Result<(), Abort> {
         match value {
             STOP_PROGRAM | RESET_PROGRAM => {
-                self.pending.ask(Action::Bootloader);
+                self.basic.pending.ask(Action::Bootloader);
                 self.jobs.is_deferred = true;
                 Ok(())
             }
@@ -171,18 +156,15 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     /// Takes what is stored of a group; where that is damaged or does not fit, the defaults stay as a whole.
     pub(super) fn load_stored(&mut self, group: Group) {
-        if A::SERVICES_ONLY {
-            return;
-        }
-        let Stored { packed, soundness } = self.application.stored(group);
-        let fits =
-            self.dictionary.unpack(group, packed, &mut self.image).is_ok() && self.mappings_are_sound();
+        let Stored { packed, soundness } = self.basic.application.stored(group);
+        let fits = self.basic.dictionary.unpack(group, packed, &mut self.basic.image).is_ok()
+            && self.mappings_are_sound();
         if !fits {
-            self.load_defaults(Scope::Group(group));
+            self.basic_mut().load_defaults(Scope::Group(group));
         }
         self.lost.set(group, !fits || soundness == Soundness::Lost);
         self.older.set(group, fits && soundness == Soundness::Older);
-        self.application.loaded(group, fits && soundness == Soundness::Whole);
+        self.basic.application.loaded(group, fits && soundness == Soundness::Whole);
     }
 
     /// Says on the bus what could not be loaded.

@@ -1,6 +1,8 @@
 //! SYNC in the device: objects 1005h, 1006h, 1007h, 1019h, and what follows from a SYNC.
 
-use super::{Application, Core, STALE};
+use super::body::Body;
+use super::full::Full;
+use super::{Application, STALE};
 use crate::emcy::Fault;
 use crate::pdo::Chain;
 use crate::sync::Settings;
@@ -8,14 +10,14 @@ use crate::transmit::Turn;
 use crate::{Frame, Instant, Transmit};
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
     pub(super) fn configure_sync(&mut self, now: Instant) {
-        let [overflow, ..] = self.number(0x1019, 0).to_le_bytes();
+        let [overflow, ..] = self.basic().number(0x1019, 0).to_le_bytes();
         self.sync.configure(Settings {
-            cob_id: self.number_or(0x1005, 0, 0x80),
-            period: self.number(0x1006, 0),
-            window: self.number(0x1007, 0),
+            cob_id: self.basic().number_or(0x1005, 0, 0x80),
+            period: self.basic().number(0x1006, 0),
+            window: self.basic().number(0x1007, 0),
             overflow,
         });
         self.clear(Fault::SyncMissing, now);
@@ -23,9 +25,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
 
     pub(super) fn on_sync(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
         let Ok(sync) = self.sync.take(frame, turn.now) else {
-            self.raise(Fault::SyncLength, turn.now);
-            self.clear(Fault::SyncLength, turn.now);
-            return;
+            return self.report(Fault::SyncLength, turn.now);
         };
         if self.sync.is_back() {
             self.clear(Fault::SyncMissing, turn.now);
@@ -38,23 +38,19 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
                 self.store_rpdo(place, data);
             }
         }
-        self.application.synchronised(sync.counter, &mut self.image);
-        self.each_tpdo(Chain::Synchronous, |tpdo, image| {
-            if tpdo.events_of().is_none() {
-                tpdo.on_sync(sync, image, turn);
-            }
-        });
+        self.basic.application.synchronised(sync.counter, &mut self.basic.image);
+        self.each_tpdo(Chain::Synchronous, |tpdo, image| tpdo.on_sync(sync, image, turn));
         if self.tells_events {
             self.send_events_with_sync(turn);
         }
-        self.process_due = self.process_due.min(self.sync.due());
+        self.basic.process_due = self.basic.process_due.min(self.sync.due());
     }
 
     /// Looks for a SYNC that is missing, and drops what the synchronous window no longer lets out.
     pub(super) fn poll_sync(&mut self, now: Instant) {
         if self.sync.expire(now) {
             self.raise(Fault::SyncMissing, now);
-            self.process_due = STALE;
+            self.basic.process_due = STALE;
         }
         if self.sync.is_window_over(now) {
             self.tpdos.iter_mut().for_each(crate::pdo::Tpdo::drop_synchronous);

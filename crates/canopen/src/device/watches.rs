@@ -1,6 +1,8 @@
 //! The heartbeats of other nodes: object 1016h and what follows when one is missing.
 
-use super::{Application, Core, Device, ErrorClass};
+use super::Application;
+use super::body::Body;
+use super::full::Full;
 use crate::dictionary::Entry;
 use crate::emcy::Fault;
 use crate::heartbeat::{Change, Watch};
@@ -10,35 +12,20 @@ use crate::{Frame, Instant};
 const CONSUMER_TIME: u16 = 0x1016;
 
 impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Device<A, N, T, R, W, M>
-{
-    /// Looks for heartbeats that are missing.
-    pub(super) fn poll_watches(&mut self, now: Instant) {
-        if self.core.is_initialising() {
-            return;
-        }
-        while let Some(change) = self.core.watches.expire(now) {
-            self.core.on_watch(change, now);
-            self.apply_error(ErrorClass::COMMUNICATION);
-        }
-    }
-}
-
-impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
-    Core<A, N, T, R, W, M>
+    Full<A, N, T, R, W, M>
 {
     #[inline(never)]
-    pub(super) fn on_heartbeat(&mut self, frame: &Frame, now: Instant) {
-        if self.is_initialising() {
+    pub(super) fn take_heartbeat(&mut self, frame: &Frame, now: Instant) {
+        if self.basic().is_initialising() {
             return;
         }
         if let Some(change) = self.watches.take(frame, now) {
             self.on_watch(change, now);
         }
-        self.services_due = self.services_due.min(self.watches.due());
+        self.basic.services_due = self.basic.services_due.min(self.watches.due());
     }
 
-    fn on_watch(&mut self, change: Change, now: Instant) {
+    pub(super) fn on_watch(&mut self, change: Change, now: Instant) {
         match change {
             Change::Lost(number) => self.raise(Fault::Heartbeat(number), now),
             Change::Back(number) => self.clear(Fault::Heartbeat(number), now),
@@ -57,7 +44,7 @@ impl<A: Application, const N: usize, const T: usize, const R: usize, const W: us
     }
 
     fn watch(&self, sub: u8) -> Option<Watch> {
-        Watch::parse(self.number(CONSUMER_TIME, sub))
+        Watch::parse(self.basic().number(CONSUMER_TIME, sub))
     }
 
     /// A new watch knows of no fault yet.

@@ -1,4 +1,4 @@
-//! What must be true of a table, so that everything at run time can rely on it. The panics here are compile errors.
+//! Checks of a table of rows at compile time, on which the code at run time relies. The panics here are compile errors.
 
 use super::compile::{effective_limits, event_timer};
 use super::{Access, DefaultValue, Mapping, Object, Rule, Type, image_size};
@@ -66,7 +66,7 @@ const fn check_row(row: &Object) {
     let fits = row.kind.size() >= 1 && row.kind.size() <= 8;
     assert!(!mappable || fits, "a mapped object has no place in a PDO");
     assert!(!mappable || row.stored_size() > 0, "a mapped object has no place in the image");
-    // What a device finds itself can be stored as well, such as the offset that follows from a preset.
+    // A read-only value can be stored too, such as the offset that the device computes from a preset.
     let lasts = matches!(row.access, Access::ReadWrite | Access::ReadOnly);
     assert!(row.group.is_none() || lasts, "only a parameter or what the device has found can be stored");
     assert!(!row.mapping.allows_tpdo() || row.access.is_readable(), "a TPDO sends what can be read");

@@ -1,6 +1,6 @@
 //! From rows to run-time tables, all of it during compilation: the panics here are compile errors.
 
-use super::filling::{Filling, attributes, is_same};
+use super::filling::{Filling, attributes, is_same, larger};
 use super::{Access, Dictionary, Object, Tables, Type, check};
 
 /// How many rows the parts of a table have together.
@@ -43,7 +43,7 @@ macro_rules! dictionary {
     }};
 }
 
-/// The same of several tables, as an array: what the dictionaries have in common is there once.
+/// The run-time dictionaries of several tables of rows, as an array. Parts that the dictionaries have in common exist once.
 #[macro_export]
 macro_rules! dictionaries {
     ($all:expr) => {{
@@ -78,7 +78,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Of the dictionaries of these tables.
+    /// The room that the dictionaries of these tables of rows need.
     ///
     /// # Panics
     /// During compilation, when a table is wrong: see [`check`](super::check).
@@ -252,6 +252,25 @@ impl Sizes {
         sizes
     }
 
+    /// The room that each of several tables has enough in.
+    #[must_use]
+    pub const fn of_any(all: &[&[Object]]) -> Sizes {
+        let mut sizes = Sizes::of(&[]);
+        let mut i = 0;
+        while i < all.len() {
+            let own = Sizes::of(all[i]);
+            sizes = Sizes {
+                image: larger(sizes.image, own.image),
+                tpdos: larger(sizes.tpdos, own.tpdos),
+                rpdos: larger(sizes.rpdos, own.rpdos),
+                watches: larger(sizes.watches, own.watches),
+                scanned: larger(sizes.scanned, own.scanned),
+            };
+            i += 1;
+        }
+        sizes
+    }
+
     /// Whether a device of the other sizes is large enough.
     #[must_use]
     pub const fn fits(self, room: Sizes) -> bool {
@@ -273,24 +292,49 @@ const fn can_be_multiplexed(count: &Object) -> bool {
     }
 }
 
-/// The type of a device with just the room that a table of rows needs.
+/// The type of a device with just the room that a table of rows needs. What is behind `room:` is [`Sizes`] instead of rows:
+/// those of a device for several tables, or for one that is not known yet.
 ///
 /// ```
-/// use canopen::dictionary::{Access, Object, Type};
+/// use canopen::dictionary::{Access, Object, Sizes, Type};
 ///
 /// const ROWS: &[Object] = &[Object::new(0x1000, 0, "Device type", Type::Unsigned32, Access::ReadOnly)];
 /// type Node = canopen::device!((), ROWS);
+///
+/// const ROOM: Sizes = Sizes { tpdos: 4, ..Sizes::of(ROWS) };
+/// type Larger = canopen::device!((), room: ROOM);
 /// ```
 #[macro_export]
 macro_rules! device {
-    ($application:ty, $rows:expr) => {
+    ($application:ty, room: $sizes:expr) => {
         $crate::Device<
             $application,
-            { $crate::dictionary::Sizes::of($rows).image },
-            { $crate::dictionary::Sizes::of($rows).tpdos },
-            { $crate::dictionary::Sizes::of($rows).rpdos },
-            { $crate::dictionary::Sizes::of($rows).watches },
-            { $crate::dictionary::Sizes::of($rows).scanned },
+            { $sizes.image },
+            { $sizes.tpdos },
+            { $sizes.rpdos },
+            { $sizes.watches },
+            { $sizes.scanned },
         >
+    };
+    ($application:ty, $rows:expr) => {
+        $crate::device!($application, room: $crate::dictionary::Sizes::of($rows))
+    };
+}
+
+/// The type of a [`ServiceDevice`](crate::ServiceDevice) with just the room that a table of rows needs.
+///
+/// ```
+/// use canopen::{NodeId, ServiceDevice, objects};
+///
+/// const ROWS: &[canopen::dictionary::Object] =
+///     canopen::rows!([objects::device_type(0)], objects::identity(0, 1, 1));
+/// static DICTIONARY: canopen::dictionary::Dictionary = canopen::dictionary!(ROWS);
+///
+/// let loader: canopen::service_device!((), ROWS) = ServiceDevice::new(&DICTIONARY, NodeId::new(126), ());
+/// ```
+#[macro_export]
+macro_rules! service_device {
+    ($application:ty, $rows:expr) => {
+        $crate::ServiceDevice<$application, { $crate::dictionary::Sizes::of($rows).image }>
     };
 }

@@ -4,7 +4,7 @@ use super::limits::Limits;
 use super::{Access, Field, Group, Mapping, Rule, Type};
 use crate::sdo::Abort;
 
-/// What entries can have in common: everything but their names in the dictionary and their places in the image.
+/// The attributes of an entry that other entries can share: all but index, sub-index and place in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attributes {
     pub(crate) limits: Limits,

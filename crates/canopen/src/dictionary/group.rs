@@ -26,7 +26,7 @@ pub struct Groups(u8);
 impl Groups {
     /// No group.
     pub const NONE: Groups = Groups(0);
-    /// What sub-index 1 of 1010h and 1011h means: communication and application.
+    /// The groups of sub-index 1 of 1010h and 1011h: communication and application.
     pub const ALL_PARAMETERS: Groups =
         Groups(1 << Group::Communication as u8 | 1 << Group::Application as u8);
 

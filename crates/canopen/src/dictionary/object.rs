@@ -94,7 +94,7 @@ pub struct Object {
     pub group: Option<Group>,
     /// Physical unit, for documents; empty where there is none.
     pub unit: &'static str,
-    /// What the entry does beyond holding a value.
+    /// The behaviour of the entry beyond holding a value.
     pub rule: Rule,
 }
 

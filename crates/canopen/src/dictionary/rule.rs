@@ -1,6 +1,6 @@
-//! What an entry does beyond holding a value.
+//! Rules: the behaviour of an entry beyond holding a value.
 
-/// What an entry does beyond holding a value. The rules of CiA 301 follow from index and sub-index, so no row can lack its
+/// The behaviour of an entry beyond holding a value. The rules of CiA 301 follow from index and sub-index, so no row can lack its
 /// rule; the others are set by the builders of [`Object`](super::Object).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {

@@ -47,11 +47,11 @@ pub(crate) struct Place {
     pub(crate) offset: u16,
 }
 
-/// What [`compile`](super::compile) makes of `D` tables of rows: room for `S` series, `P` places, `A` attributes and `V`
+/// The output of [`compile`](super::compile) for `D` tables of rows: room for `S` series, `P` places, `A` attributes and `V`
 /// bytes of default values.
 #[derive(Clone, Copy, Debug)]
 pub struct Tables<const D: usize, const S: usize, const P: usize, const A: usize, const V: usize> {
-    /// Those of the dictionaries, one after the other.
+    /// The series of all dictionaries, one dictionary after the other.
     pub(crate) series: [Series; S],
     pub(crate) places: [Place; P],
     pub(crate) attributes: [Attributes; A],

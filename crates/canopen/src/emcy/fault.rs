@@ -29,7 +29,7 @@ pub enum Fault {
     /// The stored values of a group could not be loaded, and the defaults hold (6302h, 6303h; 6300h for the calibration;
     /// the first byte of the error field is 2).
     StoredData(Group),
-    /// What was stored last of a group could not be loaded, and the values that were stored before hold (the same codes; the
+    /// The newest stored values of a group could not be loaded, and the values of the save before hold (the same codes; the
     /// first byte of the error field is 1).
     OlderData(Group),
     /// A condition of the application, by its place in
@@ -37,7 +37,7 @@ pub enum Fault {
     Application(u8),
 }
 
-/// What a fault of the application looks like on the bus.
+/// A fault of the application as EMCY and error register show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Condition {

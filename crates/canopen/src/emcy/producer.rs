@@ -11,10 +11,13 @@ use heapless::Deque;
 /// the newest.
 const WAITING: usize = 8;
 
+/// The COB-ID of a device without EMCY: bit 31 is set.
+pub(crate) const OFF: u32 = 1 << 31;
+
 /// Faults, their history and the messages about them.
 #[derive(Debug)]
 pub(crate) struct Producer {
-    /// Those of the application.
+    /// Conditions of the application.
     conditions: &'static [Condition],
     /// The bits of the error register that the device has.
     register_bits: u8,
@@ -88,7 +91,8 @@ impl Producer {
 
     fn report(&mut self, code: u16, detail: [u8; 5], now: Instant) {
         let message = Message { code, register: self.register(), detail };
-        // Of a full queue the newest message gives way: the older ones tell how the trouble began, this one how it stands.
+        // In a full queue this message replaces the newest one: the older ones tell how the trouble began, this one tells the
+        // present state.
         if self.waiting.push_back(message).is_err()
             && let Some(newest) = self.waiting.back_mut()
         {

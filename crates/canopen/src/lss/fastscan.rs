@@ -2,20 +2,20 @@
 
 use super::{Identity, Part, Request};
 
-/// How far a scan has come: the part of the identity that is compared next.
+/// State of a scan: the part of the identity that is compared next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Fastscan {
     part: u8,
 }
 
-/// What a step of the scan means for the slave.
+/// Result of a step of the scan for the slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// It is not the one, or not its turn: silence.
+    /// The slave does not match, or another part is compared: no answer.
     Silent,
     /// It may be the one.
     Match,
-    /// It is the one: the whole identity has matched.
+    /// The whole identity has matched: the slave is selected.
     Found,
 }
 

@@ -1,4 +1,4 @@
-//! What the master asks.
+//! Requests of the LSS master.
 
 use super::{Part, frame_of_word, word};
 

@@ -1,4 +1,4 @@
-//! What a slave answers.
+//! Responses of an LSS slave.
 
 use super::{Part, frame_of_word, word};
 
@@ -13,7 +13,7 @@ pub enum Response {
     BitTiming(u8),
     /// Store configuration (17h): 0, 1 not supported, or 2 for a failure of the memory.
     Stored(u8),
-    /// It is in the range, or the fastscan matches (4Fh).
+    /// The slave's identity is in the range, or matches the fastscan (4Fh).
     Identified,
     /// It has no node-ID (50h).
     Unconfigured,

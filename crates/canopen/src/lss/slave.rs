@@ -14,7 +14,7 @@ pub struct Configuration {
     pub bit_rate: BitRate,
 }
 
-/// What follows from a request.
+/// Outcome of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// Nothing: the master hears nothing.
@@ -66,7 +66,7 @@ impl Slave {
         Slave { is_selected: false, pending, selected: 0, identified: 0, scan: Fastscan::default() }
     }
 
-    /// What the next reset communication brings.
+    /// The configuration that the next reset communication activates.
     pub(crate) fn pending(&self) -> Configuration {
         self.pending
     }
@@ -93,7 +93,7 @@ impl Slave {
         }
     }
 
-    /// What the master does with the one slave that it has selected.
+    /// Takes a request to the one slave that the master has selected.
     fn configure(&mut self, request: Request, identity: &Identity, node_id: Option<NodeId>) -> Outcome {
         match request {
             Request::NodeId(id) => Outcome::Answer(Response::NodeId(self.set_node_id(id))),

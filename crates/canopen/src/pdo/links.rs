@@ -5,7 +5,8 @@
 pub(crate) enum Chain {
     /// All that are valid.
     Valid,
-    /// Those of them that the SYNC concerns.
+    /// The valid PDOs that the SYNC concerns: RPDOs whose data waits for the SYNC, and TPDOs whose values the SYNC sends or
+    /// samples.
     Synchronous,
 }
 

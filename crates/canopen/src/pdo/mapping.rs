@@ -87,7 +87,7 @@ pub(crate) fn locate(
     if fits && same_length { Ok(located) } else { Err(Abort::NotMappable) }
 }
 
-/// What a PDO carries.
+/// Content of a PDO.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Content {
     /// Mapped objects.
@@ -98,7 +98,7 @@ pub(crate) enum Content {
 
 /// The places in the image of what a PDO carries, in the order of its data. Values that lie beside each other, as those
 /// of one object do, are one place.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
     /// Bytes of the PDO.
     len: u8,
@@ -109,6 +109,10 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// The layout of a PDO without objects.
+    pub(crate) const EMPTY: Layout =
+        Layout { len: 0, count: 0, is_checked: false, places: [Field { offset: 0, size: 0 }; 8] };
+
     /// Appends a mapped object; `PdoLength` when the PDO would grow beyond eight bytes.
     pub(crate) fn push(&mut self, Located { field, takes_any }: Located) -> Result<(), Abort> {
         self.is_checked |= !takes_any;

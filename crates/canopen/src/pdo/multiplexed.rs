@@ -24,19 +24,19 @@ impl Addressing {
     }
 }
 
-/// Whose object it is.
+/// The node whose object a multiplexed PDO carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Address {
-    /// That of this sender.
+    /// An object of this node, which has sent the PDO.
     Source(NodeId),
-    /// That of this receiver; `None` for all nodes.
+    /// An object of this receiver; `None` for all nodes.
     Destination(Option<NodeId>),
 }
 
 /// The content of a multiplexed PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mpdo {
-    /// Whose object it is.
+    /// The node whose object a multiplexed PDO carries.
     pub address: Address,
     /// The object.
     pub at: Multiplexer,

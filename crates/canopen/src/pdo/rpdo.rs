@@ -6,7 +6,7 @@
 use super::{Addressing, Content, Layout, Links, Transmission};
 use crate::{CanId, Duration, Frame, Instant};
 
-/// What the objects 1400h.. and 1600h.. say about an RPDO that is valid.
+/// Settings of a valid RPDO, from the objects 1400h.. and 1600h...
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RpdoSettings {
     id: CanId,
@@ -17,6 +17,14 @@ pub(crate) struct RpdoSettings {
 }
 
 impl RpdoSettings {
+    /// Of an RPDO that is not valid.
+    const UNUSED: RpdoSettings = RpdoSettings {
+        id: CanId::NMT,
+        is_synchronous: false,
+        deadline: 0,
+        content: Content::Objects(Layout::EMPTY),
+    };
+
     /// `None` for a transmission type that an RPDO cannot have.
     pub(crate) fn new(
         id: CanId,
@@ -52,7 +60,7 @@ pub(crate) enum Reception {
     Multiplexed(Addressing),
 }
 
-/// What can be wrong with the reception of an RPDO.
+/// Faults of the reception of an RPDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum RpdoFault {
@@ -61,14 +69,15 @@ pub(crate) enum RpdoFault {
     Deadline,
 }
 
-/// An RPDO. Without settings it does not exist.
+/// An RPDO. One that is not valid is in no chain.
 #[derive(Debug)]
 pub(crate) struct Rpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
     /// Index of its communication object.
     pub(crate) index: u16,
-    settings: Option<RpdoSettings>,
+    is_valid: bool,
+    settings: RpdoSettings,
     /// Data that waits for SYNC, the newest.
     waiting: Option<[u8; 8]>,
     /// When the deadline passes; `NEVER` before the first reception.
@@ -79,22 +88,31 @@ pub(crate) struct Rpdo {
 
 impl Rpdo {
     pub(crate) const fn new() -> Rpdo {
-        Rpdo { links: Links::END, index: 0, settings: None, waiting: None, due: Instant::NEVER, faults: 0 }
+        Rpdo {
+            links: Links::END,
+            index: 0,
+            is_valid: false,
+            settings: RpdoSettings::UNUSED,
+            waiting: None,
+            due: Instant::NEVER,
+            faults: 0,
+        }
     }
 
     /// Whether its data waits for the SYNC.
     pub(crate) fn is_synchronous(&self) -> bool {
-        self.settings.as_ref().is_some_and(|settings| settings.is_synchronous)
+        self.settings.is_synchronous
     }
 
     /// Whether it carries a multiplexed PDO.
     pub(crate) fn is_multiplexed(&self) -> bool {
-        self.settings.as_ref().is_some_and(|settings| matches!(settings.content, Content::Multiplexed(_)))
+        matches!(self.settings.content, Content::Multiplexed(_))
     }
 
     /// Takes new settings and starts afresh.
     pub(crate) fn configure(&mut self, settings: Option<RpdoSettings>) {
-        self.settings = settings;
+        self.is_valid = settings.is_some();
+        self.settings = settings.unwrap_or(RpdoSettings::UNUSED);
         self.stop();
     }
 
@@ -105,14 +123,19 @@ impl Rpdo {
 
     /// Its CAN-ID, while it is valid.
     pub(crate) fn id(&self) -> Option<CanId> {
-        self.settings.as_ref().map(|settings| settings.id)
+        self.is_valid.then_some(self.settings.id)
+    }
+
+    /// Whether a frame has the CAN-ID of this RPDO, which is in a chain.
+    pub(crate) fn is_of(&self, frame: &Frame) -> bool {
+        self.settings.id.get() == frame.id()
     }
 
     /// Takes a data frame of this PDO: how its length compares, and whether the data is valid at once. `late` is true when
     /// the synchronous window is over: a synchronous PDO is then ignored.
     #[inline]
     pub(crate) fn take(&mut self, frame: &Frame, now: Instant, late: bool) -> (Reception, bool) {
-        let Some(settings) = &self.settings else { return (Reception::TooShort, false) };
+        let settings = &self.settings;
         let mapped = settings.len();
         if frame.len() < mapped {
             return (Reception::TooShort, false);
@@ -141,7 +164,7 @@ impl Rpdo {
 
     /// Where the data goes.
     pub(crate) fn layout(&self) -> Option<&Layout> {
-        match &self.settings.as_ref()?.content {
+        match &self.settings.content {
             Content::Objects(layout) => Some(layout),
             Content::Multiplexed(_) => None,
         }

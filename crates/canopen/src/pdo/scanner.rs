@@ -11,7 +11,7 @@ use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, NodeId, Transmit};
 use heapless::Vec;
 
-/// What the dictionary says about the PDO.
+/// Settings of the multiplexed TPDO, from the dictionary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ScannerSettings {
     pub(crate) id: CanId,
@@ -38,11 +38,11 @@ impl ScannerSettings {
 pub(crate) struct Watched {
     at: Multiplexer,
     field: Field,
-    /// What was sent last; `None` before.
+    /// The value that was sent last; `None` before the first transmission.
     sent: Option<[u8; 4]>,
     /// No other TPDO carries it, and its part of the device is there.
     is_own: bool,
-    /// It is to be sent.
+    /// The value waits to be sent.
     is_pending: bool,
 }
 
@@ -104,7 +104,7 @@ impl<const M: usize> Scanner<M> {
         self.watched.iter_mut().for_each(|watched| watched.is_own = is_told(watched.at));
     }
 
-    /// What is no longer told is new when it is told again.
+    /// Forgets the sent values of objects that are no longer sent: one that is chosen again later is sent as new.
     pub(crate) fn forget_others(&mut self) {
         for watched in self.watched.iter_mut().filter(|watched| !watched.is_own) {
             (watched.sent, watched.is_pending) = (None, false);

@@ -12,7 +12,7 @@ use crate::sync::Sync;
 use crate::transmit::{RETRY, Turn};
 use crate::{CanId, Duration, Frame, Instant, Transmit};
 
-/// What the objects 1800h.. and 1A00h.. say about a TPDO that is valid.
+/// Settings of a valid TPDO, from the objects 1800h.. and 1A00h...
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     pub(crate) id: CanId,
@@ -31,17 +31,30 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
+    /// The settings of a TPDO that is not valid.
+    const UNUSED: Settings = Settings {
+        id: CanId::NMT,
+        answers_remote: false,
+        transmission: Transmission::Timer,
+        inhibit: 0,
+        event: 0,
+        sync_start: 0,
+        events_of: None,
+        layout: Layout::EMPTY,
+    };
+
     fn sends_on_change(&self) -> bool {
         self.transmission == Transmission::Event && self.event == 0 && self.events_of.is_none()
     }
 }
 
-/// A TPDO and its timers. Without settings it does not exist.
+/// A TPDO and its timers. One that is not valid is in no chain, and of the methods only `configure` and `stop` are for it.
 #[derive(Debug)]
 pub(crate) struct Tpdo {
     /// The PDOs that follow in the chains.
     pub(crate) links: Links,
-    settings: Option<Settings>,
+    is_valid: bool,
+    settings: Settings,
     /// Something waits to be sent: an event within the inhibit time, or a frame that found the queue full.
     pending: bool,
     /// SYNCs since the last transmission.
@@ -54,7 +67,7 @@ pub(crate) struct Tpdo {
     event_due: Instant,
     /// Before this, an event waits.
     inhibited_until: Instant,
-    /// Of a TPDO that tells events.
+    /// When to ask for events; used by a TPDO that tells events only.
     events: Events,
 }
 
@@ -82,7 +95,8 @@ impl Tpdo {
     pub(crate) const fn new() -> Tpdo {
         Tpdo {
             links: Links::END,
-            settings: None,
+            is_valid: false,
+            settings: Settings::UNUSED,
             pending: false,
             syncs: 0,
             is_counting: false,
@@ -95,12 +109,14 @@ impl Tpdo {
 
     /// Takes new settings and starts afresh.
     pub(crate) fn configure(&mut self, settings: Option<Settings>) {
-        self.settings = settings;
+        self.is_valid = settings.is_some();
+        self.settings = settings.unwrap_or(Settings::UNUSED);
         self.stop();
     }
 
+    /// The settings of a TPDO that is valid.
     pub(crate) fn settings(&self) -> Option<&Settings> {
-        self.settings.as_ref()
+        self.is_valid.then_some(&self.settings)
     }
 
     /// Whether something waits to be sent.
@@ -112,19 +128,18 @@ impl Tpdo {
     pub(crate) fn start(&mut self) {
         self.stop();
         let events = self.events_of().is_some();
-        self.pending =
-            !events && self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
+        self.pending = !events && self.is_valid && self.settings.transmission.is_event_driven();
         self.events = if events { Events::BEGIN } else { Events::NONE };
     }
 
     /// The number of a TPDO that tells events.
     pub(crate) fn events_of(&self) -> Option<u16> {
-        self.settings.as_ref()?.events_of
+        self.settings.events_of
     }
 
-    /// The same, if the application may be asked for an event now.
+    /// The number of a TPDO that tells events, if the application may be asked for an event now.
     pub(crate) fn asks_for_event(&mut self, turn: &Turn<'_, impl Transmit>) -> Option<u16> {
-        let settings = self.settings.as_ref()?;
+        let settings = &self.settings;
         let is_asked_now = settings.transmission.is_event_driven()
             && (settings.event == 0 || self.events.is_open)
             && !self.pending
@@ -148,16 +163,10 @@ impl Tpdo {
 
     /// When the application is to be asked again.
     pub(crate) fn event_due(&self) -> Instant {
-        match &self.settings {
-            Some(settings)
-                if self.events.may_wait
-                    && settings.transmission.is_event_driven()
-                    && (settings.event == 0 || self.events.is_open) =>
-            {
-                self.inhibited_until
-            }
-            _ => Instant::NEVER,
-        }
+        let is_asked = self.events.may_wait
+            && self.settings.transmission.is_event_driven()
+            && (self.settings.event == 0 || self.events.is_open);
+        if is_asked { self.inhibited_until } else { Instant::NEVER }
     }
 
     /// Leaving Operational: nothing is due, a PDO that waits is dropped.
@@ -174,32 +183,29 @@ impl Tpdo {
 
     /// A SYNC arrived.
     pub(crate) fn on_sync(&mut self, sync: Sync, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let Some(Settings { transmission, layout, .. }) = self.settings else { return };
+        let transmission = self.settings.transmission;
         match transmission {
-            Transmission::SyncCyclic(_) if self.is_sent_with(sync) => self.send(image, turn),
+            Transmission::SyncCyclic(every) if self.is_sent_with(sync, every.get()) => self.send(image, turn),
             Transmission::SyncAcyclic if self.has_changed(image) => self.send(image, turn),
-            Transmission::SyncRemote => self.data = Some(layout.gather(image)),
+            Transmission::SyncRemote => self.data = Some(self.settings.layout.gather(image)),
             _ => (),
         }
     }
 
-    /// The same of a TPDO that tells events: its number. A SYNC sends one event, whatever the type counts.
+    /// The number of a TPDO that tells events and may send one with a SYNC, whatever the type counts.
     pub(crate) fn asks_with_sync(&self) -> Option<u16> {
-        let settings = self.settings.as_ref().filter(|_| !self.pending)?;
-        settings.events_of
+        let is_asked = self.settings.transmission.is_synchronous() && !self.pending;
+        self.settings.events_of.filter(|_| is_asked)
     }
 
-    /// Whether it is the turn of a cyclic synchronous PDO.
-    fn is_sent_with(&mut self, sync: Sync) -> bool {
-        let Some(Settings { transmission: Transmission::SyncCyclic(every), sync_start, .. }) = self.settings
-        else {
-            return false;
-        };
-        self.is_counting |= sync.counter.is_none_or(|counter| [0, counter].contains(&sync_start));
+    /// Whether it is the turn of a cyclic synchronous PDO, with every n-th SYNC.
+    fn is_sent_with(&mut self, sync: Sync, every: u8) -> bool {
+        let start = self.settings.sync_start;
+        self.is_counting |= sync.counter.is_none_or(|counter| start == 0 || start == counter);
         if self.is_counting {
             self.syncs = self.syncs.saturating_add(1);
         }
-        let is_turn = self.syncs >= every.get();
+        let is_turn = self.syncs >= every;
         if is_turn {
             self.syncs = 0;
         }
@@ -208,9 +214,10 @@ impl Tpdo {
 
     /// A remote frame asks for it. The synchronous types 0 to 240 belong to the SYNC and do not answer.
     pub(crate) fn on_remote(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let Some(settings) = self.settings.as_ref().filter(|settings| settings.answers_remote) else {
+        let settings = &self.settings;
+        if !settings.answers_remote {
             return;
-        };
+        }
         match (settings.transmission, self.data) {
             (Transmission::SyncRemote, Some(sampled)) => {
                 // The client asks again if the queue is full: a sample of the past need not be kept for it.
@@ -227,13 +234,12 @@ impl Tpdo {
 
     /// The application has found an event.
     pub(crate) fn on_event(&mut self) {
-        self.pending |=
-            self.settings.as_ref().is_some_and(|settings| settings.transmission.is_event_driven());
+        self.pending |= self.is_valid && self.settings.transmission.is_event_driven();
     }
 
     /// Mapped values may have changed.
     pub(crate) fn on_change(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        if self.settings.as_ref().is_some_and(Settings::sends_on_change) && self.has_changed(image) {
+        if self.settings.sends_on_change() && self.has_changed(image) {
             self.pending = true;
             self.poll(image, turn);
         }
@@ -241,14 +247,14 @@ impl Tpdo {
 
     /// The synchronous window is over: a synchronous PDO that still waits for room would be taken for one of the next.
     pub(crate) fn drop_synchronous(&mut self) {
-        let kind = self.settings.as_ref().map(|settings| settings.transmission);
+        let kind = self.settings.transmission;
         // An event is not told again, so it is kept.
         self.pending &= self.events_of().is_some()
-            || !matches!(kind, Some(Transmission::SyncAcyclic | Transmission::SyncCyclic(_)));
+            || !matches!(kind, Transmission::SyncAcyclic | Transmission::SyncCyclic(_));
     }
 
     fn has_changed(&self, image: &[u8]) -> bool {
-        self.settings.as_ref().is_some_and(|settings| self.data != Some(settings.layout.gather(image)))
+        self.data != Some(self.settings.layout.gather(image))
     }
 
     /// Sends what is due.
@@ -270,26 +276,31 @@ impl Tpdo {
 
     /// One period after the last due instant, so that delays do not add up; after a long gap, one period from now.
     fn following_event(&self, now: Instant) -> Instant {
-        let Some(settings) = self.settings.as_ref().filter(|settings| settings.event != 0) else {
+        if self.settings.event == 0 {
             return Instant::NEVER;
-        };
-        let period = Duration::from_millis(settings.event.into());
+        }
+        let period = Duration::from_millis(self.settings.event.into());
         let next = self.event_due + period;
         if self.event_due != Instant::NEVER && next > now { next } else { now + period }
     }
 
     /// Sends the present values. A full queue leaves it pending: when there is room, the values of then go out.
     fn send(&mut self, image: &[u8], turn: &mut Turn<'_, impl Transmit>) {
-        let Some(settings) = &self.settings else { return };
-        let data = settings.layout.gather(image);
-        let frame = Frame::data_frame(settings.id, settings.layout.len(), data);
-        let sent = if settings.events_of.is_some() { turn.send(frame) } else { turn.send_state(frame) };
-        self.pending = !sent;
-        self.inhibited_until = turn.now + if sent { Duration::from_inhibit(settings.inhibit) } else { RETRY };
-        if sent {
+        let Settings { id, layout, transmission, inhibit, .. } = &self.settings;
+        let data = layout.gather(image);
+        let frame = Frame::data_frame(*id, layout.len(), data);
+        let tells_events = self.settings.events_of.is_some();
+        let is_sent = if tells_events { turn.send(frame) } else { turn.send_state(frame) };
+        self.pending = !is_sent;
+        if is_sent {
             self.data = Some(data);
+            if *inhibit != 0 {
+                self.inhibited_until = turn.now + Duration::from_inhibit(*inhibit);
+            }
+        } else {
+            self.inhibited_until = turn.now + RETRY;
         }
-        if settings.transmission.is_event_driven() && self.event_due == Instant::NEVER {
+        if transmission.is_event_driven() && self.event_due == Instant::NEVER {
             self.event_due = self.following_event(turn.now);
         }
     }

@@ -89,7 +89,7 @@ impl Abort {
         }
     }
 
-    /// What the code means (CiA 301, table 22).
+    /// Meaning of the code (CiA 301, table 22).
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         match self {

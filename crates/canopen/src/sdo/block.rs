@@ -1,4 +1,4 @@
-//! What block transfers add to the messages.
+//! The messages of block transfers: block size, segment, end.
 
 /// Segments in a block, 1 to 127.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

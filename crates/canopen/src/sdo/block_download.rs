@@ -35,22 +35,18 @@ impl Receiver {
         self.wants_segments() && self.has_begun
     }
 
-    /// Takes a frame if it is the next segment, and neither the first nor the last of a block: most frames of a transfer
-    /// are nothing else; only within a block is anything but 1 the next. `None` for any other.
+    /// Takes a frame that is the next segment of a block, neither the first nor the last, if the buffer has room for a whole
+    /// one: most frames of a transfer are nothing else. Only within a block is anything but 1 the next. Whether it was taken.
     #[inline]
-    pub(super) fn take_next(
-        &mut self,
-        frame: &[u8; 8],
-        buffer: &mut [u8; BUFFER],
-        objects: &mut impl Objects,
-    ) -> Option<Result<(), Abort>> {
+    pub(super) fn take_next(&mut self, frame: &[u8; 8], buffer: &mut [u8; BUFFER]) -> bool {
         let [sequence, data @ ..] = frame;
-        if *sequence != self.next || !matches!(sequence, 2..=126) {
-            return None;
+        let is_taken =
+            *sequence == self.next && matches!(sequence, 2..=126) && self.sink.append_segment(data, buffer);
+        if is_taken {
+            self.next += 1;
+            self.newest = None;
         }
-        self.next += 1;
-        self.newest = None;
-        Some(self.sink.append_segment(data, buffer, objects))
+        is_taken
     }
 
     /// Takes a segment; `true` at the end of a block. Segments after a gap are left to be sent again.

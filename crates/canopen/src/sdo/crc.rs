@@ -13,7 +13,7 @@ pub(crate) fn extend(crc: u16, bytes: &[u8]) -> u16 {
     rest.iter().fold(crc, |crc, &byte| remainder(u32::from(byte) ^ u32::from(crc >> 8)) ^ crc << 8)
 }
 
-/// Of the word times x^16.
+/// The remainder of the word times x^16.
 #[allow(clippy::cast_possible_truncation)] // The low part is what is wanted.
 fn remainder(word: u32) -> u16 {
     let once = word ^ word >> 4 ^ word >> 11 ^ word >> 16;

@@ -23,7 +23,7 @@ pub use request::{Initiate, Request};
 pub use response::Response;
 pub(crate) use server::Server;
 
-/// What a transfer is about: index and sub-index, bytes 1 to 3 of the initiating frames.
+/// The object of a transfer: index and sub-index, bytes 1 to 3 of the initiating frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Multiplexer {

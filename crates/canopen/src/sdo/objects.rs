@@ -1,4 +1,4 @@
-//! What the server serves, and the two ends of a transfer: where data comes from and where it goes.
+//! The objects as the server sees them, and the two ends of a transfer: the source of an upload and the sink of a download.
 
 use super::{Abort, Bytes, Multiplexer, crc};
 use crate::copy::copy;
@@ -19,10 +19,6 @@ pub(crate) enum Writable {
 
 /// The dictionary with its values and rules.
 pub(crate) trait Objects {
-    /// Whether the image is short of room: then it has no upload in blocks, and a client takes segments, and no shortcuts
-    /// that only save time.
-    const IS_SMALL: bool = false;
-
     /// The value of an entry.
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
     /// How the entry can be written, if it can be at all.
@@ -137,42 +133,27 @@ impl Sink {
         buffer: &mut [u8; BUFFER],
         objects: &mut impl Objects,
     ) -> Result<(), Abort> {
-        self.make_room(bytes.len(), buffer, objects)?;
+        if self.held + bytes.len() > self.brim {
+            self.hand_over(buffer, objects)?;
+        }
         let end = self.held + bytes.len();
+        if end > self.brim {
+            return Err(Abort::TooLong);
+        }
         copy(buffer.get_mut(self.held..end).ok_or(Abort::TooLong)?, bytes);
         self.held = end;
         Ok(())
     }
 
-    /// The same for a whole segment: with a length that the compiler knows, the copy is two words.
+    /// Takes a whole segment if the buffer has room for it. With a length that the compiler knows, the copy is two words.
     #[inline]
-    pub(super) fn append_segment(
-        &mut self,
-        data: &[u8; 7],
-        buffer: &mut [u8; BUFFER],
-        objects: &mut impl Objects,
-    ) -> Result<(), Abort> {
-        self.make_room(data.len(), buffer, objects)?;
+    pub(super) fn append_segment(&mut self, data: &[u8; 7], buffer: &mut [u8; BUFFER]) -> bool {
+        let end = self.held + data.len();
         let place = buffer.get_mut(self.held..).and_then(|rest| rest.first_chunk_mut());
-        *place.ok_or(Abort::TooLong)? = *data;
-        self.held += data.len();
-        Ok(())
-    }
-
-    #[inline]
-    fn make_room(
-        &mut self,
-        len: usize,
-        buffer: &[u8; BUFFER],
-        objects: &mut impl Objects,
-    ) -> Result<(), Abort> {
-        if self.held + len > self.brim {
-            self.hand_over(buffer, objects)?;
-            if self.held + len > self.brim {
-                return Err(Abort::TooLong);
-            }
-        }
-        Ok(())
+        let Some(place) = place.filter(|_| end <= self.brim) else { return false };
+        *place = *data;
+        self.held = end;
+        true
     }
 
     /// Passes on what is in the buffer, if it is part of a stream.

@@ -1,4 +1,4 @@
-//! What a client asks. Eight bytes are one of these or no request at all.
+//! Requests of an SDO client. Eight bytes are one of these or no request at all.
 
 use super::{BlockEnd, Bytes, Multiplexer, Segment, tail};
 
@@ -20,7 +20,7 @@ pub enum Request {
     Abort(Multiplexer, u32),
     /// Write in blocks: the first frame.
     BlockDownload {
-        /// What to write.
+        /// The object to write.
         at: Multiplexer,
         /// The end will carry a CRC.
         crc: bool,
@@ -31,7 +31,7 @@ pub enum Request {
     BlockDownloadEnd(BlockEnd),
     /// Read in blocks: the first frame.
     BlockUpload {
-        /// What to read.
+        /// The object to read.
         at: Multiplexer,
         /// The client can check a CRC.
         crc: bool,

@@ -1,4 +1,4 @@
-//! What the server answers.
+//! Responses of an SDO server.
 
 use super::{BlockEnd, BlockSize, Bytes, Multiplexer, Segment, tail};
 
@@ -9,7 +9,7 @@ pub enum Response {
     Downloaded(Multiplexer),
     /// Segment written.
     DownloadedSegment {
-        /// Of the segment.
+        /// Toggle bit of the segment.
         toggle: bool,
     },
     /// Read: all the data, one to four bytes; all four where the server leaves the size to the type.
@@ -28,7 +28,7 @@ pub enum Response {
     BlockDownloaded,
     /// Read in blocks: ready to send.
     BlockUpload {
-        /// What is read.
+        /// The object that is read.
         at: Multiplexer,
         /// The end will carry a CRC.
         crc: bool,

@@ -67,6 +67,11 @@ impl Server {
         matches!(self.transfer, Transfer::Idle)
     }
 
+    /// Whether a block download is under way.
+    pub(crate) fn takes_block(&self) -> bool {
+        matches!(self.transfer, Transfer::BlockDownload(_))
+    }
+
     /// Whether the client is sending a block.
     pub(crate) fn is_within_block(&self) -> bool {
         matches!(&self.transfer, Transfer::BlockDownload(receiver) if receiver.is_within_block())
@@ -88,29 +93,23 @@ impl Server {
         (self.previous, self.is_answered) = ([0; 8], false);
     }
 
-    /// Takes a segment within a block; whether that has a reply, which is an abort. `None` for any other frame, which is
-    /// for [`answer`](Server::answer). The deadline is not earlier afterwards.
+    /// Takes a frame that is a segment within a block and needs nothing but a place in the buffer; whether it is one. Any other
+    /// is for [`answer`](Server::answer). The deadline is not earlier afterwards.
     #[inline]
-    pub(crate) fn take_next<O: Objects>(
-        &mut self,
-        frame: &[u8; 8],
-        objects: &mut O,
-        now: Instant,
-    ) -> Option<bool> {
-        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return None };
-        if O::IS_SMALL {
-            return None;
+    pub(crate) fn take_segment(&mut self, frame: &[u8; 8], now: Instant) -> bool {
+        let Transfer::BlockDownload(receiver) = &mut self.transfer else { return false };
+        let is_taken = receiver.take_next(frame, &mut self.buffer);
+        if is_taken {
+            self.active = now;
         }
-        let taken = receiver.take_next(frame, &mut self.buffer, objects)?;
-        self.active = now;
-        Some(taken.is_err_and(|abort| self.give_up(abort)))
+        is_taken
     }
 
     /// Takes a request; whether there is a reply.
     #[inline(never)]
-    pub(crate) fn answer<O: Objects>(&mut self, frame: &[u8; 8], objects: &mut O, now: Instant) -> bool {
+    pub(crate) fn answer(&mut self, frame: &[u8; 8], objects: &mut impl Objects, now: Instant) -> bool {
         // The requests that begin a download or an upload belong to no series: nothing to compare, nothing to remember.
-        let is_of_series = O::IS_SMALL || !matches!(frame[0] >> 5, 1 | 2) || self.wants_block_segments();
+        let is_of_series = !matches!(frame[0] >> 5, 1 | 2) || self.wants_block_segments();
         let is_repeated = is_of_series && *frame == self.previous;
         if is_repeated && self.is_answered && self.is_repeatable(frame) {
             return true;

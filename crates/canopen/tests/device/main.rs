@@ -1,10 +1,13 @@
 //! The whole device, on a bench: a small dictionary, frames in and frames out.
 
+mod application;
 mod bench;
 mod block;
 mod dictionary;
 mod emcy;
 mod events;
+#[path = "../exchange/mod.rs"]
+mod exchange;
 mod heartbeat;
 mod hooks;
 mod lss;
@@ -12,8 +15,10 @@ mod mapping;
 mod multiplexed;
 mod nmt;
 mod robustness;
+mod rows;
 mod rpdo;
 mod sdo;
+mod service_device;
 mod states;
 mod store;
 mod sync;

@@ -117,6 +117,23 @@ fn a_segment_without_a_transfer_is_no_valid_command() {
 }
 
 #[test]
+fn the_abort_of_an_unknown_command_names_the_object_of_the_frame() {
+    let mut bench = Bench::booted();
+    assert_eq!(bench.write32(0x6102, 0, 4711), Ok(()));
+    let at = Multiplexer { index: 0x1017, sub: 3 };
+    assert_eq!(bench.ask_raw([0xE0, 0x17, 0x10, 3, 0, 0, 0, 0]), abort(at, 0x0504_0001));
+}
+
+#[test]
+fn an_unknown_command_ends_the_transfer_under_way_and_names_its_object() {
+    let mut bench = Bench::booted();
+    let at = Multiplexer { index: 0x1008, sub: 0 };
+    bench.ask(Request::Upload(at));
+    assert_eq!(bench.ask_raw([0xE0, 0x17, 0x10, 3, 0, 0, 0, 0]), abort(at, 0x0504_0001));
+    assert_eq!(bench.ask(Request::UploadSegment { toggle: false }), abort(at, 0x0504_0001));
+}
+
+#[test]
 fn the_toggle_bit_must_alternate() {
     let mut bench = Bench::booted();
     let at = Multiplexer { index: 0x1008, sub: 0 };

@@ -1,7 +1,9 @@
-//! A device without an application, a queue that keeps what it is given, and a client.
+//! A device without an application, and a queue that keeps what it is given.
 
-use canopen::sdo::{Bytes, Initiate, Multiplexer, Request, Response};
+use canopen::sdo::Multiplexer;
 use canopen::{Application, Device, Frame, Instant, QueueFull, Transmit};
+
+use crate::exchange;
 
 /// The node-ID of the devices.
 pub(crate) const ID: u8 = 5;
@@ -25,7 +27,7 @@ impl Transmit for Sent {
     }
 }
 
-/// Writes up to four bytes by SDO; the abort code where the device refuses them.
+/// Writes a value by SDO; the abort code where the device refuses.
 pub(crate) fn download<
     A: Application,
     const N: usize,
@@ -39,15 +41,9 @@ pub(crate) fn download<
     bytes: &[u8],
     now: Instant,
 ) -> Result<(), u32> {
-    let at = Multiplexer { index, sub };
-    let request = Request::Download(at, Initiate::Expedited(Bytes::from_slice(bytes)));
-    let mut sent = Sent::default();
-    let frame = Frame::new(0x600 + u16::from(ID), &request.encode()).unwrap();
-    let _ = device.on_service_frame(&frame, now, &mut sent);
-    let response = sent.0.iter().find(|frame| frame.id() == 0x580 + u16::from(ID)).unwrap();
-    match Response::parse(response.data().try_into().unwrap()) {
-        Some(Response::Downloaded(_)) => Ok(()),
-        Some(Response::Abort(_, code)) => Err(code),
-        other => panic!("{other:?}"),
-    }
+    exchange::write(ID, Multiplexer { index, sub }, bytes, |request| {
+        let mut sent = Sent::default();
+        let _ = device.on_service_frame(&request, now, &mut sent);
+        sent.0
+    })
 }

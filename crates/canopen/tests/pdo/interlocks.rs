@@ -85,10 +85,9 @@ const ROWS: &[&[Object]] = &[
 ];
 const COUNT: usize = dictionary::count(ROWS);
 static TABLE: [Object; COUNT] = dictionary::gather(ROWS);
-const SIZE: usize = dictionary::image_size(&TABLE);
 const DICTIONARY: Dictionary = canopen::dictionary!(&TABLE);
 
-type Node = Device<Nothing, SIZE>;
+type Node = canopen::device!(Nothing, &TABLE);
 
 fn node() -> Node {
     let mut device = Device::new(&DICTIONARY, NodeId::new(ID).unwrap(), Nothing);

@@ -1,6 +1,9 @@
 //! PDOs of dictionaries made for the purpose.
 
 mod bench;
+#[allow(dead_code)] // These tests only write.
+#[path = "../exchange/mod.rs"]
+mod exchange;
 mod interlocks;
 mod many;
 mod places;

@@ -57,11 +57,10 @@ const PARTS: &[&[Object]] = &[
     ],
 ];
 static TABLE: [Object; dictionary::count(PARTS)] = dictionary::gather(PARTS);
-const SIZE: usize = dictionary::image_size(&TABLE);
 const DICTIONARY: Dictionary = canopen::dictionary!(&TABLE);
 
 struct Bench {
-    device: Device<Nothing, SIZE>,
+    device: canopen::device!(Nothing, &TABLE),
     sent: Sent,
 }
 

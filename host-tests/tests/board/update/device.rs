@@ -134,13 +134,12 @@ fn a_download_without_a_clear_is_refused_and_one_in_segments_is_taken() {
     assert_eq!(bench.read(CONTROL).unwrap(), [0]);
 }
 
-/// There is no block upload: a client is told so, and takes segments.
+/// In blocks and in segments.
 #[test]
-fn a_block_upload_is_refused() {
+fn a_client_may_choose_how_it_reads() {
     let mut bench = in_bootloader();
     let name = at(0x1008, 0);
-    let refused = Client::new(&mut bench).read_blocks(name, 127);
-    assert!(matches!(refused, Err(Failure::Refused(_))), "{refused:X?}");
+    assert_eq!(Client::new(&mut bench).read_blocks(name, 127).unwrap(), b"Bootloader");
     bench.run(Time::from_millis(10));
     assert_eq!(bench.read(name).unwrap(), b"Bootloader");
 }

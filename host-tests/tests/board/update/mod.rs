@@ -14,9 +14,8 @@ use update::{HEADER_LEN, Status};
 
 use crate::stack::assert_bound;
 use crate::support::{SECOND, images};
-use bench::{
-    BOOT, Bench, CONTROL, DEVICE_TYPE, HEADER, IDENTIFICATION, PROMPT, START, signed, version_a, version_b,
-};
+pub(crate) use bench::HEADER;
+use bench::{BOOT, Bench, CONTROL, DEVICE_TYPE, IDENTIFICATION, PROMPT, START, signed, version_a, version_b};
 
 #[test]
 fn the_application_reads_its_identification_from_its_header() {

@@ -3,7 +3,7 @@
 //! It behaves as devices in the field do: stopping and starting the program is not acknowledged, the node then answers
 //! in its new state; erasing takes time, in which SDO is served.
 
-use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Entry, Object, Type};
+use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Object, Type};
 use canopen::sdo::{Abort, Multiplexer, Response};
 use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Transmit};
 use nodectl::bus::Station;
@@ -33,7 +33,6 @@ const ROWS: &[Object] = &[
     read_only(0x1F57, 1, Type::Unsigned32),
 ];
 
-const SIZE: usize = dictionary::image_size(ROWS);
 const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
 /// From a command to the first answer in the new state.
@@ -115,7 +114,7 @@ impl Application for Flash {
 /// The node. It can be switched off.
 pub(crate) struct Loader {
     id: NodeId,
-    device: Device<Flash, SIZE>,
+    device: canopen::device!(Flash, ROWS),
     /// When it is up again; `NEVER` while it is off.
     up: Instant,
     is_started: bool,

@@ -1,4 +1,4 @@
-//! What slaves refuse.
+//! Errors of LSS services: refusals of slaves, and slaves that do not answer.
 
 use core::fmt;
 

@@ -6,7 +6,7 @@ use crate::client::{Service, Step, Taken};
 use crate::lss::{Request, Response};
 use crate::{Frame, Instant};
 
-/// What the answer to the last request means; `None` for a response that is no answer to it.
+/// Interprets a response to the last request; `None` for a response that does not answer the request.
 type Fits<T> = fn(Request, Response) -> Option<Result<T, Error>>;
 
 /// Up to four requests and the answer to the last of them. All requests are sent again when there is no answer: none of

@@ -77,7 +77,7 @@ impl Fastscan {
         }
     }
 
-    /// What follows from the answer, or from the silence.
+    /// Goes on after an answer, or after silence.
     fn following(&mut self) -> Question {
         match (self.question, self.is_answered) {
             (Question::Release, _) => Question::Anybody,

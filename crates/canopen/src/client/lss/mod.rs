@@ -58,6 +58,5 @@ fn frame(request: Request) -> Frame {
 }
 
 fn response(frame: &Frame) -> Option<Response> {
-    let data = frame.full().filter(|_| frame.id() == RESPONSE.get())?;
-    Response::parse(*data)
+    Response::parse(*frame.full(RESPONSE)?)
 }

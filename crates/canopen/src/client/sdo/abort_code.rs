@@ -45,7 +45,7 @@ const WORDS: [(u32, &str); 31] = [
 ];
 
 impl AbortCode {
-    /// What it means, where CiA 301 says so.
+    /// Meaning of the code; `None` where CiA 301 defines none.
     #[must_use]
     pub fn words(self) -> Option<&'static str> {
         WORDS.iter().find(|row| row.0 == self.0).map(|row| row.1)

@@ -28,7 +28,7 @@ pub enum Error {
 const OUT_OF_MEMORY: AbortCode = AbortCode(0x0504_0005);
 
 impl Error {
-    /// What the client tells the server when it gives up; `None` where the server knows.
+    /// Abort code that the client sends when it gives up; `None` where the server has ended the transfer itself.
     #[must_use]
     pub fn abort(self) -> Option<AbortCode> {
         match self {

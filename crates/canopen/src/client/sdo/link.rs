@@ -1,4 +1,4 @@
-//! What all transfers share: the way to the server, what is to be sent, and until when an answer has to come.
+//! The part of a transfer that all kinds share: the CAN-IDs, the frame to send next, and the time limit of the answer.
 
 use super::{AbortCode, Error, Options};
 use crate::client::service::later;
@@ -16,7 +16,7 @@ pub struct Link {
     /// The object of the transfer.
     pub(super) at: Multiplexer,
     pub(super) options: Options,
-    /// What is to be sent next.
+    /// The frame to send next.
     outgoing: Option<[u8; 8]>,
     /// The answer that is waited for is the first one of a transfer, and names its object.
     is_first: bool,
@@ -64,7 +64,7 @@ impl Link {
         self.outgoing = Some(Request::Abort(self.at, code.0).encode());
     }
 
-    /// What is to be sent next.
+    /// The frame to send next.
     pub(super) fn outgoing(&mut self, now: Instant) -> Option<Frame> {
         let data = self.outgoing.take()?;
         self.answer_by = later(now, self.patience);
@@ -94,8 +94,7 @@ impl Link {
 
     /// The data of a frame from the server, if it can be an answer: everything that was to be sent has been.
     pub(super) fn response(&self, frame: &Frame) -> Option<[u8; 8]> {
-        let is_answer = frame.id() == self.node.service(FROM_SERVER).get() && self.outgoing.is_none();
-        frame.full().copied().filter(|_| is_answer)
+        frame.full(self.node.service(FROM_SERVER)).copied().filter(|_| self.outgoing.is_none())
     }
 
     /// Whether a frame is one more copy of the newest.

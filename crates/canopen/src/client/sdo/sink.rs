@@ -26,7 +26,7 @@ impl<'a> Buffer<'a> {
         Buffer { memory, len: 0 }
     }
 
-    /// What has come so far.
+    /// The bytes received so far.
     #[must_use]
     pub fn as_slice(&self) -> &[u8] {
         self.memory.get(..self.len).unwrap_or(&[])

@@ -1,4 +1,4 @@
-//! What all transfers have in common: the order of things, the time-outs, the retries, the end.
+//! The frame of every transfer: order of the steps, time-outs, retries, end.
 
 use super::link::Link;
 use super::{Error, Options};
@@ -35,7 +35,7 @@ pub trait Protocol {
     fn transferred(&self) -> usize;
 }
 
-/// What an answer means.
+/// Meaning of an answer for the transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     /// The transfer goes on.

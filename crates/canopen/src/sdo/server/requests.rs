@@ -14,14 +14,20 @@ use crate::sdo::{
 impl Server {
     /// A request that is no segment of a block; `is_repeated` for the same as the one before.
     #[inline]
-    pub(super) fn dispatch<O: Objects>(
+    pub(super) fn dispatch(
         &mut self,
         frame: &[u8; 8],
         is_repeated: bool,
-        objects: &mut O,
+        objects: &mut impl Objects,
         now: Instant,
     ) -> Answer {
-        let Some(request) = Request::parse(frame) else { return Err(Abort::Command) };
+        let Some(request) = Request::parse(frame) else {
+            // No transfer is under way: the abort names the object of this frame, and not that of the last transfer.
+            if self.is_idle() {
+                self.multiplexer = Multiplexer::parse(frame);
+            }
+            return Err(Abort::Command);
+        };
         match request {
             Request::Upload(at) => self.upload(at, objects),
             Request::Download(at, initiate) => self.download(at, initiate, objects, now),
@@ -33,7 +39,6 @@ impl Server {
             }
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
-            _ if O::IS_SMALL => Err(Abort::Command),
             Request::BlockUpload { at, block_size, threshold, .. } => {
                 self.block_upload(at, block_size, threshold, objects)
             }

@@ -1,7 +1,7 @@
 //! A device on the library's own device, with everything that a check asks for: also node guarding, a SYNC producer and sub-index
 //! FFh, which the library leaves out.
 
-use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Type};
+use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Sizes, Type};
 use canopen::{
     Action, Application, Device, Duration, Frame, Instant, Job, Next, NodeId, QueueFull, Soundness, Stored,
     Transmit, objects,
@@ -192,12 +192,15 @@ impl Transmit for Out {
     }
 }
 
+/// Bytes of the image of any of the dictionaries.
 const SIZE: usize = 2048;
+/// Enough for any of them.
+const ROOM: Sizes = Sizes { image: SIZE, tpdos: 8, rpdos: 8, watches: 4, scanned: 48 };
 
 /// The device, with what the library leaves out.
 pub(super) struct Whole {
     dictionary: &'static Dictionary,
-    device: Device<App, SIZE>,
+    device: canopen::device!(App, room: ROOM),
     out: Out,
     is_started: bool,
     toggle: bool,

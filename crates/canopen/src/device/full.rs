@@ -1,0 +1,200 @@
+//! The outer device: PDO, SYNC, EMCY, the heartbeats of other nodes and stored parameters around the inner one.
+
+use super::basic::Basic;
+use super::body::Body;
+use super::pdos::low_half;
+use super::state::SELF_START;
+use super::{Application, ErrorClass, Job, STALE, store};
+use crate::dictionary::{Dictionary, Entry, Group, Groups, Rule};
+use crate::lss::Configuration;
+use crate::nmt::State;
+use crate::pdo::{Links, Rpdo, Scanner, Tpdo};
+use crate::sdo::Abort;
+use crate::transmit::Turn;
+use crate::{CanId, Frame, Instant, NodeId, Transmit, emcy, heartbeat, sync};
+
+/// All of a device but its services. The parameters are those of [`Device`](super::Device).
+#[derive(Debug)]
+pub struct Full<A, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> {
+    pub(super) basic: Basic<A, [u8; N]>,
+    pub(super) watches: heartbeat::Consumer<W>,
+    pub(super) sync: sync::Consumer,
+    pub(super) emcy: emcy::Producer,
+    pub(super) tpdos: [Tpdo; T],
+    pub(super) rpdos: [Rpdo; R],
+    /// The lowest five bits of the CAN-IDs of all valid RPDOs, as a set of 32 bits: most frames for other nodes are not in
+    /// the set, and need no further look.
+    pub(super) rpdo_filter: u32,
+    pub(super) scanner: Scanner<M>,
+    /// The RPDO that takes the multiplexed PDOs of all nodes: its CAN-ID and place.
+    pub(super) all_nodes: Option<(CanId, u16)>,
+    /// One of the TPDOs tells events.
+    pub(super) tells_events: bool,
+    /// Where the chains of PDOs begin.
+    pub(super) first_tpdos: Links,
+    pub(super) first_rpdos: Links,
+    pub(super) jobs: store::Jobs,
+    /// The groups of which the defaults hold although values are stored.
+    pub(super) lost: Groups,
+    /// The groups of which older values hold than those that were stored last.
+    pub(super) older: Groups,
+    pub(super) is_bus_off: bool,
+}
+
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize> Body
+    for Full<A, N, T, R, W, M>
+{
+    type Application = A;
+    type Image = [u8; N];
+
+    /// All PDOs of a SYNC, a heartbeat, an EMCY.
+    const RESERVED_ROOM: usize = 10;
+
+    fn new(dictionary: &'static Dictionary, node_id: Option<NodeId>, application: A) -> Self {
+        let emcy = emcy::Producer::new(A::CONDITIONS, application.register_bits());
+        Full {
+            basic: Basic::new(dictionary, node_id, application),
+            watches: heartbeat::Consumer::new(),
+            sync: sync::Consumer::new(),
+            emcy,
+            tpdos: [const { Tpdo::new() }; T],
+            rpdos: [const { Rpdo::new() }; R],
+            rpdo_filter: 0,
+            scanner: Scanner::new(),
+            all_nodes: None,
+            tells_events: false,
+            first_tpdos: Links::END,
+            first_rpdos: Links::END,
+            jobs: store::Jobs::new(),
+            lost: Groups::NONE,
+            older: Groups::NONE,
+            is_bus_off: false,
+        }
+    }
+
+    fn basic(&self) -> &Basic<A, [u8]> {
+        &self.basic
+    }
+
+    fn image(&self) -> &[u8; N] {
+        &self.basic.image
+    }
+
+    fn basic_mut(&mut self) -> &mut Basic<A, [u8]> {
+        &mut self.basic
+    }
+
+    fn entered(&mut self, state: State) {
+        self.sync.stop();
+        for place in 0..T {
+            if let Some(tpdo) = self.tpdos.get_mut(place) {
+                if state.has_pdos() { tpdo.start() } else { tpdo.stop() }
+            }
+            self.begin_events(place);
+        }
+        self.rpdos.iter_mut().for_each(Rpdo::stop);
+        if state.has_pdos() {
+            self.scanner.start();
+        } else {
+            self.scanner.stop();
+        }
+        self.basic.process_due = STALE;
+    }
+
+    fn load_values(&mut self, everything: bool) {
+        self.load_parameters(everything);
+    }
+
+    fn configure(&mut self, now: Instant) {
+        self.configure_sync(now);
+        self.emcy.configure(self.basic().number_or(0x1014, 0, emcy::OFF));
+        self.emcy.set_inhibit(low_half(self.basic().number(0x1015, 0)));
+        self.configure_watches(now);
+        self.configure_pdos(now);
+        self.emcy.restart(now);
+        self.report_stored(now);
+        self.update_error_register();
+        if self.basic().number(0x1F80, 0) == SELF_START {
+            self.basic.pending.with_values = Some(State::Operational);
+        }
+    }
+
+    fn on_pdo_frame(&mut self, frame: &Frame, turn: &mut Turn<'_, impl Transmit>) {
+        self.take_pdo_frame(frame, turn);
+    }
+
+    fn send_process(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        if turn.now >= self.basic.process_due {
+            self.run_process(turn);
+        }
+    }
+
+    fn on_heartbeat(&mut self, frame: &Frame, now: Instant) {
+        self.take_heartbeat(frame, now);
+    }
+
+    fn poll_errors(&mut self, turn: &mut Turn<'_, impl Transmit>) {
+        while let Some(change) = self.watches.expire(turn.now) {
+            self.on_watch(change, turn.now);
+            self.apply_error(ErrorClass::COMMUNICATION);
+        }
+        if self.basic.state.has_services() {
+            self.emcy.poll(turn);
+        }
+    }
+
+    fn errors_due(&self) -> Instant {
+        let emcy = if self.basic.state.has_services() { self.emcy.due() } else { Instant::NEVER };
+        emcy.min(self.watches.due())
+    }
+
+    fn computed(&self, entry: &Entry) -> Result<&[u8], Abort> {
+        let history = self.emcy.history();
+        match entry.rule() {
+            Rule::ErrorCount => Ok(core::slice::from_ref(history.count())),
+            _ => Ok(history.error(entry.sub()).ok_or(Abort::NoData)?),
+        }
+    }
+
+    fn admit(&mut self, entry: &Entry, value: u32) -> Result<(), Abort> {
+        self.admit_value(entry, value)
+    }
+
+    fn follow(&mut self, entry: &Entry, value: u32, now: Instant) {
+        self.follow_value(entry, value, now);
+    }
+
+    fn store_at_once(&mut self, entry: &Entry) -> Result<(), Abort> {
+        match self.basic.application.stores(entry) {
+            Some(groups) => self.begin_deferred(Job::Store(groups)),
+            None => Ok(()),
+        }
+    }
+
+    fn store_configuration(&mut self, configuration: Configuration) -> bool {
+        self.begin_configuration(configuration)
+    }
+
+    fn take_deferred(&mut self) -> bool {
+        self.jobs.take_deferred()
+    }
+
+    fn watched_ids(&self) -> impl Iterator<Item = CanId> {
+        self.watches.ids()
+    }
+}
+
+impl<A: Application, const N: usize, const T: usize, const R: usize, const W: usize, const M: usize>
+    Full<A, N, T, R, W, M>
+{
+    fn load_parameters(&mut self, everything: bool) {
+        let scope =
+            if everything { super::state::Scope::Everything } else { super::state::Scope::Communication };
+        self.basic_mut().load_defaults(scope);
+        self.load_stored(Group::Communication);
+        if everything {
+            self.load_stored(Group::Application);
+            self.load_stored(Group::Calibration);
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The application of the device under test: it keeps what it is told, and tells what a test gives it.
+
+use std::collections::VecDeque;
+
+use canopen::dictionary::{Entry, Group};
+use canopen::nmt::State;
+use canopen::sdo::{Abort, Multiplexer};
+use canopen::{Application, Condition, ErrorClass, Fault, Part, Soundness, Stored};
+
+use crate::rows::DICTIONARY;
+
+/// The object of type DOMAIN.
+const DOMAIN: Multiplexer = Multiplexer { index: 0x6104, sub: 0 };
+
+/// The conditions of the application.
+pub(crate) const SENSOR_BREAK: u8 = 0;
+pub(crate) const PRESSURE_RAIL: u8 = 1;
+pub(crate) const TEMPERATURE_RAIL: u8 = 2;
+pub(crate) const UNEXPECTED_RESET: u8 = 3;
+
+/// What the device told its application.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Told {
+    Written(u16, u8),
+    Received(u16),
+    Sync(Option<u8>),
+    State(State),
+    Fault(Fault, bool),
+    Error(ErrorClass),
+}
+
+/// Takes 4711 and nothing else at 6102h, and keeps a domain of up to 5000 bytes.
+#[derive(Default)]
+pub(crate) struct Numbers {
+    /// 1F80h, as if it came from a store.
+    pub(crate) start_up: u8,
+    pub(crate) domain: Vec<u8>,
+    pub(crate) downloads: usize,
+    /// What is stored: communication, application, calibration.
+    pub(crate) stored: [Vec<u8>; 3],
+    pub(crate) is_damaged: bool,
+    /// What the device said of the groups that it loaded.
+    pub(crate) loaded: Vec<(Group, bool)>,
+    pub(crate) told: Vec<Told>,
+    /// The TPDO whose frames are events; 0 for none.
+    pub(crate) event_tpdo: u16,
+    /// The value of the event that was told last: each change of 6000h:1 is one.
+    pub(crate) last_event: Option<[u8; 4]>,
+    /// Events that wait, instead: the values of 6000h:1 to tell.
+    pub(crate) events: VecDeque<[u8; 4]>,
+    /// An object that no multiplexed TPDO tells to all nodes.
+    pub(crate) not_told: Option<Multiplexer>,
+}
+
+impl Application for Numbers {
+    const CONDITIONS: &'static [Condition] =
+        &[Condition::new(0x5006), Condition::new(0x8002), Condition::new(0x8001), Condition::new(0x6101)];
+
+    fn initialise(&mut self, image: &mut [u8]) {
+        DICTIONARY.field(0x1F80, 0).set(image, &[self.start_up]);
+    }
+
+    fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if entry.index() == 0x6201 {
+            // Switches TPDO 1 and RPDO 1 off and on.
+            if let [14 | 15] = bytes {
+                let valid = if bytes == [14] { 0x80 } else { 0 };
+                DICTIONARY.field(0x1800, 1).store(image, [0x85, 0x01, 0, valid]);
+                DICTIONARY.field(0x1400, 1).store(image, [0x05, 0x02, 0, valid]);
+            }
+            return if bytes == [13] { Err(Abort::InvalidValue) } else { Ok(()) };
+        }
+        assert_eq!((entry.index(), entry.sub()), (0x6102, 0));
+        if bytes == 4711_u32.to_le_bytes() { Ok(()) } else { Err(Abort::NotStored) }
+    }
+
+    fn sends_events(&self, tpdo: u16) -> bool {
+        tpdo == self.event_tpdo
+    }
+
+    fn begin_events(&mut self, tpdo: u16, _: &mut [u8]) {
+        assert_eq!(tpdo, self.event_tpdo);
+        self.last_event = None;
+    }
+
+    fn next_event(&mut self, tpdo: u16, image: &mut [u8]) -> bool {
+        assert_eq!(tpdo, self.event_tpdo);
+        let field = DICTIONARY.field(0x6000, 1);
+        if let Some(event) = self.events.pop_front() {
+            field.set(image, &event);
+            self.last_event = Some(event);
+            return true;
+        }
+        let now = field.load(image);
+        self.last_event.replace(now) != Some(now)
+    }
+
+    fn broadcasts(&self, at: Multiplexer, _: &[u8]) -> bool {
+        self.not_told != Some(at)
+    }
+
+    fn stored(&self, group: Group) -> Stored<'_> {
+        let [communication, application, calibration] = &self.stored;
+        let packed: &[u8] = match group {
+            Group::Communication => communication,
+            Group::Application => application,
+            Group::Calibration => calibration,
+        };
+        let soundness = if self.is_damaged { Soundness::Older } else { Soundness::Whole };
+        Stored { packed, soundness }
+    }
+
+    fn loaded(&mut self, group: Group, good: bool) {
+        self.loaded.push((group, good));
+    }
+
+    fn written(&mut self, entry: &Entry, _: &mut [u8]) {
+        self.told.push(Told::Written(entry.index(), entry.sub()));
+    }
+
+    fn received(&mut self, rpdo: u16, _: &mut [u8]) {
+        self.told.push(Told::Received(rpdo));
+    }
+
+    fn synchronised(&mut self, counter: Option<u8>, _: &mut [u8]) {
+        self.told.push(Told::Sync(counter));
+    }
+
+    fn state(&mut self, state: State, _: &mut [u8]) {
+        self.told.push(Told::State(state));
+    }
+
+    fn fault(&mut self, fault: Fault, active: bool, _: &mut [u8]) {
+        self.told.push(Told::Fault(fault, active));
+    }
+
+    fn error(&mut self, class: ErrorClass, _: &mut [u8]) {
+        self.told.push(Told::Error(class));
+    }
+
+    fn read_domain(&self, at: Multiplexer) -> Result<&[u8], Abort> {
+        assert_eq!(at, DOMAIN);
+        Ok(&self.domain)
+    }
+
+    fn write_domain(&mut self, at: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
+        assert_eq!(at, DOMAIN);
+        match part {
+            Part::Begin(_) => self.domain.clear(),
+            Part::Data(offset, bytes) => {
+                assert_eq!(offset, self.domain.len());
+                self.domain.extend_from_slice(bytes);
+            }
+            Part::End(len) => {
+                assert_eq!(len, self.domain.len());
+                self.downloads += 1;
+            }
+        }
+        if self.domain.len() > 5000 { Err(Abort::NotStored) } else { Ok(()) }
+    }
+}
