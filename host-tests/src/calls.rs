@@ -63,7 +63,13 @@ pub fn verify(transitions: &[Transition], log: &[Transition], lag: u64) -> Resul
             }
         }
         if next.is_empty() {
-            return Err(format!("word {place} of {}: {word:?} after {possible:?}", log.len()));
+            let told = possible.iter().map(|(told, ..)| *told).max().unwrap_or(0);
+            let around = &transitions[told.saturating_sub(4)..transitions.len().min(told + 4)];
+            let before = &log[place.saturating_sub(8)..place];
+            return Err(format!(
+                "word {place} of {}: {word:?} after {before:#?}, {possible:?}; what happened: {around:#?}",
+                log.len()
+            ));
         }
         possible = next;
     }

@@ -1,5 +1,7 @@
 //! A lift node on the emulated board: as delivered; from the button's contact to a frame, and from a frame to the lamp's pin.
 
+use std::ops::Range;
+
 use canbus::{StandardId, Time};
 use fastrand::Rng;
 use host_tests::calls::{Transition, verify};
@@ -202,6 +204,20 @@ fn every_call_reaches_the_bus_whatever_the_times_of_the_pdo() {
     }
 }
 
+/// Without what the bus repeats: a transmitter that reads the last bit of its frame wrongly sends the frame again, although others have
+/// received it (ISO 11898-1). That takes noise, and two buttons never make the same word twice in a row.
+fn once(words: Vec<Transition>, noise: &[Range<u64>]) -> Vec<Transition> {
+    let mut last: Option<Transition> = None;
+    let is_new = |word: &Transition| {
+        let before = last.replace(*word);
+        let is_same =
+            |before: Transition| (before.button, before.is_pressed) == (word.button, word.is_pressed);
+        let in_noise = |before: Transition| noise.iter().any(|time| time.contains(&before.at));
+        !before.is_some_and(|before| is_same(before) && in_noise(before))
+    };
+    words.into_iter().filter(is_new).collect()
+}
+
 /// Two panels, four buttons, a bus that is never idle, an inhibit time of 200 ms, and noise that takes both off the bus now and
 /// then: every transition arrives once and in its order, or is covered by a full state after it.
 #[test]
@@ -218,6 +234,7 @@ fn random_presses_on_a_full_bus_with_bus_off_in_between() {
     let mut frames = vec![];
     let mut happened = [vec![], vec![]];
     let mut pressed = [[false; 2]; 2];
+    let mut noise = vec![];
     while happened.iter().map(Vec::len).sum::<usize>() < 8 * presses {
         // Each button moves at most every 30 ms, so that its contact is believed in between.
         for _ in 0..rng.u32(1..40) {
@@ -235,9 +252,12 @@ fn random_presses_on_a_full_bus_with_bus_off_in_between() {
             frames.extend(world.take_frames());
         }
         // Off the bus, and started again when both are back, at most 3.2 s later: an error had led them to Pre-operational.
+        let from = world.now();
         world.bus().faults.noise(rng.u64(..), 1.0);
-        world.run_until(world.now() + Time::from_millis(300));
+        world.run_until(from + Time::from_millis(300));
         world.bus().faults.quiet();
+        // A frame that has begun in the noise ends at most 2 ms after it.
+        noise.push(from.as_micros()..world.now().as_micros() + 2000);
         world.run_until(world.now() + SECOND * 4);
         master.send(&mut world, START_ALL.0, &START_ALL.1);
         world.run_until(world.now() + Time::from_millis(rng.u64(1..500)));
@@ -246,8 +266,8 @@ fn random_presses_on_a_full_bus_with_bus_off_in_between() {
     world.run_until(world.now() + SECOND * 12);
     frames.extend(world.take_frames());
     for (happened, node) in happened.iter().zip(NODES) {
-        let verdict =
-            verify(happened, &told(&frames, node), 20_000_000).unwrap_or_else(|error| panic!("{error}"));
+        let verdict = verify(happened, &once(told(&frames, node), &noise), 20_000_000)
+            .unwrap_or_else(|error| panic!("{error}"));
         println!("node {node}: {} transitions, {verdict:?}", happened.len());
         assert!(verdict.told > 0 && verdict.full_states > 1, "{verdict:?}");
     }

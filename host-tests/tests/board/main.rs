@@ -1,9 +1,11 @@
 //! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
 
+mod adapter;
 mod budget;
 mod bus_faults;
 mod chip_faults;
 mod configuring;
+mod conforming;
 mod cost;
 mod damage;
 mod differential;

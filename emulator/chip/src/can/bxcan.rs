@@ -37,6 +37,7 @@ const RFLM: u32 = 3;
 const NART: u32 = 4;
 const AWUM: u32 = 5;
 const ABOM: u32 = 6;
+const TTCM: u32 = 7;
 const RESET: u32 = 15;
 const MCR_RESET: u32 = 0x0001_0002;
 const MCR_WRITABLE: u32 = 0x0001_00FF;
@@ -62,7 +63,7 @@ pub struct Lines {
 
 /// A bxCAN peripheral at register level.
 ///
-/// On the bus it is a [`canbus::Controller`]. Not modelled: time stamps (TTCM is a mere flag), debug freeze, the
+/// On the bus it is a [`canbus::Controller`]. Not modelled: time stamps (to set TTCM is on record), debug freeze, the
 /// level of the CAN_RX pin within a frame, and the CAN_TX pin in loop-back mode.
 #[derive(Clone, Debug)]
 pub struct BxCan {
@@ -158,11 +159,14 @@ impl BxCan {
         }
     }
 
-    /// A write of the word at `offset`; `None` when no register is there.
+    /// A write of the word at `offset`; `None` when no register is there, or when a setting is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         self.advance(now);
         match offset {
-            MCR => self.write_control(value, now),
+            MCR => {
+                self.write_control(value, now);
+                return (!bit(value, TTCM)).then_some(());
+            }
             MSR => self.status.clear_flags(value),
             TSR => self.transmitter.write_status(value),
             RF0R => self.fifos[0].write_status(value),

@@ -247,3 +247,15 @@ fn the_signature_names_the_chip() {
     assert_eq!(half_word(&mut rig, 0x1FFF_7A2E), 1207, "TS_CAL2");
     assert!(rig.chip.unmodelled().is_empty());
 }
+
+#[test]
+fn time_stamps_of_the_can_controller_are_on_record() {
+    const CAN1_MCR: u32 = 0x4000_6400;
+    let mut rig = Rig::new();
+    rig.set(APB1ENR, 1 << 25);
+    rig.write(CAN1_MCR, 1);
+    assert!(rig.chip.unmodelled().is_empty());
+    rig.write(CAN1_MCR, 1 | 1 << 7);
+    let names: Vec<String> = rig.chip.unmodelled().into_iter().map(|entry| entry.name).collect();
+    assert_eq!(names, ["CAN1+0x00"]);
+}

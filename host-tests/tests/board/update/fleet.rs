@@ -4,30 +4,17 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
 
-use canbus::{Id, Time};
-use canopen::{Frame, Instant};
+use canbus::Time;
 use clap::Parser;
-use nodectl::Network;
-use nodectl::bus::{Bus, BusError, Received};
-use nodectl::cli::{Cli, Output, Paper, Session};
+use nodectl::cli::Cli;
 use serde_json::{Value, json};
 use sign::image::Image;
 use sim::world::World;
 
 use super::bench::{VERSION_B, version_a, version_b};
-use crate::support::{Master, SECOND, world};
-
-/// Of the adapter: how often it looks for a frame.
-const STEP: Time = Time::from_micros(100);
-
-pub(super) type Shared = Rc<RefCell<World>>;
-
-/// The adapter of `nodectl`.
-struct Adapter {
-    world: Shared,
-    master: Master,
-    outage: Option<Outage>,
-}
+pub(super) use crate::adapter::Shared;
+use crate::adapter::run;
+use crate::support::{SECOND, world};
 
 /// A board that is switched off in one operation of its flash, and on again.
 pub(super) struct Outage {
@@ -67,44 +54,6 @@ impl Outage {
     }
 }
 
-impl Adapter {
-    fn next(&self) -> Option<Received> {
-        let mut world = self.world.borrow_mut();
-        let stamped = world.port(self.master.port).receive()?;
-        let Id::Standard(id) = stamped.frame.id() else { return None };
-        let frame = Frame::new(id.as_raw(), stamped.frame.bytes())?;
-        Some(Received { frame, at: instant(stamped.at) })
-    }
-}
-
-impl Bus for Adapter {
-    fn now(&self) -> Instant {
-        instant(self.world.borrow().now())
-    }
-
-    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.master.send(&mut self.world.borrow_mut(), frame.id(), frame.data());
-        Ok(())
-    }
-
-    fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
-        loop {
-            let received = self.next();
-            if received.is_some() || self.now() >= until {
-                return Ok(received);
-            }
-            let mut world = self.world.borrow_mut();
-            let next = world.now() + STEP;
-            world.run_until(next);
-            self.outage.take_if(|outage| outage.is_over(&mut world));
-        }
-    }
-}
-
-fn instant(time: Time) -> Instant {
-    Instant(time.as_micros())
-}
-
 pub(super) fn boards(count: u8) -> Shared {
     let nodes: String = (1..=count).map(|node| format!(" --node {node}:pressure")).collect();
     let world = Rc::new(RefCell::new(world(&format!("--bitrate 1000{nodes}"))));
@@ -121,16 +70,10 @@ pub(super) fn update(world: &Shared, nodes: &str, image: &Image, outage: Option<
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", nodes, "update", "--force"];
     let cli = Cli::try_parse_from(line.into_iter().chain(file.to_str())).unwrap();
 
-    let master = Master::join(&mut world.borrow_mut());
-    let port = master.port;
-    let mut adapter = Some(Adapter { world: Rc::clone(world), master, outage });
-    let open = move || Ok(Box::new(adapter.take().expect("the bus is opened once")) as Box<dyn Bus>);
-    let paper = Paper::default();
-    let output = Output::new(paper.clone(), cli.options.json);
-    let result = cli.run_in(&mut Session::with(Network::open(open).unwrap(), &cli.options, output));
-    world.borrow_mut().close_port(port);
-
-    let printed = paper.take();
+    let mut outage = outage;
+    let (printed, result) = run(world, &cli, move |world| {
+        outage.take_if(|outage| outage.is_over(world));
+    });
     result.unwrap_or_else(|failure| panic!("{failure}: {printed}"));
     println!("{:6.2} s: {printed}", world.borrow().now().as_secs_f64());
     printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()

@@ -15,9 +15,8 @@ use update::{HEADER_LEN, Status};
 
 use crate::stack::assert_bound;
 use crate::support::{SECOND, images};
-use bench::{
-    BOOT, Bench, CONTROL, DEVICE_TYPE, HEADER, IDENTIFICATION, PROMPT, START, signed, version_a, version_b,
-};
+pub(crate) use bench::HEADER;
+use bench::{BOOT, Bench, CONTROL, DEVICE_TYPE, IDENTIFICATION, PROMPT, START, signed, version_a, version_b};
 
 /// What 1F57h reads where the signature is not good.
 const SIGNATURE: u8 = 67;

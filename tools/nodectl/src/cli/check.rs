@@ -4,14 +4,16 @@ use std::fmt;
 use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::PathBuf;
 
-use canopen::Duration;
+use canopen::{Duration, NodeId};
 use clap::Args;
+use eds::Eds;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::check::{self, Check as Rule, Effect, Profile, Setup, Stop, Subject, Verdict, about, report};
+use crate::object::at;
 
 /// How long a device may take to boot.
 const BOOT: Duration = Duration::from_millis(10_000);
@@ -121,8 +123,7 @@ impl Check {
 
     fn try_all(session: &mut Session, options: check::Options) -> Result<check::Run, Failure> {
         let node = session.options.node.one()?;
-        let catalogue = session.catalogue(node)?;
-        let sheet = catalogue.is_of_a_device().then(|| catalogue.into_sheet());
+        let sheet = Check::sheet(session, node)?;
         let setup = Setup { node, sheet, timeout: session.options.timeout(), boot: BOOT };
         let bar = bar(options.checks.len());
         let mut subject = Subject::new(&mut session.network, setup);
@@ -141,6 +142,24 @@ impl Check {
             )),
             Stop::Skipped(reason) => Failure::Usage(reason),
         })
+    }
+
+    /// The data sheet of the options, else the one that is built in for the identity of the device. A bootloader has the identity of
+    /// its device, and another device type: no data sheet is its own then.
+    fn sheet(session: &mut Session, node: NodeId) -> Result<Option<Eds>, Failure> {
+        let catalogue = session.catalogue(node)?;
+        let sheet = catalogue.is_of_a_device().then(|| catalogue.into_sheet());
+        if session.options.eds.is_some() {
+            return Ok(sheet);
+        }
+        let Some(sheet) = sheet else { return Ok(None) };
+        // The low word is the profile; the rest may follow from how the device is set up.
+        let declared = match sheet.get(0x1000, 0).and_then(|entry| entry.default.as_ref()) {
+            Some(eds::Formula::Constant(eds::Value::Integer(number))) => number & 0xFFFF,
+            _ => return Ok(Some(sheet)),
+        };
+        let seen = session.word(node, at(0x1000, 0))?.map(|word| i128::from(word & 0xFFFF));
+        Ok(Some(sheet).filter(|_| seen == Some(declared)))
     }
 
     fn write_reports(&self, run: &check::Run) -> Result<(), Failure> {

@@ -162,6 +162,7 @@ fn priority<const STATE: u8>(s: &mut Subject<'_>) -> Outcome {
 
 fn back(s: &mut Subject<'_>) -> Outcome {
     s.need(0x100C, 0)?;
+    s.need_writable(0x1017, 0)?;
     s.beat(5000)?;
     s.beat(0)?;
     guard(s).map(drop)

@@ -28,7 +28,8 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn takes_zero(s: &mut Subject<'_>) -> Outcome {
-    s.beat(0)?;
+    s.need(0x1017, 0)?;
+    s.set(0x1017, 0, 0)?;
     s.holds(0x1017, 0, 0)
 }
 
@@ -40,12 +41,14 @@ fn beats(s: &mut Subject<'_>, ms: u64) -> Outcome<Vec<Logged>> {
 }
 
 fn ten(s: &mut Subject<'_>) -> Outcome {
+    s.need_writable(0x1017, 0)?;
     s.beat(100)?;
     let count = beats(s, 1000)?.len();
     ensure((9..=11).contains(&count), "9 to 11 heartbeats in 1 s", format!("{count}"))
 }
 
 fn silent(s: &mut Subject<'_>) -> Outcome {
+    s.need_writable(0x1017, 0)?;
     s.beat(100)?;
     s.beat(0)?;
     let count = beats(s, 500)?.len();
@@ -64,9 +67,10 @@ fn says<const STATE: u8>(s: &mut Subject<'_>) -> Outcome {
 
 fn one_byte(s: &mut Subject<'_>) -> Outcome {
     s.beat(50)?;
-    let beats = beats(s, 500)?;
+    s.told_state()?;
+    let beats = beats(s, 2000)?;
     let wrong = beats.iter().find(|heard| heard.frame.len() != 1 || heard.frame.data()[0] & 0x80 != 0);
-    ensure(!beats.is_empty(), "heartbeats", "none in 500 ms")?;
+    ensure(!beats.is_empty(), "heartbeats", "none in 2 s")?;
     ensure(
         wrong.is_none(),
         "one byte whose bit 7 is 0",
@@ -75,6 +79,7 @@ fn one_byte(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn even(s: &mut Subject<'_>) -> Outcome {
+    s.need_writable(0x1017, 0)?;
     s.beat(100)?;
     let beats = beats(s, 2000)?;
     let gaps: Vec<u64> = beats.windows(2).map(|pair| pair[1].at.0.saturating_sub(pair[0].at.0)).collect();
@@ -85,6 +90,7 @@ fn even(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn at_once(s: &mut Subject<'_>) -> Outcome {
+    s.need_writable(0x1017, 0)?;
     s.beat(60_000)?;
     s.beat(100)?;
     let count = beats(s, 500)?.len();
@@ -92,6 +98,7 @@ fn at_once(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn through_changes(s: &mut Subject<'_>) -> Outcome {
+    s.need_writable(0x1017, 0)?;
     s.beat(100)?;
     let (mark, id) = (s.mark(), s.error_control());
     for state in [State::Operational, State::Stopped, State::PreOperational, State::Operational] {

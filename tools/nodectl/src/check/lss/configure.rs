@@ -14,7 +14,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("LSS-25", "A table that nobody has is refused", "CiA 305, 3.10.2", bit_timing::<100, 0>),
     Check::new("LSS-26", "The reserved bit rate is refused", "CiA 305, 3.10.2", bit_timing::<0, 5>),
     Check::new("LSS-27", "An unknown service is not answered", "CiA 305, 3.8", unknown),
-    Check::new("LSS-28", "A request of seven bytes is not answered", "CiA 305, 3.8", short),
+    Check::new("LSS-28", "A request of seven bytes is not answered", "CiA 305, 3.8", short).recommended(),
     Check::new("LSS-29", "A device that LSS has selected still serves SDO", "CiA 305, 3.7", serves)
         .recommended(),
 ];

@@ -17,7 +17,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("LSS-09", "LSS tells the serial number of 1018h", "CiA 305, 3.11.1", tells::<3>),
     Check::new("LSS-10", "LSS tells the node-ID", "CiA 305, 3.11.2", node_id),
     Check::new("LSS-11", "In the state waiting nothing is told", "CiA 305, 3.7", waiting),
-    Check::new("LSS-12", "A slave in the range is identified", "CiA 305, 3.12.1", in_range::<true>),
+    Check::new("LSS-12", "A slave in the range is identified", "CiA 305, 3.12.1", in_range::<true>)
+        .recommended(),
     Check::new("LSS-13", "A slave out of the range is not", "CiA 305, 3.12.1", in_range::<false>),
     Check::new("LSS-14", "A slave with a node-ID is not told as unconfigured", "CiA 305, 3.12.2", configured),
     Check::new("LSS-15", "Unused bytes of a response are 0", "CiA 305, 3.9.2", reserved),

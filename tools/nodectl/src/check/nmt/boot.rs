@@ -126,7 +126,7 @@ fn first_frame(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn parameters_return(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     s.reset(Command::ResetCommunication)?;
     let before = s.number(0x1017, 0)?;
     s.set(0x1017, 0, if before == 4321 { 1234 } else { 4321 })?;

@@ -49,6 +49,7 @@ fn requests(s: &mut Subject<'_>) -> Outcome {
 
 fn heartbeat(s: &mut Subject<'_>) -> Outcome {
     s.need_solitude()?;
+    s.need_writable(0x1017, 0)?;
     s.beat(100)?;
     let (mark, id) = (s.mark(), s.error_control());
     for _ in 0..20 {
@@ -76,7 +77,7 @@ fn uploads(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn changes(s: &mut Subject<'_>) -> Outcome {
-    s.beat(0)?;
+    s.need(0x1017, 0)?;
     for _ in 0..50 {
         s.command(Command::Start)?;
         s.command(Command::EnterPreOperational)?;

@@ -134,7 +134,7 @@ fn sync(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn left_alone(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     s.answer([0x21, 0x17, 0x10, 0, 2, 0, 0, 0])?;
     // Longer than the time-out of any server that has one; where the server has none, a new transfer begins anew.
     s.pass(3000)?;

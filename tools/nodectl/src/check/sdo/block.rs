@@ -122,7 +122,7 @@ fn upload_crc(s: &mut Subject<'_>) -> Outcome {
 
 /// Begins a block download of two bytes; the server's block size.
 fn begin_download(s: &mut Subject<'_>, index: u16, crc: bool) -> Outcome<BlockSize> {
-    s.need(index, 0)?;
+    s.need_writable(index, 0)?;
     let value = s.read(index, 0)?;
     s.write(index, 0, &value)?;
     match s.respond(Request::BlockDownload { at: at(index, 0), crc, size: Some(2) })? {
@@ -205,7 +205,7 @@ fn repeated(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn server_block_size(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let request = Request::BlockDownload { at: at(0x1017, 0), crc: false, size: Some(2) };
     let answer = s.answer(request.encode())?;
     s.give_up(0x1017, 0)?;

@@ -80,7 +80,7 @@ fn plain(s: &mut Subject<'_>) -> Outcome<(u16, u8)> {
 }
 
 fn write_back(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let value = s.read(0x1017, 0)?;
     s.write(0x1017, 0, &value)?;
     let again = s.read(0x1017, 0)?;
@@ -118,12 +118,12 @@ fn unknown_command(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn too_long(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     s.refuses_bytes(0x1017, 0, &[0, 0, 0, 0], &[abort::TOO_LONG, abort::LENGTH])
 }
 
 fn too_short(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     s.refuses_bytes(0x1017, 0, &[0], &[abort::TOO_SHORT, abort::LENGTH])
 }
 
@@ -148,7 +148,7 @@ fn names_read(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn names_written(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let value = s.read(0x1017, 0)?;
     let [low, high] =
         value[..].try_into().map_err(|_| fail("two bytes in 1017h", format!("{value:02X?}")))?;
@@ -172,7 +172,7 @@ fn size_is_told(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn reserved(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let value = s.read(0x1017, 0)?;
     let [low, high] =
         value[..].try_into().map_err(|_| fail("two bytes in 1017h", format!("{value:02X?}")))?;
@@ -216,7 +216,7 @@ fn refused_changes_nothing(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn reads_what_was_written(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     for value in [5000, 0, 1234] {
         s.set(0x1017, 0, value)?;
         match s.respond(Request::Upload(at(0x1017, 0)))? {

@@ -59,14 +59,14 @@ fn long(s: &mut Subject<'_>) -> Outcome<u16> {
 }
 
 fn download<const INDEX: u16>(s: &mut Subject<'_>) -> Outcome {
-    s.need(INDEX, 0)?;
+    s.need_writable(INDEX, 0)?;
     let taken = s.segmented(INDEX, 0, &[0x10, 0x27], true)?;
     taken.map_err(|refusal| fail("the download is taken", refusal))?;
     s.holds(INDEX, 0, 10_000)
 }
 
 fn unannounced(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let taken = s.segmented(0x1017, 0, &[0x10, 0x27], false)?;
     taken.map_err(|refusal| fail("the download is taken", refusal))?;
     s.holds(0x1017, 0, 10_000)
@@ -127,7 +127,7 @@ fn segment(toggle: bool, last: bool, data: &[u8]) -> [u8; 8] {
 }
 
 fn begin_download(s: &mut Subject<'_>, size: u32) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     match s.respond(Request::Download(at(0x1017, 0), Initiate::Segmented(Some(size))))? {
         Response::Downloaded(_) => Ok(()),
         other => Err(fail("the response to the initiation of a download", format!("{other:X?}"))),
@@ -150,7 +150,7 @@ fn lone_download_segment(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn too_long(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     match s.segmented(0x1017, 0, &[1, 2, 3, 4, 5], true)? {
         Err(Refusal(abort::TOO_LONG | abort::LENGTH)) => Ok(()),
         other => Err(fail("abort 0607 0012h or 0607 0010h for five bytes", format!("{other:X?}"))),
@@ -158,7 +158,7 @@ fn too_long(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn too_short(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     match s.segmented(0x1017, 0, &[1], true)? {
         Err(Refusal(abort::TOO_SHORT | abort::LENGTH)) => Ok(()),
         other => Err(fail("abort 0607 0013h or 0607 0010h for one byte", format!("{other:X?}"))),
@@ -173,7 +173,7 @@ fn aborted_upload(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn aborted_download(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let before = s.number(0x1017, 0)?;
     s.set(0x1017, 0, before)?;
     begin_download(s, 2)?;

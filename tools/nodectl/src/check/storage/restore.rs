@@ -14,7 +14,7 @@ pub(super) const CHECKS: &[Check] = &[
 
 /// Saves 1017h with another value than its default; the default.
 fn spoil(s: &mut Subject<'_>) -> Outcome<u32> {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let default = s.number(0x1017, 0)?;
     s.set(0x1017, 0, default ^ 0x0800)?;
     s.try_write(0x1010, 1, b"save")?.map_err(|refusal| fail("1010h:1 saves", refusal))?;

@@ -62,19 +62,19 @@ fn is_kept(s: &mut Subject<'_>, at: (u16, u8), bytes: &[u8]) -> Outcome {
 }
 
 fn survives<const GROUP: u8>(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let kept = keeps(s, (0x1017, 0), &4711_u16.to_le_bytes(), GROUP, Command::ResetNode)?;
     ensure(kept, "4711 in 1017h after the restart", "another value")
 }
 
 fn survives_communication(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let kept = keeps(s, (0x1017, 0), &4712_u16.to_le_bytes(), 1, Command::ResetCommunication)?;
     ensure(kept, "4712 in 1017h after the restart", "another value")
 }
 
 fn lost(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     s.reset(Command::ResetNode)?;
     let saved = s.number(0x1017, 0)?;
     s.set(0x1017, 0, saved ^ 0x1000)?;
@@ -83,7 +83,7 @@ fn lost(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn not_by_three(s: &mut Subject<'_>) -> Outcome {
-    s.need(0x1017, 0)?;
+    s.need_writable(0x1017, 0)?;
     let kept = keeps(s, (0x1017, 0), &4713_u16.to_le_bytes(), 3, Command::ResetNode)?;
     ensure(!kept, "the saved value of 1017h", "the value that was not saved")
 }

@@ -2,12 +2,18 @@
 
 use canopen::nmt::{Command, State};
 
-use super::Subject;
+use super::{Refusal, Subject, abort};
 use crate::check::Outcome;
 use crate::check::verdict::{fail, skip};
 
 /// How long a device may take to change its state.
 const SETTLE: u64 = 20;
+
+/// How long a heartbeat of a fixed time is waited for.
+const SLOWEST: u64 = 2500;
+
+/// After this time a device that answers again is taken for booted, even without a boot-up message.
+const MUTE: u64 = 1500;
 
 impl Subject<'_> {
     /// Sends an NMT command to the device.
@@ -30,17 +36,25 @@ impl Subject<'_> {
         0x700 + self.id()
     }
 
-    /// Switches a heartbeat on; skipped where the device has none.
-    pub(in crate::check) fn beat(&mut self, ms: u32) -> Outcome {
+    /// Switches a heartbeat on; skipped where the device has none. A device whose heartbeat time is fixed has the one it has.
+    pub(in crate::check) fn beat(&mut self, ms: u16) -> Outcome {
         self.need(0x1017, 0)?;
-        self.set(0x1017, 0, ms)
+        match self.change(0x1017, 0, &ms.to_le_bytes())? {
+            Ok(()) => Ok(()),
+            Err(Refusal(abort::READ_ONLY)) if self.number(0x1017, 0)? > 0 => Ok(()),
+            Err(Refusal(abort::READ_ONLY)) => Err(skip("1017h is 0 and cannot be written")),
+            Err(refusal) => Err(fail(format!("1017h takes {ms}"), refusal)),
+        }
     }
 
     /// The state that the next heartbeat tells; a heartbeat has to be on.
     pub(in crate::check) fn told_state(&mut self) -> Outcome<u8> {
         let (mark, id) = (self.mark(), self.error_control());
-        let heard = self.next(mark, id, 500)?;
-        let heard = heard.ok_or_else(|| fail("a heartbeat", "none in 500 ms"))?;
+        let heard = match self.next(mark, id, 500)? {
+            Some(heard) => Some(heard),
+            None => self.next(mark, id, SLOWEST)?,
+        };
+        let heard = heard.ok_or_else(|| fail("a heartbeat", format!("none in {SLOWEST} ms")))?;
         heard.frame.data().first().copied().ok_or_else(|| fail("a heartbeat of one byte", "no byte"))
     }
 
@@ -62,6 +76,12 @@ impl Subject<'_> {
             let left = until.saturating_sub(self.network.now().0 / 1000);
             let boot_ups = self.heard(mark, id).iter().filter(|heard| heard.frame.data() == [0]).count();
             if boot_ups > 0 {
+                return self.pass(SETTLE);
+            }
+            // A boot-up message that says something else than 0 is for NMT-01 to tell; the other checks go on.
+            let is_back =
+                time - left > MUTE && self.heard(mark, id).iter().any(|heard| heard.frame.data() != [0]);
+            if is_back && self.is_served()? {
                 return self.pass(SETTLE);
             }
             if left == 0 {

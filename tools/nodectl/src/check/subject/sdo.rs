@@ -184,6 +184,18 @@ impl Subject<'_> {
         }
     }
 
+    /// Skips the check where the device does not have an object, or not for us to write.
+    pub(in crate::check) fn need_writable(&mut self, index: u16, sub: u8) -> Outcome {
+        self.need(index, sub)?;
+        let value = self.read(index, sub)?;
+        match self.try_write(index, sub, &value)? {
+            Err(Refusal(abort::READ_ONLY)) => {
+                Err(skip(format!("{} cannot be written", Place(at(index, sub)))))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Writes bytes that have to be taken. What was there before is written back after the check.
     pub(in crate::check) fn write(&mut self, index: u16, sub: u8, value: &[u8]) -> Outcome {
         let place = Place(at(index, sub));

@@ -1,0 +1,58 @@
+//! zencan-node, called as its documentation says, as a station of a simulated bus.
+
+use canopen::{Duration, Frame, Instant, Transmit};
+use nodectl::bus::Station;
+use zencan_node::Callbacks;
+use zencan_node::common::messages::{CanId, CanMessage};
+
+#[allow(missing_docs, unreachable_pub, clippy::all)]
+mod generated {
+    zencan_node::include_modules!(NODE);
+}
+
+/// Its node-ID.
+pub const ID: u8 = 5;
+
+/// How often the node is called.
+const PERIOD: Duration = Duration::from_millis(1);
+
+/// The node. Its dictionary is global, so a process has one.
+pub struct Zencan(zencan_node::Node<'static>);
+
+impl Zencan {
+    /// A node that boots with its first call. It has no memory to save in: that is left to the application.
+    #[must_use]
+    #[allow(clippy::new_without_default)] // There is one.
+    pub fn new() -> Zencan {
+        let id = zencan_node::common::NodeId::new(ID).expect("a node-ID");
+        let (mailbox, state) = (&generated::NODE_MBOX, &generated::NODE_STATE);
+        Zencan(zencan_node::Node::new(id, Callbacks::new(), mailbox, state, &generated::OD_TABLE))
+    }
+
+    fn run(&mut self, now: Instant, out: &mut impl Transmit) {
+        self.0.process(now.0);
+        while let Some(message) = generated::NODE_MBOX.next_transmit_message() {
+            let id = u16::try_from(message.id().raw()).unwrap_or(0);
+            if let Some(frame) = Frame::new(id, message.data()) {
+                // The simulated bus has room for any number of frames.
+                let _ = out.send(frame);
+            }
+        }
+    }
+}
+
+impl Station for Zencan {
+    fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
+        let id = CanId::Std(frame.id());
+        let message =
+            if frame.is_remote() { CanMessage::new_rtr(id) } else { CanMessage::new(id, frame.data()) };
+        // A message that the mailbox does not want is for somebody else.
+        let _ = generated::NODE_MBOX.store_message(message);
+        self.run(now, out);
+    }
+
+    fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant {
+        self.run(now, out);
+        now + PERIOD
+    }
+}
