@@ -1,7 +1,7 @@
 //! What must never happen, made to happen: the node comes back and says why.
 
 use crate::chip_faults::{peek, poke};
-use crate::support::{SECOND, comes_back, run, running};
+use crate::support::{Master, SECOND, comes_back, read, run, running};
 use canbus::Time;
 
 /// The first word of RAM, below which the stack must not grow, and a place that no image uses.
@@ -130,6 +130,9 @@ fn the_bootloader_does_not_start_an_erased_application() {
     machine.power_off();
     machine.power_on(Time::ZERO);
     let after = run(&mut world, SECOND);
-    assert_eq!(after.nodes[0].heard.boot_ups, boot_ups);
+    assert_eq!(after.nodes[0].heard.boot_ups, boot_ups + 1);
     assert!(after.nodes[0].incidents.is_empty(), "{after}");
+    // What has booted at the node-ID of the board is the bootloader.
+    let master = Master::join(&mut world);
+    assert_eq!(read(&mut world, &master, (0x1000, 0)), u32::from_be_bytes(*b"BOOT"));
 }

@@ -45,6 +45,6 @@ mod tests {
     #[test]
     fn both_images_have_tasks() {
         assert_eq!(of("firmware").unwrap().len(), 7);
-        assert_eq!(of("bootloader").unwrap().len(), 2);
+        assert_eq!(of("bootloader").unwrap().len(), 3);
     }
 }
