@@ -59,7 +59,7 @@ fn messages() -> Vec<Switch> {
         fault(
             "does not tell the end of an error",
             &["EMC-24"],
-            loses(|look| look.is(Way::Out, EMCY) && look.frame.data()[..2] == [0, 0]),
+            loses(|look| look.is(Way::Out, EMCY) && look.frame.data().starts_with(&[0, 0])),
         ),
         fault(
             "keeps an error in 1001h",

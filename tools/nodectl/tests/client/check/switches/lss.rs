@@ -58,7 +58,7 @@ pub(super) fn switches() -> Vec<Switch> {
         fault(
             "is not identified",
             &["LSS-12"],
-            loses(|look| look.is(Way::Out, TOLD) && look.frame.data()[0] == 0x4F),
+            loses(|look| look.is(Way::Out, TOLD) && look.frame.data().first() == Some(&0x4F)),
         ),
         fault("is identified out of its range", &["LSS-13"], always_tells(0x4B, 0x4F)),
         fault("says that it has no node-ID", &["LSS-14"], always_tells(0x4C, 0x50)),
@@ -79,8 +79,8 @@ pub(super) fn switches() -> Vec<Switch> {
             "is deaf to SDO while LSS has selected it",
             &["LSS-29"],
             Box::new(move |look| {
-                is_selected |= look.is(Way::Out, TOLD) && look.frame.data()[0] == 0x44;
-                is_selected &= !(look.is(Way::In, ASKED) && look.frame.data()[..2] == [4, 0]);
+                is_selected |= look.is(Way::Out, TOLD) && look.frame.data().first() == Some(&0x44);
+                is_selected &= !(look.is(Way::In, ASKED) && look.frame.data().starts_with(&[4, 0]));
                 if is_selected && look.is(Way::In, REQUEST) {
                     look.pass = None;
                 }

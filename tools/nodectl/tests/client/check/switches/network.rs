@@ -262,7 +262,7 @@ fn consumer() -> Vec<Switch> {
         fault(
             "does not tell a lost heartbeat",
             &["ERR-22", "ERR-26", "ERR-47", "EMC-20"],
-            loses(|look| look.is(Way::Out, EMCY) && look.frame.data()[..2] == LOST[..2]),
+            loses(|look| look.is(Way::Out, EMCY) && look.frame.data().starts_with(&LOST[..2])),
         ),
         fault(
             "stays as it is without heartbeat",
@@ -284,7 +284,7 @@ fn consumer() -> Vec<Switch> {
             "goes to Pre-operational although 1029h says stay",
             &["ERR-24"],
             Box::new(|look| {
-                if look.is(Way::Out, EMCY) && look.frame.data()[..2] == LOST[..2] {
+                if look.is(Way::Out, EMCY) && look.frame.data().starts_with(&LOST[..2]) {
                     look.to_device.push(command(0x80));
                 }
             }),
@@ -293,7 +293,7 @@ fn consumer() -> Vec<Switch> {
             "tells a lost heartbeat once",
             &["ERR-26"],
             Box::new(move |look| {
-                if look.is(Way::Out, EMCY) && look.frame.data()[..2] == LOST[..2] {
+                if look.is(Way::Out, EMCY) && look.frame.data().starts_with(&LOST[..2]) {
                     told += 1;
                     if told > 1 {
                         look.pass = None;

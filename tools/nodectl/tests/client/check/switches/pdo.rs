@@ -209,7 +209,7 @@ fn receipt() -> Vec<Switch> {
         fault(
             "does not tell a short RPDO",
             &["PDO-93"],
-            loses(|look| look.is(Way::Out, EMCY) && look.frame.data()[..2] == [0x10, 0x82]),
+            loses(|look| look.is(Way::Out, EMCY) && look.frame.data().starts_with(&[0x10, 0x82])),
         ),
         fault(
             "takes no RPDO that is too long",
@@ -243,7 +243,7 @@ fn receipt() -> Vec<Switch> {
         fault(
             "does not tell an RPDO that is late",
             &["PDO-98"],
-            loses(|look| look.is(Way::Out, EMCY) && look.frame.data()[..2] == [0x50, 0x82]),
+            loses(|look| look.is(Way::Out, EMCY) && look.frame.data().starts_with(&[0x50, 0x82])),
         ),
     ]
 }

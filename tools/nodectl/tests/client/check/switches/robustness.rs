@@ -53,7 +53,7 @@ fn foreign() -> Vec<Switch> {
             "answers LSS requests for others",
             &["ROB-06"],
             replies(|look| {
-                (look.frame.id() == 0x7E5 && look.frame.data()[0] == 0x11)
+                (look.frame.id() == 0x7E5 && look.frame.data().first() == Some(&0x11))
                     .then(|| frame(0x7E4, &[0x11, 0, 0, 0, 0, 0, 0, 0]))
             }),
         ),
@@ -133,7 +133,8 @@ fn flood(most: u32, is_meant: impl Fn(&Look) -> bool) -> impl FnMut(&Look) -> bo
         if look.way != Way::In || !is_meant(look) {
             return false;
         }
-        count = if look.now.0 - last.0 < 1000 { count + 1 } else { 1 };
+        // Frames follow each other without a gap: between requests whose answers are waited for there are those.
+        count = if look.now.0 - last.0 < 696 { count + 1 } else { 1 };
         last = look.now;
         count > most
     }

@@ -284,7 +284,7 @@ fn blocks() -> Vec<Switch> {
             Box::new(|look| {
                 if look.way == Way::Out
                     && look.frame.id() == RESPONSE
-                    && look.frame.data()[..2] == [0x01, b'a']
+                    && look.frame.data().starts_with(&[0x01, b'a'])
                 {
                     let mut data = [0; 8];
                     data.copy_from_slice(look.frame.data());
