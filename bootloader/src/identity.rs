@@ -30,7 +30,7 @@ impl Identity {
     }
 }
 
-/// What LSS or the factory has stored.
+/// The device record that LSS or the factory has stored.
 fn stored() -> Option<DeviceRecord> {
     storage::device_record(&mut Memory(parameter_pages()), Pages::new(0, PARAMETER_PAGE))
 }

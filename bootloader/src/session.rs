@@ -33,7 +33,7 @@ pub(crate) struct Session {
     can: Controller,
     timing: BitTiming,
     back_off: BackOff,
-    /// What was left to copy at the start is being copied: after that the application starts, if there is one.
+    /// A copy that an earlier start has begun is being finished: after the copy the application starts, if there is one.
     is_resuming: bool,
     /// The chip is to be reset, at the latest then.
     reset: Option<Instant>,
@@ -87,7 +87,7 @@ impl Session {
         self.can.watch_errors();
     }
 
-    /// What the controller has heard since the last call.
+    /// Frames and errors that the controller has heard since the last call.
     pub(crate) fn heard(&mut self) -> Heard {
         self.can.heard()
     }
@@ -140,7 +140,7 @@ impl Session {
         next
     }
 
-    /// What was left to copy is copied or was refused: the application starts in either case, if it is good.
+    /// The copy of an earlier start is finished or was refused: the application starts in either case, if the application is good.
     fn start_if_good(&mut self, now: Instant) {
         let start = Start { stay: false, trial: retained::trial(), proof: Proof::Waived };
         let flash = self.device.application_mut().updater().flash();

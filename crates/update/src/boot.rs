@@ -16,11 +16,11 @@ pub struct Start {
     pub stay: bool,
     /// The crashes of the application, this reset counted.
     pub trial: Trial,
-    /// What is known of the signature of the application.
+    /// How far the signature of the application is proven.
     pub proof: Proof,
 }
 
-/// What is known of the signature of the application.
+/// How far the signature of the application is proven since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proof {
     /// Nothing, as after power-on: it is checked.

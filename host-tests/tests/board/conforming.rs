@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use clap::Parser;
 use host_tests::thorough::is_thorough;
-use nodectl::cli::Cli;
+use nodectl::cli::{Cli, Failure};
 use serde_json::Value;
 
 use crate::adapter::{Shared, run};
@@ -15,10 +15,14 @@ use crate::update::HEADER;
 /// The virtual time that a device may take.
 const LIMIT: f64 = 180.0;
 
-fn command(world: &Shared, line: &[&str]) -> String {
+/// Does a command; its JSON, and how it ended.
+fn json(world: &Shared, line: &[&str]) -> (String, Result<(), Failure>) {
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json"].iter().chain(line);
-    let cli = Cli::try_parse_from(line).unwrap();
-    let (printed, result) = run(world, &cli, |_| ());
+    run(world, &Cli::try_parse_from(line).unwrap(), |_| ())
+}
+
+fn command(world: &Shared, line: &[&str]) -> String {
+    let (printed, result) = json(world, line);
     result.unwrap_or_else(|failure| panic!("{failure}: {printed}"));
     printed
 }
@@ -26,9 +30,7 @@ fn command(world: &Shared, line: &[&str]) -> String {
 /// Checks the node, and gives the report.
 fn check(world: &Shared, more: &[&str]) -> Value {
     let start = world.borrow().now();
-    let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "check", "--yes"];
-    let cli = Cli::try_parse_from(line.iter().chain(more)).unwrap();
-    let (printed, result) = run(world, &cli, |_| ());
+    let (printed, result) = json(world, &[&["check", "--yes"], more].concat());
     let report: Value = serde_json::from_str(printed.lines().last().unwrap_or_default())
         .unwrap_or_else(|error| panic!("{error}: {printed} {result:?}"));
     let took = (world.borrow().now() - start).as_secs_f64();

@@ -5,14 +5,15 @@
 //! in time (latest value), the watchdog is fed (supervision), and what reset and battery keep is valid (retained memory, backup SRAM).
 
 use canbus::Time;
+use host_tests::thorough::either;
 use sim::stimuli::Stimulus;
 use sim::world::World;
 
 use crate::support::{Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, SYNC, frame, read, world, write};
 
-/// Seeds that are tried; all of them with THOROUGH set.
+/// Seeds that are tried.
 fn seeds() -> std::ops::Range<u64> {
-    0..if std::env::var_os("THOROUGH").is_some() { 50 } else { 2 }
+    0..either(2, 50)
 }
 
 const HEARTBEAT_TIME: (u16, u8) = (0x1017, 0);

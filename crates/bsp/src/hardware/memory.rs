@@ -45,7 +45,7 @@ pub fn parameters() -> Range<u32> {
     unsafe { region(&_parameters_start, &_parameters_end) }
 }
 
-/// What the parameter store holds, for the bootloader: nobody programs these pages while it runs.
+/// The two pages of the parameter store, for the bootloader: nobody programs the pages while the bootloader runs.
 pub fn parameter_pages() -> &'static [u8; 2 * PARAMETER_PAGE as usize] {
     // SAFETY: the region is as long (memory.x): flash, readable whatever it holds, and in the bootloader nobody programs it.
     unsafe { &*(parameters().start as *const _) }

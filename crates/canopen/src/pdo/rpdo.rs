@@ -17,7 +17,7 @@ pub(crate) struct RpdoSettings {
 }
 
 impl RpdoSettings {
-    /// Of an RPDO that is not valid.
+    /// Settings of an RPDO that is not valid.
     const UNUSED: RpdoSettings = RpdoSettings {
         id: CanId::NMT,
         is_synchronous: false,

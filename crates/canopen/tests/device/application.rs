@@ -18,7 +18,7 @@ pub(crate) const PRESSURE_RAIL: u8 = 1;
 pub(crate) const TEMPERATURE_RAIL: u8 = 2;
 pub(crate) const UNEXPECTED_RESET: u8 = 3;
 
-/// What the device told its application.
+/// Calls of the application by the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Told {
     Written(u16, u8),
@@ -36,10 +36,10 @@ pub(crate) struct Numbers {
     pub(crate) start_up: u8,
     pub(crate) domain: Vec<u8>,
     pub(crate) downloads: usize,
-    /// What is stored: communication, application, calibration.
+    /// The stored values: communication, application, calibration.
     pub(crate) stored: [Vec<u8>; 3],
     pub(crate) is_damaged: bool,
-    /// What the device said of the groups that it loaded.
+    /// The reports of the device about the groups that it loaded.
     pub(crate) loaded: Vec<(Group, bool)>,
     pub(crate) told: Vec<Told>,
     /// The TPDO whose frames are events; 0 for none.

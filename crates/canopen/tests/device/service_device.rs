@@ -116,7 +116,7 @@ fn a_heartbeat_begins_when_its_time_is_written() {
     let mut bench = Bench::booted();
     assert_eq!(bench.write(0x1017, 0, &[100, 0]), Ok(()));
     let mut out = Sent::default();
-    // What waits for the caller is handed over first.
+    // Actions that wait for the caller are handed over first.
     while bench.device.poll(bench.now, &mut out).action.is_some() {}
     out.0.clear();
     let heartbeat = Frame::new(0x700 + u16::from(ID), &[0x7F]).unwrap();

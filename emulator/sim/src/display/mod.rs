@@ -84,3 +84,9 @@ fn log_line(line: &Line) -> String {
 fn name(node: &NodeStatus) -> String {
     if node.id == node.node_id { node.id.to_string() } else { format!("{} ({})", node.id, node.node_id) }
 }
+
+/// A line cut into lines of so many letters.
+fn wrapped(line: &str, width: usize) -> Vec<ratatui::text::Line<'static>> {
+    let letters: Vec<char> = line.chars().collect();
+    letters.chunks(width).map(|part| ratatui::text::Line::from(part.iter().collect::<String>())).collect()
+}

@@ -106,6 +106,6 @@ impl Shown {
                 lines.push(format!("{INDENT}{word}"));
             }
         }
-        lines.iter().flat_map(|line| super::screen::wrapped(line, width.max(1))).collect()
+        lines.iter().flat_map(|line| super::wrapped(line, width.max(1))).collect()
     }
 }

@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 
 use crossterm::event::{self, Event};
 use ratatui::DefaultTerminal;
-use ratatui::text::Line;
 
 use super::view::View;
 use crate::console::Command;
@@ -68,10 +67,4 @@ impl Drop for Screen {
     fn drop(&mut self) {
         ratatui::restore();
     }
-}
-
-/// A line cut into lines of so many letters.
-pub(super) fn wrapped(line: &str, width: usize) -> Vec<Line<'static>> {
-    let letters: Vec<char> = line.chars().collect();
-    letters.chunks(width).map(|part| Line::from(part.iter().collect::<String>())).collect()
 }

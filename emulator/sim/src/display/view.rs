@@ -134,7 +134,7 @@ impl View {
     fn log_lines(&self, area: Rect, border: usize) -> Vec<Line<'static>> {
         let inside = |length: u16| usize::from(length).saturating_sub(border);
         let (room, width) = (inside(area.height), inside(area.width).max(1));
-        let lines: Vec<Line> = self.log.iter().flat_map(|line| super::screen::wrapped(line, width)).collect();
+        let lines: Vec<Line> = self.log.iter().flat_map(|line| super::wrapped(line, width)).collect();
         lines[lines.len().saturating_sub(room)..].to_vec()
     }
 }

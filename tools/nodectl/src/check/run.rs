@@ -144,8 +144,8 @@ impl Subject<'_> {
             }
             self.put_back()?;
         }
-        let states = [State::Operational, State::Stopped, State::PreOperational];
-        Ok(told(self).and_then(|told| states.into_iter().find(|state| state.code() == told & 0x7F)))
+        let state = told(self).and_then(|told| State::from_code(told & 0x7F));
+        Ok(state.filter(|state| *state != State::Initialising))
     }
 
     /// Where every check begins.

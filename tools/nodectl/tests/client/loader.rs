@@ -3,9 +3,10 @@
 //! It behaves as devices in the field do: stopping and starting the program is not acknowledged, the node then answers
 //! in its new state; erasing takes time, in which SDO is served.
 
+use crate::wire::Answers;
 use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Object, Type};
 use canopen::sdo::{Abort, Multiplexer, Response};
-use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, QueueFull, Transmit};
+use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, Transmit};
 use nodectl::bus::Station;
 
 const fn read_only(index: u16, sub: u8, kind: Type) -> Object {
@@ -179,21 +180,6 @@ impl Loader {
     fn understands(&self, frame: &Frame) -> bool {
         let is_block_download = frame.data().first().is_some_and(|byte| byte >> 5 == 6);
         self.device.application().has_blocks || !is_block_download
-    }
-}
-
-/// A queue for the answer to one frame.
-#[derive(Default)]
-struct Answers(Vec<Frame>);
-
-impl Transmit for Answers {
-    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
-        self.0.push(frame);
-        Ok(())
-    }
-
-    fn room(&self) -> usize {
-        usize::MAX
     }
 }
 

@@ -6,7 +6,7 @@ use nodectl::bus::Station;
 use crate::commands::{failed, printed, run};
 use crate::loader::Loader;
 use crate::pressure::Pressure;
-use crate::wire::{Fate, Wire};
+use crate::wire::{Answers, Fate, Wire};
 
 fn with_serial(id: impl Into<Option<u8>>, serial: u32) -> Pressure {
     Pressure::new(id).with_serial(serial)
@@ -107,7 +107,7 @@ fn slaves_behind_a_slow_gateway_are_found() {
     }
     impl Station for Slow {
         fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) {
-            let mut answers = Answers(vec![]);
+            let mut answers = Answers::default();
             self.node.receive(frame, now, &mut answers);
             self.late.extend(answers.0.into_iter().map(|frame| (now + Duration::from_millis(12), frame)));
             self.poll(now, out);
@@ -125,19 +125,6 @@ fn slaves_behind_a_slow_gateway_are_found() {
     let wire = Wire::new(Slow { node: with_serial(None, 77), late: vec![] });
     let lines = printed(&wire, &["lss", "scan", "--step", "5"]);
     assert!(lines.contains("serial number 0000004Dh"), "{lines}");
-}
-
-struct Answers(Vec<Frame>);
-
-impl Transmit for Answers {
-    fn send(&mut self, frame: Frame) -> Result<(), canopen::QueueFull> {
-        self.0.push(frame);
-        Ok(())
-    }
-
-    fn room(&self) -> usize {
-        usize::MAX
-    }
 }
 
 const EVIL: &[u8] = b"\x1b]0;x\x07\r\nnode 9\x9b";

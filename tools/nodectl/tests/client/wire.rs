@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::io;
 use std::rc::Rc;
 
-use canopen::{Duration, Frame, Instant, NodeId};
+use canopen::{Duration, Frame, Instant, NodeId, QueueFull, Transmit};
 use nodectl::Network;
 use nodectl::bus::{Bus, BusError, Received, Simulated, Station};
 use nodectl::sdo::{Client, Options};
@@ -20,6 +20,21 @@ pub(crate) enum Fate {
     BecomesAnother(Frame),
     /// The client's way to the bus breaks at this frame.
     BreaksTheBus,
+}
+
+/// What a device sends, in a queue that is never full.
+#[derive(Default)]
+pub(crate) struct Answers(pub(crate) Vec<Frame>);
+
+impl Transmit for Answers {
+    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
+        self.0.push(frame);
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        usize::MAX
+    }
 }
 
 struct State<S> {

@@ -1,6 +1,7 @@
 //! PDOs of the device: which there are, and how one is configured (CiA 301, 7.5.2.36 and 7.5.2.38).
 
 use canopen::nmt::State;
+use canopen::pdo::MappedObject;
 use canopen::sdo::Multiplexer;
 use eds::Entry;
 
@@ -9,6 +10,7 @@ use super::sheet::size;
 use crate::check::Outcome;
 use crate::check::verdict::{fail, skip};
 use crate::object::at;
+use crate::pdo_parameters::slots;
 
 /// Bit 31 of a COB-ID: the PDO does not exist.
 pub(in crate::check) const OFF: u32 = 1 << 31;
@@ -169,9 +171,9 @@ impl Subject<'_> {
     pub(in crate::check) fn mapping(&mut self, pdo: u16) -> Outcome<Vec<(Multiplexer, u8)>> {
         let count = self.number(pdo | 0x0200, 0)?;
         let mut objects = Vec::new();
-        for sub in 1..=u8::try_from(count).ok().filter(|count| *count <= 64).unwrap_or(0) {
-            let [bits, sub, low, high] = self.number(pdo | 0x0200, sub)?.to_le_bytes();
-            objects.push((at(u16::from_le_bytes([low, high]), sub), bits));
+        for slot in slots(count) {
+            let object = MappedObject::parse(self.number(pdo | 0x0200, slot)?);
+            objects.push((at(object.index, object.sub), object.bits));
         }
         Ok(objects)
     }

@@ -1,10 +1,10 @@
 //! A device on the library's own device, with everything that a check asks for: also node guarding, a SYNC producer and sub-index
 //! FFh, which the library leaves out.
 
+use crate::wire::Answers;
 use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Sizes, Type};
 use canopen::{
-    Action, Application, Device, Duration, Frame, Instant, Job, Next, NodeId, QueueFull, Soundness, Stored,
-    Transmit, objects,
+    Action, Application, Device, Duration, Frame, Instant, Job, Next, NodeId, Soundness, Stored, objects,
 };
 use nodectl::check::Profile;
 
@@ -177,21 +177,6 @@ impl Application for App {
     }
 }
 
-/// The frames that the device sends.
-#[derive(Default)]
-struct Out(Vec<Frame>);
-
-impl Transmit for Out {
-    fn send(&mut self, frame: Frame) -> Result<(), QueueFull> {
-        self.0.push(frame);
-        Ok(())
-    }
-
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-}
-
 /// Bytes of the image of any of the dictionaries.
 const SIZE: usize = 2048;
 /// Enough for any of them.
@@ -201,7 +186,7 @@ const ROOM: Sizes = Sizes { image: SIZE, tpdos: 8, rpdos: 8, watches: 4, scanned
 pub(super) struct Whole {
     dictionary: &'static Dictionary,
     device: canopen::device!(App, room: ROOM),
-    out: Out,
+    out: Answers,
     is_started: bool,
     toggle: bool,
     /// When the master is lost.
@@ -217,7 +202,7 @@ impl Whole {
         Whole {
             dictionary,
             device: Device::new(dictionary, NodeId::new(ID), App::default()),
-            out: Out::default(),
+            out: Answers::default(),
             is_started: false,
             toggle: false,
             life: Instant::NEVER,
