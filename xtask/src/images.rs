@@ -15,36 +15,61 @@ pub(crate) fn dir() -> PathBuf {
     target_dir().join(TRIPLE).join("release")
 }
 
-/// Compiles the firmware and the bootloader.
+/// A bootloader that starts what nobody has signed, and trusts the key that everybody knows: for a board on a desk, emulated or not.
+pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development"];
+
+/// Compiles the firmware and the bootloader for development.
 pub(crate) fn compile_node(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "firmware 1/2", &["firmware", "bootloader"])
 }
 
-/// Compiles everything that the tests run on the emulated core.
+/// Compiles everything that the tests run on the emulated core, for development.
 pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "images", &["firmware", "bootloader", "mechanics-images"])
 }
 
-/// Compiles the bootloader as its owner does, with a key that only the tests know, and puts the file beside the one of a
-/// development board.
-pub(crate) fn compile_production(toolchain: &Toolchain) -> Result<()> {
-    let key = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-key.hex"))?;
-    let package = ["--release", "-p", "bootloader", "--features", "production"];
+/// Compiles the firmware and the bootloader for the owner of the keys in the environment. The owner signs the firmware.
+pub(crate) fn build_for_owner() -> Result<()> {
+    ensure!(
+        std::env::var_os("UPDATE_PUBLIC_KEY").is_some(),
+        "the bootloader needs the key of its owner in UPDATE_PUBLIC_KEY; `cargo xtask sign key FILE` makes one. \
+         For a board on a desk: cargo xtask images --development"
+    );
+    let packages = ["--release", "-p", "firmware", "-p", "bootloader"];
+    progress::build("images", &mut Toolchain::ensure()?.cargo("build", &packages))?;
+    println!("{} is to be signed: cargo xtask sign image", dir().join("firmware").display());
+    Ok(())
+}
+
+/// Compiles the bootloader as its owner does, with keys that only the tests know, and puts the file beside the one for
+/// development. Without a key it must not compile.
+pub(crate) fn compile_owner(toolchain: &Toolchain) -> Result<()> {
+    let keys = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-keys.hex"))?;
+    let package = ["--release", "-p", "bootloader"];
     let mut command = toolchain.cargo("build", &package);
-    progress::build("production bootloader", command.env("UPDATE_PUBLIC_KEY", key.trim()))?;
-    std::fs::copy(dir().join("bootloader"), dir().join("bootloader-production"))?;
-    let refused = toolchain.cargo("build", &package).env_remove("UPDATE_PUBLIC_KEY").output()?;
+    command.envs(KEYS.into_iter().zip(keys.lines()));
+    progress::build("bootloader of an owner", &mut command)?;
+    std::fs::copy(dir().join("bootloader"), dir().join("bootloader-owner"))?;
+    let mut keyless = toolchain.cargo("build", &package);
+    for key in KEYS {
+        keyless.env_remove(key);
+    }
+    let refused = keyless.output()?;
     let says = String::from_utf8_lossy(&refused.stderr);
     ensure!(
-        !refused.status.success() && says.contains("needs a key of its own"),
-        "a production bootloader was built with the development key:\n{says}"
+        !refused.status.success() && says.contains("needs a key of its owner"),
+        "a bootloader that is not for development was built with the development key:\n{says}"
     );
     Ok(())
 }
 
+/// The variables that the keys come in.
+const KEYS: [&str; 2] = ["UPDATE_PUBLIC_KEY", "UPDATE_PUBLIC_KEY_2"];
+
 fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {
     let mut command = toolchain.cargo("build", &["--release"]);
-    progress::build(what, command.args(packages.iter().flat_map(|package| ["-p", package])))?;
+    command.args(DEVELOPMENT).args(packages.iter().flat_map(|package| ["-p", package]));
+    progress::build(what, &mut command)?;
     for name in ["firmware", "bootloader"] {
         ensure!(dir().join(name).exists(), "cargo built no {name} in {}", dir().display());
     }
