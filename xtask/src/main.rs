@@ -5,6 +5,7 @@ mod callgraph;
 mod command;
 mod coverage;
 mod eds;
+mod flash;
 mod fuzz;
 mod images;
 mod mutants;
@@ -44,6 +45,8 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         flags: Vec<OsString>,
     },
+    /// Put bootloader and signed application on a board at a debug probe, and print the log (docs/board.md)
+    Flash(flash::Flags),
     /// Write eds/*.eds and docs/object-dictionary.md from the dictionary tables
     Eds,
     /// Write docs/plots/*.svg and the tables of docs/measuring.md from the measurement chain
@@ -96,6 +99,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Some(Command::Sim { flags }) => sim::run(&flags),
+        Some(Command::Flash(flags)) => flash::run(&flags),
         Some(command) => run(command).map(|()| ExitCode::SUCCESS),
         None => list().map(|()| ExitCode::SUCCESS),
     };
@@ -108,7 +112,7 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<()> {
     match command {
         Command::Images => images::build(Tools::ByCargo),
-        Command::Sim { .. } => unreachable!("`sim` is the only command with an exit status of its own"),
+        Command::Sim { .. } | Command::Flash(_) => unreachable!("these have an exit status of their own"),
         Command::Eds => eds::write(),
         Command::Plots => plots::write(),
         Command::Sign { arguments } => own_tool::run("sign", &arguments),
