@@ -54,9 +54,12 @@ impl Flags {
         tool.arg("--bootloader").arg(bootloader).arg("--application").arg(application);
         let flags = [("--dry-run", self.dry_run), ("--no-log", self.no_log)];
         tool.args(flags.iter().filter(|(_, is_set)| *is_set).map(|(flag, _)| flag));
-        self.key.iter().for_each(|key| drop(tool.arg("--key").arg(key)));
-        self.chip.iter().for_each(|chip| drop(tool.args(["--chip", chip])));
-        self.probe.iter().for_each(|probe| drop(tool.args(["--probe", probe])));
+        if let Some(key) = &self.key {
+            tool.arg("--key").arg(key);
+        }
+        for (flag, value) in [("--chip", &self.chip), ("--probe", &self.probe)] {
+            tool.args(value.iter().flat_map(|value| [flag, value]));
+        }
         tool
     }
 }

@@ -43,10 +43,17 @@ pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
 
 /// Compiles the bootloader as its owner does, with a key that only the tests know, and puts the file beside the one of a
 /// development board.
-pub(crate) fn compile_production(toolchain: &Toolchain) -> Result<()> {
+pub(crate) fn compile_owners(toolchain: &Toolchain) -> Result<PathBuf> {
     let key = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-key.hex"))?;
     let bootloader = compile_bootloader(toolchain, Some(key.trim().to_owned()))?;
-    std::fs::copy(bootloader, dir().join("bootloader-production"))?;
+    let owners = dir().join("bootloader-production");
+    std::fs::copy(bootloader, &owners)?;
+    Ok(owners)
+}
+
+/// The same; and without a key of the owner's there is no such bootloader.
+pub(crate) fn compile_production(toolchain: &Toolchain) -> Result<()> {
+    compile_owners(toolchain)?;
     let package = ["--release", "-p", "bootloader", "--features", "production"];
     let refused = toolchain.cargo("build", &package).env_remove("UPDATE_PUBLIC_KEY").output()?;
     let says = String::from_utf8_lossy(&refused.stderr);

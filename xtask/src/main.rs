@@ -5,6 +5,7 @@ mod callgraph;
 mod command;
 mod coverage;
 mod eds;
+mod fault_injection;
 mod flash;
 mod fuzz;
 mod images;
@@ -42,6 +43,13 @@ enum Command {
     #[command(disable_help_flag = true)]
     Sim {
         /// Flags of the simulator
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        flags: Vec<OsString>,
+    },
+    /// Skip instructions and flip bits of registers while the bootloader decides what may start (docs/evidence.md)
+    #[command(disable_help_flag = true)]
+    FaultInjection {
+        /// Flags of the tool
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         flags: Vec<OsString>,
     },
@@ -113,6 +121,7 @@ fn run(command: Command) -> Result<()> {
     match command {
         Command::Images => images::build(Tools::ByCargo),
         Command::Sim { .. } | Command::Flash(_) => unreachable!("these have an exit status of their own"),
+        Command::FaultInjection { flags } => fault_injection::try_all(&flags),
         Command::Eds => eds::write(),
         Command::Plots => plots::write(),
         Command::Sign { arguments } => own_tool::run("sign", &arguments),
@@ -134,7 +143,7 @@ fn run(command: Command) -> Result<()> {
 fn list() -> Result<()> {
     for command in Cli::command().get_subcommands().filter(|command| !command.is_hide_set()) {
         let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-        println!("cargo xtask {:<10} {}", command.get_name(), about.split(" (").next().unwrap_or_default());
+        println!("cargo xtask {:<15} {}", command.get_name(), about.split(" (").next().unwrap_or_default());
     }
     Ok(())
 }

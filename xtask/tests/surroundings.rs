@@ -183,7 +183,8 @@ fn a_board_needs_the_target_too() {
 fn without_a_board_nothing_is_built() {
     let empty = "echo 'No debug probes were found.'";
     for probe_rs in [empty, FAILS] {
-        let machine = Machine::new("no-board").with("probe-rs", &format!("[ \"$1\" = --version ] || {probe_rs}"));
+        let machine =
+            Machine::new("no-board").with("probe-rs", &format!("[ \"$1\" = --version ] || {probe_rs}"));
         let output = machine.xtask(&["flash"]);
         let says = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2));

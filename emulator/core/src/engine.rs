@@ -2,7 +2,8 @@
 
 use chip::{Effect, Peripherals};
 use unicorn_engine::{
-    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn, uc_error,
+    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn,
+    uc_error,
 };
 
 use crate::core::{Core, Halt, Unmapped};

@@ -177,7 +177,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// When the CPU library refuses.
     pub fn skip(&mut self, (address, size): (u32, u32)) -> Result<(), Error> {
         if address == self.pc() {
-            self.set(RegisterARM::PC, address + size | 1);
+            self.set(RegisterARM::PC, (address + size) | 1);
             return Ok(());
         }
         let (first, block) = (self.pc(), self.next_instructions());

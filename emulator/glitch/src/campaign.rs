@@ -15,11 +15,17 @@ use crate::scene::Scene;
 pub struct Extent {
     /// Every so many instructions is a point: 1 takes all.
     pub every: usize,
+    /// The same of those that run more often than [`OFTEN`].
+    pub every_of_loops: usize,
     /// So many bits of registers are flipped at each point, one after the other.
     pub flips: usize,
     /// Threads, each with a board of its own.
     pub boards: usize,
 }
+
+/// What runs more often is a loop of the hashes, of the sums, or of the arithmetic of points: wrong there is the number, not the
+/// decision.
+pub const OFTEN: u64 = 66;
 
 /// A fault that made run what may not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +41,8 @@ pub struct Violation {
 pub struct Campaign {
     /// Instructions that the decision has.
     pub instructions: usize,
+    /// Those of them that run more often than [`OFTEN`].
+    pub loops: usize,
     /// Points at which the program was stopped.
     pub points: usize,
     /// Skips and flips, by what came of them.
@@ -49,17 +57,25 @@ impl Campaign {
     /// # Errors
     /// The image is none for the board, or the decision is wrong without any fault.
     pub fn run(bootloader: &[u8], scene: &Scene, extent: Extent) -> Result<Campaign> {
-        let (visits, outcome) = Rig::new(bootloader)?.survey(scene)?;
+        let mut rig = Rig::new(bootloader)?;
+        let (visits, outcome) = rig.survey(scene)?;
         let expected = if scene.has_good { Outcome::Good } else { Outcome::Stays };
         ensure!(outcome == expected, "{}: without a fault the outcome is {outcome:?}", scene.name);
-        let chosen: Vec<Point> = visits.iter().step_by(extent.every).flat_map(ends).collect();
+        let undisturbed = rig.undisturbed;
+        let (loops, rest): (Vec<&Point>, Vec<&Point>) = visits.iter().partition(|point| point.visit > OFTEN);
+        let chosen = rest
+            .into_iter()
+            .step_by(extent.every)
+            .chain(loops.iter().copied().step_by(extent.every_of_loops));
+        let chosen: Vec<Point> = chosen.flat_map(ends).collect();
         let shares = chosen.chunks(chosen.len().div_ceil(extent.boards.max(1)).max(1));
         let parts: Vec<Result<Campaign>> = thread::scope(|scope| {
-            let boards: Vec<_> =
-                shares.map(|share| scope.spawn(|| part(bootloader, scene, share, extent.flips))).collect();
+            let boards: Vec<_> = shares
+                .map(|share| scope.spawn(|| part(bootloader, scene, share, extent.flips, &undisturbed)))
+                .collect();
             boards.into_iter().map(|board| board.join().map_err(|_| anyhow!("a board was lost"))?).collect()
         });
-        let mut all = Campaign { instructions: visits.len(), ..Campaign::default() };
+        let mut all = Campaign { instructions: visits.len(), loops: loops.len(), ..Campaign::default() };
         for part in parts {
             all.add(part?);
         }
@@ -105,9 +121,16 @@ fn ends(last: &Point) -> impl Iterator<Item = Point> + use<> {
 }
 
 /// What one board does: it runs once, from point to point.
-fn part(bootloader: &[u8], scene: &Scene, points: &[Point], flips: usize) -> Result<Campaign> {
+fn part(
+    bootloader: &[u8],
+    scene: &Scene,
+    points: &[Point],
+    flips: usize,
+    undisturbed: &[u8],
+) -> Result<Campaign> {
     let mut campaign = Campaign::default();
     let mut rig = Rig::new(bootloader)?;
+    rig.undisturbed = undisturbed.to_vec();
     rig.start(scene, points.to_vec())?;
     while let Some(point) = rig.next(scene.has_good)? {
         let moment = rig.stop()?;

@@ -20,8 +20,11 @@ struct Cli {
     #[arg(long)]
     scene: Option<String>,
     /// Take every so many instructions
-    #[arg(long, default_value_t = 1)]
-    every: usize,
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    every: u16,
+    /// Take every so many of those in the loops of hashes, sums and points
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    every_of_loops: u16,
     /// Flip so many bits of registers at each point; there are 480
     #[arg(long, default_value_t = 4)]
     flips: usize,
@@ -42,7 +45,12 @@ fn run(cli: &Cli) -> Result<()> {
         .with_context(|| format!("cannot read {}", cli.bootloader.display()))?;
     let places = Places::of(&bootloader)?;
     let boards = std::thread::available_parallelism()?.get();
-    let extent = Extent { every: cli.every.max(1), flips: cli.flips, boards };
+    let extent = Extent {
+        every: cli.every.into(),
+        every_of_loops: cli.every_of_loops.into(),
+        flips: cli.flips,
+        boards,
+    };
     let mut violations = 0;
     for scene in Scene::all()? {
         if cli.scene.as_ref().is_some_and(|name| !scene.name.contains(name.as_str())) {
@@ -52,7 +60,12 @@ fn run(cli: &Cli) -> Result<()> {
         let campaign = Campaign::run(&bootloader, &scene, extent)?;
         print(&scene, &campaign, begin.elapsed().as_secs_f64());
         for violation in &campaign.violations {
-            println!("  BROKEN {:?}, visit {}: {}", violation.fault, violation.point.visit, places.name(violation.point.address));
+            println!(
+                "  BROKEN {:?}, visit {}: {}",
+                violation.fault,
+                violation.point.visit,
+                places.name(violation.point.address)
+            );
         }
         violations += campaign.violations.len();
     }
@@ -63,8 +76,9 @@ fn run(cli: &Cli) -> Result<()> {
 
 fn print(scene: &Scene, campaign: &Campaign, seconds: f64) {
     println!("{}: {}", scene.name, scene.what);
-    let (instructions, points) = (campaign.instructions, campaign.points);
-    println!("  {points} points at {instructions} instructions, {} faults, {seconds:.0} s", campaign.faults());
+    let Campaign { instructions, loops, points, .. } = campaign;
+    println!("  {instructions} instructions, {loops} of them in loops of hashes, sums and points");
+    println!("  {} faults at {points} points, {seconds:.0} s", campaign.faults());
     for ((kind, what), count) in &campaign.outcomes {
         println!("  {count:>8} {kind}: {what}");
     }

@@ -16,7 +16,8 @@ impl Places {
         let functions = file.symbols().filter(|symbol| symbol.kind() == object::SymbolKind::Text);
         let mut all: Vec<(u32, String)> = functions
             .map(|symbol| {
-                let name = addr2line::demangle_auto(symbol.name().unwrap_or_default().into(), None).into_owned();
+                let name =
+                    addr2line::demangle_auto(symbol.name().unwrap_or_default().into(), None).into_owned();
                 (symbol.address() as u32 & !1, name)
             })
             .collect();

@@ -1,5 +1,7 @@
 //! A board at which one thing goes wrong.
 
+use std::ops::Range;
+
 use anyhow::{Context, Result, bail};
 use canbus::Time;
 use chip::{Board, Stm32f4, Variant};
@@ -11,6 +13,8 @@ use crate::scene::{Scene, Start};
 const FLASH: u32 = 512 * 1024;
 /// Where code runs that was copied from flash.
 const RAM: u32 = 0x2000_0000;
+/// The region RETAINED (memory.x).
+const RETAINED: Range<u32> = 0x2001_FF00..0x2002_0000;
 const PC: u8 = 15;
 
 /// How long a board is given at once.
@@ -45,6 +49,8 @@ pub enum Outcome {
 pub(crate) struct Rig {
     machine: Machine<Stm32f4>,
     bootloader: Vec<u8>,
+    /// What a reset leaves alone, at the end of a decision without a fault.
+    pub(crate) undisturbed: Vec<u8>,
 }
 
 impl Rig {
@@ -52,7 +58,7 @@ impl Rig {
     pub(crate) fn new(bootloader: &[u8]) -> Result<Rig> {
         let chip = Stm32f4::new(Variant::F446, Board::default());
         let machine = Machine::new(Model::stm32f4(FLASH), chip)?;
-        Ok(Rig { machine, bootloader: bootloader.to_vec() })
+        Ok(Rig { machine, bootloader: bootloader.to_vec(), undisturbed: Vec::new() })
     }
 
     /// Brings the board to the start at which it decides, and watches from there for these points.
@@ -103,7 +109,16 @@ impl Rig {
         self.start(scene, Vec::new())?;
         self.next(scene.has_good)?;
         let visits = self.machine.visits().into_iter().filter(|point| point.address >= RAM).collect();
-        Ok((visits, self.outcome(scene.has_good)?))
+        let outcome = self.outcome(scene.has_good)?;
+        self.undisturbed = self.retained();
+        Ok((visits, outcome))
+    }
+
+    /// What a reset leaves alone.
+    fn retained(&self) -> Vec<u8> {
+        let mut bytes = vec![0; RETAINED.len()];
+        let _ = self.machine.read(RETAINED.start, &mut bytes);
+        bytes
     }
 
     /// A moment to go back to, out of the watch.
@@ -118,18 +133,22 @@ impl Rig {
 
     /// The skips that are possible here.
     pub(crate) fn skips(&self) -> Vec<Fault> {
-        self.machine.next_instructions().into_iter().map(|(address, size)| Fault::Skip(address, size)).collect()
+        self.machine
+            .next_instructions()
+            .into_iter()
+            .map(|(address, size)| Fault::Skip(address, size))
+            .collect()
     }
 
-    /// Does it, and runs to the end. What has settled gets another start: a fault must not leave a proof behind that the next start
-    /// would trust.
+    /// Does it, and runs to the end. What has settled gets another start where the fault has changed what the next start goes by: it
+    /// must not leave a proof behind.
     pub(crate) fn disturb(&mut self, fault: Fault, has_good: bool) -> Result<Outcome> {
         match fault {
             Fault::Skip(address, size) => self.machine.skip((address, size))?,
             Fault::Flip(register, bit) => self.machine.flip(register, bit),
         }
         let outcome = self.outcome(has_good)?;
-        if outcome != Outcome::Stays {
+        if outcome != Outcome::Stays || self.retained() == self.undisturbed {
             return Ok(outcome);
         }
         self.machine.set_register(PC, 0x3000_0000);

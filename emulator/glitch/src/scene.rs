@@ -1,6 +1,7 @@
 //! What lies in the flash when a board is switched on, and what the bootloader has to make of it.
 
 use anyhow::{Context, Result, ensure};
+use bsp::sectors;
 use bsp::update_layout::LAYOUT;
 use ed25519_dalek::SigningKey;
 use sign::image::Image;
@@ -11,8 +12,6 @@ use crate::program::{BAD, GOOD, code};
 
 /// The secret key whose public half the bootloader was built with: `cargo xtask` and the tests of the owner's bootloader use it.
 const OWNER: [u8; 32] = [0x42; 32];
-/// Sectors of an STM32F4 with 512 KiB.
-const SECTORS: [usize; 8] = [16, 16, 16, 16, 64, 128, 128, 128].map(|kib| kib * 1024);
 const NEWER: u32 = 3;
 const OLDER: u32 = 2;
 
@@ -44,7 +43,7 @@ impl Scene {
     /// # Errors
     /// The images cannot be made.
     pub fn all() -> Result<Vec<Scene>> {
-        let bare = |application: &[u8]| with(vec![0xFF; SECTORS.iter().sum()], application);
+        let bare = |application: &[u8]| with(erased(), application);
         let unsigned = unsigned()?.to_bytes();
         let headless = [&[0xFF; HEADER_LEN][..], &code(BAD)].concat();
         let alone = |name, what, flash, start| Scene { name, what, flash, start, has_good: false };
@@ -52,15 +51,28 @@ impl Scene {
         Ok(vec![
             alone("unsigned", "an application that nobody has signed", bare(&unsigned), Start::Power),
             alone("bare", "an application without a header", bare(&headless), Start::Power),
-            alone("exchanged", "an application that took the place of a signed one before a reset", bare(&unsigned), Start::Reset),
-            staged("older", "an older image, signed, that waits to be copied", waiting(&older()?.to_bytes())?),
-            staged("waiting", "an image that nobody has signed and that waits to be copied", waiting(&unsigned)?),
+            alone(
+                "exchanged",
+                "an application that took the place of a signed one before a reset",
+                bare(&unsigned),
+                Start::Reset,
+            ),
+            staged(
+                "older",
+                "an older image, signed, that waits to be copied",
+                waiting(&older()?.to_bytes())?,
+            ),
+            staged(
+                "waiting",
+                "an image that nobody has signed and that waits to be copied",
+                waiting(&unsigned)?,
+            ),
         ])
     }
 
     /// A flash with the application that may run.
     pub(crate) fn good() -> Result<Vec<u8>> {
-        Ok(with(vec![0xFF; SECTORS.iter().sum()], &newer()?.to_bytes()))
+        Ok(with(erased(), &newer()?.to_bytes()))
     }
 }
 
@@ -88,6 +100,15 @@ fn unsigned() -> Result<Image> {
     Ok(Image { header: image.header.with_signature([0; 64]), ..image })
 }
 
+/// Of the sectors.
+fn sizes() -> Vec<usize> {
+    sectors::all().map(|sector| sector.size as usize).collect()
+}
+
+fn erased() -> Vec<u8> {
+    vec![0xFF; sizes().iter().sum()]
+}
+
 fn with(mut flash: Vec<u8>, application: &[u8]) -> Vec<u8> {
     put(&mut flash, LAYOUT.application().start(), application);
     flash
@@ -106,7 +127,7 @@ fn waiting(image: &[u8]) -> Result<Vec<u8>> {
         hardware: 0,
         key: owner().verifying_key().to_bytes(),
     };
-    let mut flash = MockFlash::new(&SECTORS, 1);
+    let mut flash = MockFlash::new(&sizes(), 1);
     let mut updater = Updater::new(&mut flash, target, Status::GOOD);
     updater.clear()?;
     while updater.poll() != Next::Nothing {}

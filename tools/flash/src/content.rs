@@ -75,7 +75,8 @@ impl fmt::Display for Content {
         writeln!(f, "{:<12}{}, security counter {}", "version", about.version, about.counter)?;
         let digits: String =
             self.key.verifying_key().to_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
-        let whose = if key::is_development(&self.key) { " (the development key, known to everybody)" } else { "" };
+        let whose =
+            if key::is_development(&self.key) { " (the development key, known to everybody)" } else { "" };
         write!(f, "{:<12}{digits}{whose}", "public key")
     }
 }
@@ -86,10 +87,15 @@ fn segments(file: &[u8]) -> Result<Vec<Part>> {
     let mut parts = Vec::new();
     for segment in elf.elf_program_headers() {
         let address = segment.p_paddr(Endianness::Little);
-        let bytes = segment.data(Endianness::Little, file).ok().context("a segment that is not in the file")?;
+        let bytes =
+            segment.data(Endianness::Little, file).ok().context("a segment that is not in the file")?;
         if segment.p_type(Endianness::Little) == elf::PT_LOAD && !bytes.is_empty() {
             let room = FLASH..FLASH + LAYOUT.application().start();
-            ensure!(room.contains(&address), "{} bytes at {address:#010x} are no place for a bootloader", bytes.len());
+            ensure!(
+                room.contains(&address),
+                "{} bytes at {address:#010x} are no place for a bootloader",
+                bytes.len()
+            );
             parts.push(Part { what: "bootloader", address, bytes: bytes.to_vec() });
         }
     }
