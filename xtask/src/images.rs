@@ -23,6 +23,23 @@ pub(crate) fn compile_node(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "firmware 1/2", &["firmware", "bootloader"])
 }
 
+/// Compiles the application alone, and says where it is.
+pub(crate) fn compile_application(toolchain: &Toolchain) -> Result<PathBuf> {
+    progress::build("firmware", &mut toolchain.cargo("build", &["--release", "-p", "firmware"]))?;
+    Ok(dir().join("firmware"))
+}
+
+/// Compiles the bootloader alone, and says where it is: one for development, or one that trusts nothing but this key.
+pub(crate) fn compile_bootloader(toolchain: &Toolchain, key: Option<String>) -> Result<PathBuf> {
+    let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
+    match key {
+        Some(key) => command.env(KEYS[0], key).env_remove(KEYS[1]),
+        None => command.args(DEVELOPMENT),
+    };
+    progress::build("bootloader", &mut command)?;
+    Ok(dir().join("bootloader"))
+}
+
 /// Compiles everything that the tests run on the emulated core, for development.
 pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "images", &["firmware", "bootloader", "mechanics-images"])
@@ -42,15 +59,21 @@ pub(crate) fn build_for_owner() -> Result<()> {
 }
 
 /// Compiles the bootloader as its owner does, with keys that only the tests know, and puts the file beside the one for
-/// development. Without a key it must not compile.
-pub(crate) fn compile_owner(toolchain: &Toolchain) -> Result<()> {
+/// development.
+pub(crate) fn compile_owners(toolchain: &Toolchain) -> Result<PathBuf> {
     let keys = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-keys.hex"))?;
-    let package = ["--release", "-p", "bootloader"];
-    let mut command = toolchain.cargo("build", &package);
+    let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
     command.envs(KEYS.into_iter().zip(keys.lines()));
     progress::build("bootloader of an owner", &mut command)?;
-    std::fs::copy(dir().join("bootloader"), dir().join("bootloader-owner"))?;
-    let mut keyless = toolchain.cargo("build", &package);
+    let owners = dir().join("bootloader-owner");
+    std::fs::copy(dir().join("bootloader"), &owners)?;
+    Ok(owners)
+}
+
+/// The same; and without a key, and not for development, there is no bootloader.
+pub(crate) fn check_owners(toolchain: &Toolchain) -> Result<()> {
+    compile_owners(toolchain)?;
+    let mut keyless = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
     for key in KEYS {
         keyless.env_remove(key);
     }

@@ -27,12 +27,20 @@ pub(crate) enum Need {
     TargetLints,
     /// A Python that makes environments: the outside judges python-can and canopen run in one.
     Python,
+    /// The tool that writes the flash of a board.
+    Probe,
     /// The protocol analyser that judges what was said on the bus.
     Tshark,
 }
 
 /// What `cargo sim` needs.
 pub(crate) const SIM: &[Need] = &[Need::Target, Need::Emulator];
+
+/// What the images need.
+pub(crate) const IMAGES: &[Need] = &[Need::Target];
+
+/// What `cargo xtask flash` needs.
+pub(crate) const FLASH: &[Need] = &[Need::Target, Need::Probe];
 
 /// What `cargo xtask test` needs.
 pub(crate) const TEST: &[Need] =
@@ -52,7 +60,8 @@ fn missing(needs: &[Need]) -> Vec<Package> {
             Need::Target => target::missing(),
             Need::TargetLints => target::missing_lints(),
             Need::Python => python::missing(),
-            Need::Tshark => tshark(),
+            Need::Probe => package_unless(system::runs("probe-rs"), Package::ProbeRs),
+            Need::Tshark => package_unless(system::runs("tshark"), Package::Tshark),
         };
         for package in of_need {
             if !packages.contains(&package) {
@@ -68,8 +77,8 @@ pub(crate) fn install(needs: &[Need]) -> Result<()> {
     system::install(&missing(needs))
 }
 
-fn tshark() -> Vec<Package> {
-    if system::runs("tshark") { Vec::new() } else { vec![Package::Tshark] }
+fn package_unless(is_there: bool, package: Package) -> Vec<Package> {
+    if is_there { Vec::new() } else { vec![package] }
 }
 
 /// `cargo xtask setup`: brings everything that the test command needs, or only says what is missing.
