@@ -62,15 +62,17 @@ export class Connection extends EventTarget {
   }
 
   #tell(message) {
-    // The first message says that the server has taken the connection.
-    if (message.event === "hello") this.#set(true);
+    // With the first message the server has taken the connection.
+    const isFirst = message.event === "hello";
+    if (isFirst) this.connected = true;
     this.dispatchEvent(new CustomEvent(message.event, { detail: message }));
+    if (isFirst) this.#tellConnected();
   }
 
   #lost() {
     for (const { reject } of this.#open.values()) reject(new Refusal(WENT_AWAY));
     this.#open.clear();
-    this.#set(false);
+    if (this.connected) this.#disconnect();
     setTimeout(() => this.#again(), RETRY_MS);
   }
 
@@ -80,10 +82,13 @@ export class Connection extends EventTarget {
     this.start();
   }
 
-  #set(connected) {
-    if (this.connected === connected && !connected) return;
-    this.connected = connected;
-    this.dispatchEvent(new CustomEvent("connected", { detail: connected }));
+  #disconnect() {
+    this.connected = false;
+    this.#tellConnected();
+  }
+
+  #tellConnected() {
+    this.dispatchEvent(new CustomEvent("connected", { detail: this.connected }));
   }
 }
 

@@ -15,7 +15,7 @@ export class Pressure {
     Object.assign(this, { bus, recorder });
     this.value = el("output", { class: "big" }, "-");
     this.result = outcome();
-    this.fields = el("div");
+    this.fields = el("div", { class: "object-fields" });
     this.element = el("section", { class: "box", "aria-labelledby": "pressure-title" }, el("h3", { id: "pressure-title" }, "Pressure channel"),
       el("div", { class: "bar" }, this.value, button("Auto-zero", () => this.#zero())), this.result.line, this.fields);
   }

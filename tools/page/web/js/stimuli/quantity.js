@@ -23,7 +23,7 @@ export class Quantity {
     this.slider = el("input", { type: "range", min: low, max: high, step, value: start, id: newId("slider"), on: { input: () => this.#slide() } });
     this.numbers = el("div", { class: "bar" });
     this.form = select([["const", "slider"], ...Object.keys(FORMS).map((form) => [form, form]), ...(rpm ? [["rpm", "rpm"]] : [])], "const", () => this.#choose());
-    this.element = el("div", { class: "quantity" }, el("label", { for: this.slider.id }, `${name}, ${unit}`), this.slider, this.output, field("Waveform", this.form), this.numbers, this.spec);
+    this.element = el("div", { class: "quantity" }, el("label", { for: this.slider.id }, `${name}, ${unit}`), this.slider, this.output, this.form, this.numbers, this.spec);
     set(this.form, "aria-label", `Waveform of ${name}`);
   }
 

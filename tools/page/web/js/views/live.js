@@ -8,6 +8,7 @@ import { UnitChart } from "../plot/chart.js";
 import { csv, drawing, legend } from "../plot/export.js";
 import { addGestures } from "../plot/gestures.js";
 import { onTheme } from "../plot/theme.js";
+import { Boards } from "../stimuli/boards.js";
 import { TimeWindow } from "../plot/time_window.js";
 
 const LENGTHS = [1, 5, 10, 30, 60, 300];
@@ -26,13 +27,14 @@ class Live {
     this.plots = el("div", { class: "plots" });
     this.faults = el("ul", { class: "faults", "aria-label": "Faults" });
     this.empty = el("p", { class: "hint" });
+    this.boards = new Boards(bus, ({ node }) => node === bus.chosen);
     this.content = this.#layout();
     this.#listen();
   }
 
   show() {
     this.isShown = true;
-    this.#ask();
+    this.isStale = true;
     this.#tick();
   }
 
@@ -43,7 +45,8 @@ class Live {
   #layout() {
     const head = ["Show", "Object", "Signal", "Value", "Status", "PDO"].map((name) => el("th", { scope: "col" }, name));
     const table = el("table", { class: "signals" }, el("caption", { class: "unseen" }, "Process values"), el("thead", {}, el("tr", {}, head)), this.table);
-    return el("div", { class: "live" }, el("div", { class: "bar" }, nodeChoice(this.bus), ...this.#tools()), this.empty, this.plots, el("div", { class: "wide" }, table), el("h3", {}, "Faults"), this.faults);
+    const side = el("div", { class: "side" }, el("div", { class: "wide" }, table), el("h3", {}, "Faults"), this.faults, this.boards.element);
+    return el("div", {}, el("div", { class: "bar" }, nodeChoice(this.bus), ...this.#tools()), this.empty, el("div", { class: "live" }, this.plots, side));
   }
 
   #tools() {
@@ -63,7 +66,7 @@ class Live {
 
   #listen() {
     const { bus, recorder, time } = this;
-    bus.on("chosen", () => this.#ask());
+    bus.on("chosen", () => (this.#ask(), this.boards.show()));
     bus.on("fault", () => this.#showFaults());
     bus.on("restart", () => this.#showFaults());
     bus.on("connected", () => this.#ask());
@@ -73,10 +76,10 @@ class Live {
     onTheme(() => this.#makeCharts());
   }
 
-  /** Asks what the chosen node's TPDOs carry, and follows it. */
+  /** Asks what the chosen node's TPDOs carry, and follows it; also while another view is shown, so that nothing is missing here. */
   async #ask() {
     const node = this.bus.chosen;
-    if (!this.isShown || node == null || !this.bus.connection.connected) return;
+    if (node == null || !this.bus.connection.connected) return;
     try {
       const { signals } = await this.bus.request("signals", { node });
       if (node !== this.bus.chosen) return;
