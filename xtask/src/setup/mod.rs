@@ -29,6 +29,8 @@ pub(crate) enum Need {
     Python,
     /// The protocol analyser that judges what was said on the bus.
     Tshark,
+    /// The browser that shows the page of the bus, and the program that drives it.
+    Browser,
 }
 
 /// What `cargo sim` needs.
@@ -36,7 +38,10 @@ pub(crate) const SIM: &[Need] = &[Need::Target, Need::Emulator];
 
 /// What `cargo xtask test` needs.
 pub(crate) const TEST: &[Need] =
-    &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark];
+    &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark, Need::Browser];
+
+/// What `cargo xtask pictures` needs.
+pub(crate) const PICTURES: &[Need] = &[Need::Target, Need::Emulator, Need::Python, Need::Browser];
 
 /// Ends with the one command that installs what is missing, where this user cannot go on without it.
 pub(crate) fn check(needs: &[Need]) -> Result<()> {
@@ -53,6 +58,7 @@ fn missing(needs: &[Need]) -> Vec<Package> {
             Need::TargetLints => target::missing_lints(),
             Need::Python => python::missing(),
             Need::Tshark => tshark(),
+            Need::Browser => browser(),
         };
         for package in of_need {
             if !packages.contains(&package) {
@@ -70,6 +76,11 @@ pub(crate) fn install(needs: &[Need]) -> Result<()> {
 
 fn tshark() -> Vec<Package> {
     if system::runs("tshark") { Vec::new() } else { vec![Package::Tshark] }
+}
+
+fn browser() -> Vec<Package> {
+    let programs = [("chromium", Package::Chromium), ("chromedriver", Package::Chromedriver)];
+    programs.into_iter().filter(|(program, _)| !system::runs(program)).map(|(_, package)| package).collect()
 }
 
 /// `cargo xtask setup`: brings everything that the test command needs, or only says what is missing.

@@ -17,9 +17,10 @@ import { update } from "./views/update.js";
 const connection = new Connection(tokenOf(document));
 const bus = new Bus(connection);
 const recorder = new Recorder(bus);
+const plots = live(bus, recorder);
 const navigation = new Navigation([
   overview(bus),
-  live(bus, recorder),
+  plots,
   dictionary(bus, recorder),
   trace(bus),
   commissioning(bus, recorder),
@@ -41,3 +42,6 @@ function onKey(event) {
   else return;
   event.preventDefault();
 }
+
+// For the console of the browser, for scripts in it, and for the tests.
+window.canopen = { bus, recorder, time: plots.time };

@@ -17,7 +17,7 @@ const SHOWN_FAULTS = 20;
 
 export function live(bus, recorder) {
   const view = new Live(bus, recorder);
-  return { name: "live", title: "Live", content: view.content, show: () => view.show(), hide: () => view.hide() };
+  return { name: "live", title: "Live", content: view.content, time: view.time, show: () => view.show(), hide: () => view.hide() };
 }
 
 class Live {
