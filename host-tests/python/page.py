@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import shutil
 import subprocess
 import time
 
@@ -12,6 +13,9 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
 from simulator import PATIENCE, Simulator
+
+#: The view that is shown.
+SHOWN = "main > section:not([hidden])"
 
 #: Between two looks at the page.
 POLL = 0.1
@@ -42,7 +46,7 @@ def browser(width: int = 1440, height: int = 900) -> webdriver.Chrome:
     for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--hide-scrollbars"):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service("chromedriver"))
+    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
     driver.set_script_timeout(PATIENCE)
     size(driver, width, height)
     return driver
@@ -85,16 +89,15 @@ class Page:
     def view(self, name: str) -> None:
         self.script("location.hash = arguments[0]", name)
         self.until(lambda: self.script("return !document.getElementById(arguments[0]).hidden", f"view-{name}"), f"show {name}")
-        self.shown = f"#view-{name}"
 
     def find(self, selector: str):
-        return self.driver.find_element(By.CSS_SELECTOR, f"{self.shown} {selector}")
+        return self.driver.find_element(By.CSS_SELECTOR, f"{SHOWN} {selector}")
 
     def press(self, name: str, inside: str = "") -> None:
         """Presses the button of this view with this name, when it is in use."""
         code = """return [...document.querySelectorAll(arguments[0])].find((button) => button.offsetParent && !button.disabled
             && (button.ariaLabel ?? button.innerText).trim() === arguments[1])"""
-        button = self.until(lambda: self.script(code, f"{self.shown} {inside} button", name), f"offer {name!r}")
+        button = self.until(lambda: self.script(code, f"{SHOWN} {inside} button", name), f"offer {name!r}")
         self.script("arguments[0].scrollIntoView({ block: 'center' })", button)
         button.click()
 
@@ -102,7 +105,7 @@ class Page:
         """The control of this view with this label."""
         code = """return [...document.querySelectorAll(arguments[0])].find((label) => label.offsetParent
             && label.innerText.trim() === arguments[1])?.control"""
-        return self.until(lambda: self.script(code, f"{self.shown} {inside} label", label), f"have the field {label!r}")
+        return self.until(lambda: self.script(code, f"{SHOWN} {inside} label", label), f"have the field {label!r}")
 
     def choose(self, label: str, value: str) -> None:
         field = self.field(label)
