@@ -44,8 +44,9 @@ class Update {
   async #inspect(file) {
     this.#clear();
     const keys = { node: this.bus.chosen, name: file.name, data: file.data };
-    const answer = await this.result.of("checking", this.bus.request("update.inspect", keys), ({ allowed }) => (allowed ? "the program fits: nothing is changed yet" : "the program does not fit: nothing is changed"));
+    const answer = await this.result.of("checking", this.bus.request("update.inspect", keys), "the program fits: nothing is changed yet");
     if (!answer) return;
+    if (!answer.allowed) this.result.bad("the program does not fit: nothing is changed");
     this.inspected = answer;
     if (answer.image) this.known.set(answer.image.identification, { ...file, version: answer.image.version });
     text(this.versions, `In the node: ${program(answer.device)}. In the file: ${answer.image ? program(answer.image) : "no program"}.`);
