@@ -5,6 +5,7 @@ import { address, hex } from "../format.js";
 import { outcome } from "../outcome.js";
 import { check, isReadable, isWritable, rangeText } from "./check.js";
 import { keyOf } from "./filter.js";
+import { help } from "./help.js";
 
 export class Row {
   /** `owner`: the view, with `read`, `write` and `favourites`. */
@@ -71,10 +72,11 @@ export class Row {
   }
 
   #help() {
-    const { help, type, access, tpdo, rpdo, parameter } = this.entry;
+    const { type, access, tpdo, rpdo, parameter } = this.entry;
+    const words = help(this.entry, this.owner.bus.node()?.personality);
     const pdo = [tpdo && "TPDO", rpdo && "RPDO"].filter(Boolean).join(" and ");
     const facts = [type, access, rangeText(this.entry), pdo && `can be in a ${pdo}`, parameter && "part of a configuration"];
-    return [help ? el("p", {}, help) : null, el("p", { class: "hint" }, facts.filter(Boolean).join(" · "))].filter(Boolean);
+    return [words ? el("p", {}, words) : null, el("p", { class: "hint" }, facts.filter(Boolean).join(" · "))].filter(Boolean);
   }
 
   #editor() {
@@ -91,7 +93,7 @@ export class Row {
     const value = await this.result.of("reading", this.owner.read(this.entry), (value) => value.error ?? (value.meaning ? `reads ${value.text}: ${value.meaning}` : ""));
     if (!value) return;
     if (value.error) this.result.bad(value.error);
-    else if (this.input && this.input.value === "") this.input.value = value.text;
+    else if (this.input && this.input.value === "" && document.activeElement !== this.input) this.input.value = value.text;
   }
 
   async #write() {
