@@ -79,7 +79,8 @@ fn python(file: &Path, thorough: bool) -> Result<()> {
 
 /// Tells Python where the programs of the project are.
 pub(crate) fn with_programs(command: &mut Command) -> &mut Command {
-    for (variable, tool) in [("SIM_COMMAND", "sim"), ("NODECTL_COMMAND", "nodectl"), ("SIGN_COMMAND", "sign")] {
+    for (variable, tool) in [("SIM_COMMAND", "sim"), ("NODECTL_COMMAND", "nodectl"), ("SIGN_COMMAND", "sign")]
+    {
         command.env(variable, built(tool));
     }
     command
