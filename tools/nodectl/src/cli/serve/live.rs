@@ -261,9 +261,10 @@ mod tests {
     fn survey(mapping: &[(u16, u8, u8)]) -> Survey {
         let mapping: Vec<MappedObject> =
             mapping.iter().map(|&(index, sub, bits)| MappedObject { index, sub, bits }).collect();
-        let signal = |mapped: &MappedObject| Signal {
-            tpdo: Some(1),
-            ..Signal::polled(at(mapped.index, mapped.sub), "value", "")
+        let signal = |mapped: &MappedObject| {
+            let mut signal = Signal::polled(at(mapped.index, mapped.sub), "value", "");
+            signal.tpdo = Some(1);
+            signal
         };
         let signals = mapping.iter().map(signal).collect();
         Survey { tpdos: vec![Tpdo { number: 1, id: 0x185, mapping }], signals, catalogue: None }
