@@ -57,6 +57,8 @@ def take_page(page: Page, master: Master) -> None:
     page.press("Start all")
     page.says("tr[data-node='1'] td[data-label=State]", "operational")
     master.write(0x1800, 5, 10, 2)
+    # A fault of the device does not take the node out of Operational.
+    master.write(0x1029, 2, 1, 1)
     begin = bus_time(page)
     page.view("live")
     page.until(lambda: bus_time(page) > begin + SECONDS * 0.6, "measure")

@@ -18,7 +18,7 @@ export class Board {
   constructor(bus, board, faults) {
     Object.assign(this, { bus, id: board.board, buttons: [] });
     this.result = outcome();
-    this.quantities = QUANTITIES.map((quantity) => new Quantity(quantity, (kind, spec) => this.#send(kind, spec), () => bus.status?.t ?? 0));
+    this.quantities = QUANTITIES.map((quantity) => new Quantity(quantity, (kind, spec) => this.#send(kind, spec)));
     this.switches = new Map(faults.map((fault) => [fault.name, this.#fault(fault)]));
     this.buttons = board.buttons.map((_, at) => this.#button(at + 1));
     const title = `Board ${board.board}${board.node == null ? "" : `: node ${board.node}, ${board.personality ?? "-"}`}`;

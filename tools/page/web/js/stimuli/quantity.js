@@ -10,14 +10,14 @@ const SEND_MS = 60;
 const FORMS = {
   sine: [["Offset", (q) => (q.low + q.high) / 4], ["Amplitude", (q) => (q.high - q.low) / 10], ["Frequency, Hz", () => 0.5]],
   ramp: [["From", (q) => q.low], ["To", (q) => q.high / 2], ["Seconds", () => 10]],
-  step: [["From", (q) => q.start], ["To", (q) => q.high / 2], ["At, s", (q) => q.now() + 2]],
+  step: [["From", (q) => q.start], ["To", (q) => q.high / 2], ["After, s", () => 2]],
   noise: [["Mean", (q) => q.start], ["Deviation", (q) => (q.high - q.low) / 1000]],
 };
 
 /** `low`, `high`, `step` and all numbers are in the unit that is shown; `factor` leads to the unit of the simulator. */
 export class Quantity {
-  constructor({ kind, name, unit, low, high, step, start, factor, offset = 0, rpm = false }, send, now) {
-    Object.assign(this, { kind, name, unit, low, high, step, start, factor, offset, rpm, send, now });
+  constructor({ kind, name, unit, low, high, step, start, factor, offset = 0, rpm = false }, send) {
+    Object.assign(this, { kind, name, unit, low, high, step, start, factor, offset, rpm, send });
     this.output = el("output", { class: "value" });
     this.spec = el("small", { class: "hint" });
     this.slider = el("input", { type: "range", min: low, max: high, step, value: start, id: newId("slider"), on: { input: () => this.#slide() } });

@@ -67,6 +67,7 @@ class Live {
   #listen() {
     const { bus, recorder, time } = this;
     bus.on("chosen", () => (this.#ask(), this.boards.show()));
+    bus.on("nodes", () => (this.isStale = true));
     bus.on("fault", () => this.#showFaults());
     bus.on("restart", () => this.#showFaults());
     bus.on("connected", () => this.#ask());
@@ -85,7 +86,8 @@ class Live {
       if (node !== this.bus.chosen) return;
       this.offered = signals;
       this.#showSignals();
-      await this.recorder.want("live", signals.map(({ signal }) => signal));
+      const statuses = signals.map(statusKey).filter(Boolean);
+      await this.recorder.want("live", [...new Set([...signals.map(({ signal }) => signal), ...statuses])]);
     } catch (error) {
       text(this.empty, error.message);
     }
@@ -155,17 +157,17 @@ class Live {
 
   #showValue({ value, status, signal }) {
     const series = this.recorder.of(signal.signal);
-    if (series.newest === undefined) return;
-    text(value, quantity(series.newest, signal.unit));
-    const words = series.meaning ?? this.#statusOf(signal);
-    text(status, words ?? (series.newest == null ? "not valid" : "ok"));
-    set(status, "data-kind", words && words !== "valid" ? "bad" : series.newest == null ? "bad" : "good");
+    const state = this.bus.node()?.state;
+    const isOld = signal.tpdo != null && state !== "operational";
+    if (series.newest === undefined && !isOld) return;
+    text(value, isOld ? "-" : quantity(series.newest, signal.unit));
+    const words = isOld ? `not sent: ${state ?? "not heard"}` : (series.meaning ?? this.#statusOf(signal) ?? (series.newest == null ? "not valid" : "ok"));
+    text(status, words);
+    set(status, "data-kind", ["ok", "valid"].includes(words) ? "good" : "bad");
   }
 
-  /** Status of a process value of CiA 404 (6150h): 20h after the value, where a PDO carries it. */
-  #statusOf({ node, index, sub }) {
-    const status = this.recorder.series.get(signalKey(node, index + 0x20, sub));
-    return (index & 0xf0ff) === 0x6030 ? status?.meaning : null;
+  #statusOf(signal) {
+    return this.recorder.series.get(statusKey(signal))?.meaning ?? null;
   }
 
   #showTime() {
@@ -200,4 +202,11 @@ class Live {
   #svg() {
     offer(`node${this.bus.chosen}.svg`, drawing(this.recorder, this.#units(), this.time, this.#ownFaults()), "image/svg+xml");
   }
+}
+
+/** The status of a process value of CiA 404 (6150h), which is read where no PDO carries it; `null` for any other signal. */
+function statusKey({ node, index, sub }) {
+  const isSecondDevice = (index & 0x800) !== 0;
+  const isProcessValue = [0x6130, 0x7130, 0x9130].includes(index & ~0x800);
+  return isProcessValue ? signalKey(node, isSecondDevice ? 0x6950 : 0x6150, sub) : null;
 }

@@ -10,7 +10,7 @@ import { Filter, KINDS, Rows } from "../trace/rows.js";
 
 export function trace(bus) {
   const view = new Trace(bus);
-  return { name: "trace", title: "Trace", content: view.content, search: view.search, show: () => view.show(), hide: () => view.hide() };
+  return { name: "trace", title: "Trace", content: view.content, search: view.search, show: () => view.show(), hide: () => (view.isShown = false) };
 }
 
 class Trace {
@@ -23,23 +23,20 @@ class Trace {
     this.search.addEventListener("input", () => (this.filter.setText(this.search.value), this.#show()));
     this.content = this.#layout();
     bus.connection.on("trace", (event) => this.#take(event));
-    bus.on("connected", () => this.isShown && this.#ask());
+    bus.on("connected", () => this.isWanted && this.#ask());
     bus.on("nodes", () => this.#nodes());
   }
 
+  /** From the first look on the trace runs, also while another view is shown: nothing is missing when the user comes back. */
   show() {
     this.isShown = true;
-    this.#ask();
+    if (!this.isWanted) this.#ask();
+    this.isWanted = true;
     this.#show();
   }
 
-  hide() {
-    this.isShown = false;
-    this.#ask();
-  }
-
   #ask() {
-    if (this.bus.connection.connected) this.bus.request("trace", { on: this.isShown }).catch((error) => announce(error.message));
+    if (this.bus.connection.connected) this.bus.request("trace", { on: true }).catch((error) => announce(error.message));
   }
 
   #layout() {
