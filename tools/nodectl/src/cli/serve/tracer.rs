@@ -55,7 +55,7 @@ struct Cell<'l> {
 impl Tracer {
     /// Tells what a node is; what it has configured is then as after a reset, until the trace shows something else.
     pub(super) fn know(&mut self, node: NodeId, catalogue: &Arc<Catalogue>) {
-        self.decoder.know(node, Knowledge::new((**catalogue).clone()));
+        self.decoder.know(node, Knowledge::new(Arc::clone(catalogue)));
     }
 
     /// Tells what a node was asked for.

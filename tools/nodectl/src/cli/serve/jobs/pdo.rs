@@ -24,11 +24,12 @@ pub(in crate::cli::serve) fn survey(node: NodeId) -> Job {
         let catalogue = context.catalogue(node)?;
         context.session.begin_all();
         let session = &mut context.session;
-        let knowledge = Knowledge::ask(&mut session.client(node), catalogue.clone());
+        let catalogue = Arc::new(catalogue);
+        let knowledge = Knowledge::ask(&mut session.client(node), Arc::clone(&catalogue));
         let knowledge = knowledge.map_err(|error| session.named(error))?;
         let found = acquisition::survey(&mut session.client(node), &catalogue, &[]);
         let (tpdos, signals) = found.map_err(|error| session.named(error))?;
-        let survey = Survey { tpdos, signals, catalogue: Some(Arc::new(catalogue)) };
+        let survey = Survey { tpdos, signals, catalogue: Some(catalogue) };
         let signals = survey.describe(node);
         context.learned(node, Learned::Survey(survey, Box::new(knowledge)));
         Ok(json!({ "signals": signals }))

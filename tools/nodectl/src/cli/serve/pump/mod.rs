@@ -5,6 +5,7 @@ mod frames;
 mod orders;
 mod work;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::Duration as StdDuration;
@@ -22,6 +23,7 @@ use super::port::Outlet;
 use super::schedule::{Haste, Lane, Schedule};
 use super::status::{Count, Rate};
 use super::tracer::Tracer;
+use crate::Catalogue;
 use crate::bus::{Bus, BusError, clock};
 use crate::cli::Options;
 
@@ -127,6 +129,8 @@ pub(super) struct Pump {
     rate: Rate,
     /// Nodes whose PDO parameters were written, and when.
     remapped: Vec<(NodeId, f64)>,
+    /// By vendor-ID and product code.
+    catalogues: BTreeMap<(Option<u32>, Option<u32>), Arc<Catalogue>>,
     stimuli: Option<Json>,
     bit_rate: Option<u16>,
     looked: Instant,
@@ -160,6 +164,7 @@ impl Pump {
             count: Count::default(),
             rate: Rate::default(),
             remapped: Vec::new(),
+            catalogues: BTreeMap::new(),
             stimuli: None,
             bit_rate,
             looked: clock::now(),

@@ -1,5 +1,7 @@
 //! Jobs: when they begin, what they find out, and what comes of them.
 
+use std::sync::Arc;
+
 use canopen::NodeId;
 use serde_json::{Value as Json, json};
 
@@ -77,6 +79,9 @@ impl Pump {
         match learned {
             Learned::Present => drop(self.nodes.change(node)),
             Learned::Identity(identity, catalogue) => {
+                // Nodes of a kind share one: a data sheet is large.
+                let kind = (identity.vendor, identity.product);
+                let catalogue = Arc::clone(self.catalogues.entry(kind).or_insert(catalogue));
                 self.tracer.know(node, &catalogue);
                 let entry = self.nodes.change(node);
                 (entry.identity, entry.catalogue) = (Some(identity), Some(catalogue));
