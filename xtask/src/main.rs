@@ -83,8 +83,7 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
-    /// Bring what the other commands need: a compiler for the Cortex-M4, cmake, libclang, Python packages, tshark,
-    /// a browser
+    /// Bring what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
     Setup {
         /// Only say what is missing, and how to install it
         #[arg(long)]
