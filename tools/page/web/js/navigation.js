@@ -51,6 +51,7 @@ export class Navigation {
       set(other.link, "aria-current", other === view ? "page" : null);
     }
     this.current = view;
+    view.link.scrollIntoView({ block: "nearest", inline: "center" });
     view.show?.();
     document.title = `${view.title} - CANopen bus`;
     if (isMove) view.heading.focus({ preventScroll: true });

@@ -12,6 +12,7 @@ export class Row {
   constructor(entry, owner) {
     Object.assign(this, { entry, owner, key: keyOf(entry), details: null });
     this.value = el("td", { class: "number", data: { label: "Value" } });
+    this.unit = el("td", { data: { label: "Unit" } }, knownUnit(entry));
     this.opener = el("button", { type: "button", class: "plain", "aria-expanded": "false", on: { click: () => this.toggle() } }, address(entry.index, entry.sub));
     this.element = el("tr", { data: { object: address(entry.index, entry.sub) } }, el("td", {}, this.#star()), el("th", { scope: "row" }, this.opener), ...this.#cells());
   }
@@ -19,6 +20,7 @@ export class Row {
   show(value) {
     this.newest = value;
     text(this.value, value.error ? "-" : shown(value));
+    if (value.unit) text(this.unit, value.unit);
     set(this.value, "title", value.error ?? (value.raw ? `bytes ${value.raw}` : null));
   }
 
@@ -44,9 +46,9 @@ export class Row {
   }
 
   #cells() {
-    const { path, unit, type, access } = this.entry;
+    const { path, type, access } = this.entry;
     const cell = (label, content) => el("td", { data: { label } }, content);
-    return [cell("Name", path), this.value, cell("Unit", unit), cell("Type", type), cell("Access", access), cell("Limits", this.#limits()), cell("Default", this.#default())];
+    return [cell("Name", path), this.value, this.unit, cell("Type", type), cell("Access", access), cell("Limits", this.#limits()), cell("Default", this.#default())];
   }
 
   #limits() {
@@ -84,7 +86,7 @@ export class Row {
     const read = isReadable(this.entry) && button("Read", () => this.#read());
     if (!isWritable(this.entry)) return el("div", { class: "bar" }, read, this.result.line);
     this.input = el("input", { autocomplete: "off", spellcheck: "false" });
-    const form = el("form", { class: "bar", novalidate: true }, field(`New value${this.entry.unit ? ` in ${this.entry.unit}` : ""}`, this.input), el("button", { type: "submit" }, "Write"), read);
+    const form = el("form", { class: "bar", novalidate: true }, field("New value", this.input), el("button", { type: "submit" }, "Write"), read);
     form.addEventListener("submit", (event) => (event.preventDefault(), this.#write()));
     return el("div", {}, form, this.result.line);
   }
@@ -104,6 +106,11 @@ export class Row {
     const value = await this.result.of("writing", this.owner.write(this.entry, this.input.value.trim()), said);
     set(this.input, "aria-invalid", value ? null : "true");
   }
+}
+
+/** The unit that the data sheet has. Where it has the object that tells the unit (6131h), a read brings the unit. */
+function knownUnit({ unit }) {
+  return /^[0-9A-F]{4}h/.test(unit) ? "" : unit;
 }
 
 /** A value with what it stands for; the unit has a column of its own where the data sheet has a unit. */

@@ -32,7 +32,14 @@ export class Quantity {
     const shown = (value - this.offset) / this.factor;
     text(this.output, `${number(Number(shown.toFixed(3)))} ${this.unit}`);
     text(this.spec, spec);
+    this.#showForm(spec.split(":")[0]);
     if (document.activeElement !== this.slider && !this.timer) this.slider.value = shown;
+  }
+
+  /** The waveform that the board has, unless the user is about to choose another one. */
+  #showForm(form) {
+    if (document.activeElement === this.form || this.numbers.childElementCount > 0) return;
+    if ([...this.form.options].some(({ value }) => value === form)) this.form.value = form;
   }
 
   #slide() {

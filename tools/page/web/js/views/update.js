@@ -63,7 +63,7 @@ class Update {
     set(this.startButton, "disabled", true);
     set(this.bar, "hidden", null);
     const keys = { node: this.bus.chosen, file: this.inspected.file, force: this.force.checked };
-    const answer = await this.result.of("updating: do not take the power away", this.bus.request("update.start", keys), (done) => (done.result === "unchanged" ? "the node runs this program already" : `updated from ${done.old_version} to ${done.new_version}`));
+    const answer = await this.result.of("updating: do not take the power away", this.bus.request("update.start", keys), (done) => (done.result === "unchanged" ? "the node runs this program already" : `updated: ${of(done, "old")}, is now ${of(done, "new")}`));
     set(this.bar, "hidden", true);
     text(this.step, "");
     if (answer) this.#offerBack(answer);
@@ -83,13 +83,13 @@ class Update {
     this.back.replaceChildren();
     if (result !== "updated") return;
     const file = this.known.get(old);
-    if (!file) return this.back.append(el("p", { class: "hint" }, `To go back to ${version}, choose its file.`));
+    if (!file) return this.back.append(el("p", { class: "hint" }, `To go back to version ${version}, choose its file.`));
     const revert = async () => {
       this.force.checked = true;
       await this.#inspect(file);
       await this.#start();
     };
-    this.back.append(button(`Put back ${file.version}`, revert));
+    this.back.append(button(`Put back ${file.name}`, revert));
   }
 
   #clear() {
@@ -100,6 +100,11 @@ class Update {
     this.result.clear();
     this.#offer();
   }
+}
+
+/** The old or the new program of an update. */
+function of(done, which) {
+  return program({ version: done[`${which}_version`], identification: done[`${which}_identification`] });
 }
 
 function program({ version, identification, bytes }) {
