@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::thread;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 
-use crate::command::built;
+use crate::command::{become_program, built};
 use crate::setup::{self, emulator};
 use crate::target::Toolchain;
 use crate::{images, progress};
@@ -36,20 +36,6 @@ pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     build_all()?;
     images::sign(Command::new(built("sign")))?;
     become_program(with_images(&built("sim")).args(flags))
-}
-
-#[cfg(unix)]
-fn become_program(command: &mut Command) -> Result<ExitCode> {
-    use std::os::unix::process::CommandExt as _;
-    Err(command.exec()).with_context(|| format!("cannot start {}", command.get_program().display()))
-}
-
-/// Without `exec` the simulator is a child; its exit status becomes ours.
-#[cfg(not(unix))]
-fn become_program(command: &mut Command) -> Result<ExitCode> {
-    let status =
-        command.status().with_context(|| format!("cannot start {}", command.get_program().display()))?;
-    Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
 /// The simulator with the two ELF files it loads, and the program that it has serve the page. That is a program of its own: the

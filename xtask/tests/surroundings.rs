@@ -166,6 +166,62 @@ fn without_a_package_manager_the_packages_are_named() {
 }
 
 #[test]
+fn who_has_no_probe_rs_is_told_how_to_get_it_and_nothing_is_built() {
+    for machine in [Machine::new("no-probe-rs").with("dnf", WORKS), Machine::new("no-manager")] {
+        let output = machine.xtask(&["flash"]);
+        let says = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        assert!(says.contains("cargo install --locked probe-rs-tools"), "{says}");
+        assert_eq!(machine.calls("cargo"), [""; 0]);
+    }
+}
+
+#[test]
+fn a_board_needs_the_target_too() {
+    let machine = Machine::new("no-target").closed().with("dnf", WORKS).with("probe-rs", WORKS);
+    let output = machine.xtask(&["flash", "--dry-run"]);
+    let says = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(says.contains("rustup target add thumbv7em-none-eabihf") && !says.contains("probe-rs"), "{says}");
+}
+
+#[test]
+fn without_a_board_nothing_is_built() {
+    let empty = "echo 'No debug probes were found.'";
+    for probe_rs in [empty, FAILS] {
+        let machine =
+            Machine::new("no-board").with("probe-rs", &format!("[ \"$1\" = --version ] || {probe_rs}"));
+        let output = machine.xtask(&["flash"]);
+        let says = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        assert!(says.contains("no debug probe was found") && says.contains("ST-LINK"), "{says}");
+        assert_eq!(machine.calls("cargo"), [""; 0]);
+        assert_eq!(machine.calls("probe-rs"), ["probe-rs list"]);
+    }
+}
+
+/// What follows is the program that writes, which is not there on this machine: the tools and both programs were built.
+#[test]
+fn with_a_board_both_programs_are_built() {
+    let machine = Machine::new("board").with("probe-rs", "echo '[0]: STLink V2-1'");
+    let says = String::from_utf8(machine.xtask(&["flash"]).stderr).unwrap();
+    assert!(says.contains("cannot start") && says.contains("flash"), "{says}");
+    let calls = machine.calls("cargo");
+    let builds = |what: &str| calls.iter().filter(|call| call.contains(what)).count();
+    assert_eq!((builds("-p flash"), builds("-p firmware"), builds("-p bootloader")), (1, 1, 1), "{calls:?}");
+}
+
+/// As the runner of `cargo run` the command gets the application.
+#[test]
+fn an_application_that_is_given_is_not_built() {
+    let machine = Machine::new("runner").with("probe-rs", WORKS);
+    machine.xtask(&["flash", "firmware"]);
+    let calls = machine.calls("cargo");
+    assert!(calls.iter().any(|call| call.contains("-p bootloader")), "{calls:?}");
+    assert!(!calls.iter().any(|call| call.contains("-p firmware")), "{calls:?}");
+}
+
+#[test]
 fn without_an_argument_the_commands_are_listed_a_line_each() {
     let output = Machine::new("list").xtask(&[]);
     let says = String::from_utf8(output.stdout).unwrap();

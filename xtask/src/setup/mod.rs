@@ -27,6 +27,8 @@ pub(crate) enum Need {
     TargetLints,
     /// A Python that makes environments: the outside judges python-can and canopen run in one.
     Python,
+    /// The tool that writes the flash of a board.
+    Probe,
     /// The protocol analyser that judges what was said on the bus.
     Tshark,
     /// The browser that shows the page of the bus, and the program that drives it.
@@ -35,6 +37,12 @@ pub(crate) enum Need {
 
 /// What `cargo sim` needs.
 pub(crate) const SIM: &[Need] = &[Need::Target, Need::Emulator];
+
+/// What the images need.
+pub(crate) const IMAGES: &[Need] = &[Need::Target];
+
+/// What `cargo xtask flash` needs.
+pub(crate) const FLASH: &[Need] = &[Need::Target, Need::Probe];
 
 /// What `cargo xtask test` needs.
 pub(crate) const TEST: &[Need] =
@@ -57,7 +65,8 @@ fn missing(needs: &[Need]) -> Vec<Package> {
             Need::Target => target::missing(),
             Need::TargetLints => target::missing_lints(),
             Need::Python => python::missing(),
-            Need::Tshark => tshark(),
+            Need::Probe => package_unless(system::runs("probe-rs"), Package::ProbeRs),
+            Need::Tshark => package_unless(system::runs("tshark"), Package::Tshark),
             Need::Browser => browser(),
         };
         for package in of_need {
@@ -74,8 +83,8 @@ pub(crate) fn install(needs: &[Need]) -> Result<()> {
     system::install(&missing(needs))
 }
 
-fn tshark() -> Vec<Package> {
-    if system::runs("tshark") { Vec::new() } else { vec![Package::Tshark] }
+fn package_unless(is_there: bool, package: Package) -> Vec<Package> {
+    if is_there { Vec::new() } else { vec![package] }
 }
 
 fn browser() -> Vec<Package> {
