@@ -1,10 +1,11 @@
 //! Running other programs.
 
 use std::cell::RefCell;
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context, Result, bail};
 
@@ -72,8 +73,23 @@ fn streams() -> Result<Option<(File, File)>> {
     })
 }
 
+/// Goes on as another program, so that a signal to `cargo xtask` reaches that one.
+#[cfg(unix)]
+pub(crate) fn become_program(command: &mut Command) -> Result<ExitCode> {
+    use std::os::unix::process::CommandExt as _;
+    Err(command.exec()).with_context(|| format!("cannot start {}", command.get_program().display()))
+}
+
+/// Without `exec` the simulator is a child; its exit status becomes ours.
+#[cfg(not(unix))]
+pub(crate) fn become_program(command: &mut Command) -> Result<ExitCode> {
+    let status =
+        command.status().with_context(|| format!("cannot start {}", command.get_program().display()))?;
+    Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from))
+}
+
 /// What a program prints, without the last line end; `None` when it is missing or fails.
-pub(crate) fn output(program: &str, args: &[&str]) -> Option<String> {
+pub(crate) fn output(program: impl AsRef<OsStr>, args: &[&str]) -> Option<String> {
     let output = Command::new(program).args(args).stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }

@@ -20,6 +20,22 @@ pub(crate) fn compile_node(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "firmware 1/2", &["firmware", "bootloader"])
 }
 
+/// Compiles the application alone, and says where it is.
+pub(crate) fn compile_application(toolchain: &Toolchain) -> Result<PathBuf> {
+    progress::build("firmware", &mut toolchain.cargo("build", &["--release", "-p", "firmware"]))?;
+    Ok(dir().join("firmware"))
+}
+
+/// Compiles the bootloader alone, and says where it is: that of a development board, or one that trusts nothing but this key.
+pub(crate) fn compile_bootloader(toolchain: &Toolchain, key: Option<String>) -> Result<PathBuf> {
+    let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
+    if let Some(key) = key {
+        command.args(["--features", "production"]).env("UPDATE_PUBLIC_KEY", key);
+    }
+    progress::build("bootloader", &mut command)?;
+    Ok(dir().join("bootloader"))
+}
+
 /// Compiles everything that the tests run on the emulated core.
 pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "images", &["firmware", "bootloader", "mechanics-images"])
@@ -27,12 +43,18 @@ pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
 
 /// Compiles the bootloader as its owner does, with a key that only the tests know, and puts the file beside the one of a
 /// development board.
-pub(crate) fn compile_production(toolchain: &Toolchain) -> Result<()> {
+pub(crate) fn compile_owners(toolchain: &Toolchain) -> Result<PathBuf> {
     let key = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-key.hex"))?;
+    let bootloader = compile_bootloader(toolchain, Some(key.trim().to_owned()))?;
+    let owners = dir().join("bootloader-production");
+    std::fs::copy(bootloader, &owners)?;
+    Ok(owners)
+}
+
+/// The same; and without a key of the owner's there is no such bootloader.
+pub(crate) fn compile_production(toolchain: &Toolchain) -> Result<()> {
+    compile_owners(toolchain)?;
     let package = ["--release", "-p", "bootloader", "--features", "production"];
-    let mut command = toolchain.cargo("build", &package);
-    progress::build("production bootloader", command.env("UPDATE_PUBLIC_KEY", key.trim()))?;
-    std::fs::copy(dir().join("bootloader"), dir().join("bootloader-production"))?;
     let refused = toolchain.cargo("build", &package).env_remove("UPDATE_PUBLIC_KEY").output()?;
     let says = String::from_utf8_lossy(&refused.stderr);
     ensure!(

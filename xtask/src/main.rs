@@ -5,10 +5,13 @@ mod callgraph;
 mod command;
 mod coverage;
 mod eds;
+mod fault_injection;
+mod flash;
 mod fuzz;
 mod images;
 mod mutants;
 mod own_tool;
+mod pictures;
 mod plots;
 mod progress;
 mod setup;
@@ -44,10 +47,21 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         flags: Vec<OsString>,
     },
+    /// Skip instructions and flip bits of registers while the bootloader decides what may start (docs/evidence.md)
+    #[command(disable_help_flag = true)]
+    FaultInjection {
+        /// Flags of the tool
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        flags: Vec<OsString>,
+    },
+    /// Put bootloader and signed application on a board at a debug probe, and print the log (docs/board.md)
+    Flash(flash::Flags),
     /// Write eds/*.eds and docs/object-dictionary.md from the dictionary tables
     Eds,
     /// Write docs/plots/*.svg and the tables of docs/measuring.md from the measurement chain
     Plots,
+    /// Take the pictures of the page and of the simulator's screen for docs/page.md and README
+    Pictures,
     /// Make signing keys and sign images for the field update (docs/update.md; `cargo xtask sign --help`)
     #[command(disable_help_flag = true)]
     Sign {
@@ -80,7 +94,7 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
-    /// Bring what the other commands need: a compiler for the Cortex-M4, cmake, libclang, Python packages, tshark
+    /// Bring what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
     Setup {
         /// Only say what is missing, and how to install it
         #[arg(long)]
@@ -96,6 +110,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Some(Command::Sim { flags }) => sim::run(&flags),
+        Some(Command::Flash(flags)) => flash::run(&flags),
         Some(command) => run(command).map(|()| ExitCode::SUCCESS),
         None => list().map(|()| ExitCode::SUCCESS),
     };
@@ -108,9 +123,11 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<()> {
     match command {
         Command::Images => images::build(Tools::ByCargo),
-        Command::Sim { .. } => unreachable!("`sim` is the only command with an exit status of its own"),
+        Command::Sim { .. } | Command::Flash(_) => unreachable!("these have an exit status of their own"),
+        Command::FaultInjection { flags } => fault_injection::try_all(&flags),
         Command::Eds => eds::write(),
         Command::Plots => plots::write(),
+        Command::Pictures => pictures::take(),
         Command::Sign { arguments } => own_tool::run("sign", &arguments),
         Command::Protect { arguments } => own_tool::run("protect", &arguments),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags),
@@ -130,7 +147,7 @@ fn run(command: Command) -> Result<()> {
 fn list() -> Result<()> {
     for command in Cli::command().get_subcommands().filter(|command| !command.is_hide_set()) {
         let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-        println!("cargo xtask {:<10} {}", command.get_name(), about.split(" (").next().unwrap_or_default());
+        println!("cargo xtask {:<15} {}", command.get_name(), about.split(" (").next().unwrap_or_default());
     }
     Ok(())
 }

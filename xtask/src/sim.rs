@@ -5,17 +5,17 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::thread;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 
-use crate::command::built;
+use crate::command::{become_program, built};
 use crate::setup::{self, emulator};
 use crate::target::Toolchain;
 use crate::{images, progress};
 
-/// Builds the simulator and the tool that signs images.
+/// Builds the simulator, the tool that signs images, and the program that serves the page.
 fn build() -> Result<()> {
     let mut command = emulator::cargo_with_emulator()?;
-    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "sign"]);
+    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "sign", "-p", "nodectl"]);
     progress::build("emulator 2/2", &mut command)
 }
 
@@ -38,24 +38,12 @@ pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     become_program(with_images(&built("sim")).args(flags))
 }
 
-#[cfg(unix)]
-fn become_program(command: &mut Command) -> Result<ExitCode> {
-    use std::os::unix::process::CommandExt as _;
-    Err(command.exec()).with_context(|| format!("cannot start {}", command.get_program().display()))
-}
-
-/// Without `exec` the simulator is a child; its exit status becomes ours.
-#[cfg(not(unix))]
-fn become_program(command: &mut Command) -> Result<ExitCode> {
-    let status =
-        command.status().with_context(|| format!("cannot start {}", command.get_program().display()))?;
-    Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from))
-}
-
-/// The simulator with the two ELF files it loads.
+/// The simulator with the two ELF files it loads, and the program that it has serve the page. That is a program of its own: the
+/// simulator's licence is not that of the tools.
 fn with_images(program: &Path) -> Command {
     let mut command = Command::new(program);
     command.arg("--bootloader").arg(images::dir().join("bootloader"));
     command.arg("--firmware").arg(images::dir().join("firmware"));
+    command.arg("--page-program").arg(built("nodectl"));
     command
 }

@@ -119,6 +119,7 @@ const CSSC: u32 = 23;
 const HSI_HERTZ: u64 = 16_000_000;
 
 /// The reset and clock controller.
+#[derive(Clone)]
 pub(crate) struct Rcc {
     variant: Variant,
     /// Frequency of the clock on OSC_IN; `None` without one.

@@ -1,6 +1,7 @@
 //! Registers that only hold what is written to them.
 
 /// One plain register of a peripheral.
+#[derive(Clone)]
 pub(crate) struct Plain {
     /// Byte offset from the base of the peripheral.
     pub(crate) offset: u32,

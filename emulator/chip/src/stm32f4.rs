@@ -33,6 +33,7 @@ use crate::variant::Variant;
 pub(crate) const PORTS: usize = 9;
 
 /// An STM32F4 without its core, on its board.
+#[derive(Clone)]
 pub struct Stm32f4 {
     pub(crate) variant: Variant,
     pub(crate) board: Board,

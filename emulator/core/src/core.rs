@@ -17,12 +17,15 @@ use crate::scb::Scb;
 use crate::stats::Stats;
 use crate::stepping::Stepping;
 use crate::systick::SysTick;
+use crate::watch::Watch;
 
 /// Why the CPU library was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Halt {
     /// Something is due: time, an effect, an interrupt.
     Attention,
+    /// A point that is watched for.
+    Watched,
     /// The core branched to an EXC_RETURN value.
     ExceptionReturn,
     /// SVC; the address after it.
@@ -62,6 +65,8 @@ pub(crate) struct Core<P> {
     pub(crate) profile: Profile,
     /// Interrupts come between any two instructions.
     pub(crate) stepping: Option<Stepping>,
+    /// Points before which the program stops.
+    pub(crate) watch: Option<Watch>,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
     /// Rules that were found broken: when, and where the program was.
@@ -82,6 +87,20 @@ pub(crate) struct Core<P> {
     pub(crate) flash_closed: bool,
     /// How often the flash array was written.
     pub(crate) flash_changes: u64,
+    cyccnt: Option<Cyccnt>,
+}
+
+/// The part of a [`crate::Moment`] that is here.
+pub(crate) struct CoreMoment<P> {
+    chip: P,
+    times: [Time; 4],
+    nvic: Nvic,
+    scb: Scb,
+    systick: SysTick,
+    stats: Stats,
+    effects: VecDeque<Effect>,
+    pended: [Time; Exception::COUNT],
+    flags: [bool; 2],
     cyccnt: Option<Cyccnt>,
 }
 
@@ -107,6 +126,7 @@ impl<P: Peripherals> Core<P> {
             stats: Stats::default(),
             profile: Profile::default(),
             stepping: None,
+            watch: None,
             halt: None,
             unmapped: None,
             breaches: VecDeque::new(),
@@ -122,6 +142,44 @@ impl<P: Peripherals> Core<P> {
             flash_changes: 0,
             cyccnt: None,
         }
+    }
+
+    /// What a program can see, and the time.
+    pub(crate) fn moment(&self) -> CoreMoment<P>
+    where
+        P: Clone,
+    {
+        CoreMoment {
+            chip: self.chip.clone(),
+            times: [self.now, self.cycle, self.until, self.due],
+            nvic: self.nvic.clone(),
+            scb: self.scb.clone(),
+            systick: self.systick.clone(),
+            stats: self.stats.clone(),
+            effects: self.effects.clone(),
+            pended: self.pended,
+            flags: [self.reset_requested, self.exclusive],
+            cyccnt: self.cyccnt,
+        }
+    }
+
+    /// Back to that moment.
+    pub(crate) fn go_back(&mut self, moment: &CoreMoment<P>)
+    where
+        P: Clone,
+    {
+        self.chip = moment.chip.clone();
+        [self.now, self.cycle, self.until, self.due] = moment.times;
+        self.nvic = moment.nvic.clone();
+        self.scb = moment.scb.clone();
+        self.systick = moment.systick.clone();
+        self.stats = moment.stats.clone();
+        self.effects.clone_from(&moment.effects);
+        self.pended = moment.pended;
+        [self.reset_requested, self.exclusive] = moment.flags;
+        self.cyccnt = moment.cyccnt;
+        self.halt = None;
+        self.unmapped = None;
     }
 
     /// Back to the state after a reset; the clock of virtual time and the counters go on.

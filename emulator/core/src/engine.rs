@@ -2,7 +2,8 @@
 
 use chip::{Effect, Peripherals};
 use unicorn_engine::{
-    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn, uc_error,
+    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn,
+    uc_error,
 };
 
 use crate::core::{Core, Halt, Unmapped};
@@ -93,7 +94,7 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     if let Some(exception) = stepping.arrived(place) {
         cpu.get_data_mut().pend(exception);
     }
-    let mut code = [0; 18];
+    let mut code = [0; stepping::LONGEST_BLOCK];
     let charged = cpu.get_data().memory.read(place, &mut code).map_or(size, |()| stepping::length(&code));
     let traps_division = cpu.get_data().scb.ccr & DIV_0_TRP != 0;
     if let Some(status) = alignment::fault(&code, traps_division, |number| core_register(cpu, number)) {
@@ -108,8 +109,29 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     }
 }
 
+/// Has every instruction looked at by the [`crate::watch::Watch`].
+pub(crate) fn watch<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<UcHookId, Error> {
+    let hook = cpu.add_code_hook(1, 0, on_watched)?;
+    cpu.ctl_flush_tb()?;
+    Ok(hook)
+}
+
+/// What stops for something else comes by again.
+fn on_watched<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
+    let core = cpu.get_data_mut();
+    if address & !0xFFF == HIDDEN || core.halt.is_some() {
+        return;
+    }
+    let mut code = [0; stepping::LONGEST_BLOCK];
+    let block = core.memory.read(address as u32, &mut code).map_or(size, |()| stepping::length(&code));
+    if core.watch.as_mut().is_some_and(|watch| watch.stops_before(address as u32, size, block)) {
+        core.halt = Some(Halt::Watched);
+        let _ = cpu.emu_stop();
+    }
+}
+
 /// R0 to R14 by number.
-fn core_register<P>(cpu: &Unicorn<Core<P>>, number: u16) -> u32 {
+pub(crate) fn core_register<P>(cpu: &Unicorn<Core<P>>, number: u16) -> u32 {
     let register = match number {
         0..=12 => RegisterARM::R0 as i32 + i32::from(number),
         13 => RegisterARM::SP as i32,

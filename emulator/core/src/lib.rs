@@ -13,6 +13,7 @@
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
 //! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
 //! | `stepping`, `alignment` | the mode in which interrupts come between any two instructions; what only that mode notices |
+//! | `watch` | stopping before an instruction, skipping it, flipping a bit of a register, going back |
 //! | `cost`, `stats`, `profile` | cycles of a block; what was counted, and where |
 //! | `loader` | ELF files |
 //!
@@ -50,6 +51,7 @@ mod scb;
 mod stats;
 mod stepping;
 mod systick;
+mod watch;
 
 pub use exception::Exception;
 pub use fault::Fault;
@@ -60,3 +62,4 @@ pub use mechanism::Mechanism;
 pub use model::{Error, Model};
 pub use profile::Visits;
 pub use stats::{Activity, Stats};
+pub use watch::{Moment, Point};

@@ -2,7 +2,7 @@
 
 use canbus::Time;
 use chip::{BusFault, Effect, Peripherals};
-use unicorn_engine::{RegisterARM, uc_error};
+use unicorn_engine::{RegisterARM, UcHookId, uc_error};
 
 use crate::core::{Core, Halt};
 use crate::engine::{self, Cpu};
@@ -33,6 +33,8 @@ pub enum Stop {
     },
     /// The supply is gone, as a test asked for.
     PowerCut,
+    /// A point is reached that [`Machine::watch`] was given.
+    Watched,
 }
 
 /// A core, its memory, and a chip.
@@ -46,6 +48,10 @@ pub struct Machine<P: Peripherals + 'static> {
     /// A load waits for flash: until then nothing else happens in the core.
     loading: bool,
     incidents: Vec<(Time, Incident)>,
+    /// The hook of [`Machine::watch`].
+    pub(crate) watching: Option<UcHookId>,
+    /// The program has stopped at a watched point.
+    at_point: bool,
 }
 
 impl<P: Peripherals + 'static> Machine<P> {
@@ -65,6 +71,8 @@ impl<P: Peripherals + 'static> Machine<P> {
             stall: Time::ZERO,
             loading: false,
             incidents: vec![],
+            watching: None,
+            at_point: false,
         })
     }
 
@@ -246,7 +254,20 @@ impl<P: Peripherals + 'static> Machine<P> {
                 return self.locked.map_or(Stop::Reached, |pc| Stop::Lockup { pc });
             }
             self.step(until);
+            if std::mem::take(&mut self.at_point) {
+                return Stop::Watched;
+            }
         }
+    }
+
+    /// What a [`crate::Moment`] keeps of the machine itself.
+    pub(crate) fn state(&self) -> (bool, Option<u32>, Time, bool) {
+        (self.sleeping, self.locked, self.stall, self.loading)
+    }
+
+    pub(crate) fn set_state(&mut self, state: (bool, Option<u32>, Time, bool)) {
+        (self.sleeping, self.locked, self.stall, self.loading) = state;
+        self.powered = true;
     }
 
     /// Everything that is due before the next block: events, effects, resets.
@@ -348,6 +369,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         let result = self.cpu.emu_start(u64::from(self.pc() | 1), 0, 0, 0);
         match (result, self.cpu.get_data_mut().halt.take()) {
             (_, Some(Halt::Attention)) => {}
+            (_, Some(Halt::Watched)) => self.at_point = true,
             (_, Some(Halt::ExceptionReturn)) => self.leave(),
             (_, Some(Halt::SupervisorCall)) => self.supervisor_call(),
             (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),

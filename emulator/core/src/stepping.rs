@@ -60,21 +60,30 @@ impl Stepping {
     }
 }
 
+/// Bytes of the longest IT block: the IT instruction and four wide ones.
+pub(crate) const LONGEST_BLOCK: usize = 18;
+
 /// Bytes of the instruction at the start of `code`, and of its block where it is an IT instruction (ARMv7-M, A7.7.37).
 pub(crate) fn length(code: &[u8]) -> u32 {
-    let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
-    let first = halves.next().unwrap_or(0);
+    instructions(code).last().map_or(0, |(at, size)| at + size)
+}
+
+/// The instruction at the start of `code`, and those of its block where it is an IT instruction: distance and bytes of each.
+pub(crate) fn instructions(code: &[u8]) -> Vec<(u32, u32)> {
+    let half = |at: u32| {
+        let bytes = code.get(at as usize..at as usize + 2);
+        bytes.map(|bytes| u16::from_le_bytes([bytes[0], bytes[1]]))
+    };
+    let first = half(0).unwrap_or(0);
     let conditional =
         if first >> 8 == 0xBF && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 };
-    let mut size = width(first);
+    let mut all = vec![(0, width(first))];
     for _ in 0..conditional {
-        let Some(next) = halves.next() else { break };
-        if width(next) == 4 {
-            halves.next();
-        }
-        size += width(next);
+        let at = all.last().map_or(0, |(at, size)| at + size);
+        let Some(next) = half(at) else { break };
+        all.push((at, width(next)));
     }
-    size
+    all
 }
 
 /// Bytes of an instruction that begins with this halfword.

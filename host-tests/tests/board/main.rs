@@ -11,6 +11,7 @@ mod damage;
 mod differential;
 mod encoder;
 mod faults;
+mod flashing;
 mod lift;
 mod lost_events;
 mod measuring;

@@ -1,6 +1,7 @@
 //! What the application of this project says of itself where nobody says otherwise.
 
 use anyhow::{Context, Result};
+use ed25519_dalek::SigningKey;
 use update::{Description, Version};
 
 use crate::code;
@@ -23,12 +24,20 @@ pub fn version(text: &str) -> Result<Version> {
     Ok(Version { major, minor, patch })
 }
 
-/// The image of an application, signed with the development key, of the version of this project.
+/// The image of an application, signed with this key, of the version of this project.
+///
+/// # Errors
+/// The file is no application.
+pub fn image(file: &[u8], key: &SigningKey) -> Result<Image> {
+    let version = version(env!("CARGO_PKG_VERSION"))?;
+    let about = Description { product: PRODUCT, hardware: HARDWARE, version, counter: 0 };
+    Image::sign(about, code::read(file)?, key)
+}
+
+/// The same, signed with the development key.
 ///
 /// # Errors
 /// The file is no application.
 pub fn development_image(file: &[u8]) -> Result<Image> {
-    let version = version(env!("CARGO_PKG_VERSION"))?;
-    let about = Description { product: PRODUCT, hardware: HARDWARE, version, counter: 0 };
-    Image::sign(about, code::read(file)?, &key::development())
+    image(file, &key::development())
 }

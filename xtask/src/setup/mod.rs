@@ -27,16 +27,29 @@ pub(crate) enum Need {
     TargetLints,
     /// A Python that makes environments: the outside judges python-can and canopen run in one.
     Python,
+    /// The tool that writes the flash of a board.
+    Probe,
     /// The protocol analyser that judges what was said on the bus.
     Tshark,
+    /// The browser that shows the page of the bus, and the program that drives it.
+    Browser,
 }
 
 /// What `cargo sim` needs.
 pub(crate) const SIM: &[Need] = &[Need::Target, Need::Emulator];
 
+/// What the images need.
+pub(crate) const IMAGES: &[Need] = &[Need::Target];
+
+/// What `cargo xtask flash` needs.
+pub(crate) const FLASH: &[Need] = &[Need::Target, Need::Probe];
+
 /// What `cargo xtask test` needs.
 pub(crate) const TEST: &[Need] =
-    &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark];
+    &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark, Need::Browser];
+
+/// What `cargo xtask pictures` needs.
+pub(crate) const PICTURES: &[Need] = &[Need::Target, Need::Emulator, Need::Python, Need::Browser];
 
 /// Ends with the one command that installs what is missing, where this user cannot go on without it.
 pub(crate) fn check(needs: &[Need]) -> Result<()> {
@@ -52,7 +65,9 @@ fn missing(needs: &[Need]) -> Vec<Package> {
             Need::Target => target::missing(),
             Need::TargetLints => target::missing_lints(),
             Need::Python => python::missing(),
-            Need::Tshark => tshark(),
+            Need::Probe => package_unless(system::runs("probe-rs"), Package::ProbeRs),
+            Need::Tshark => package_unless(system::runs("tshark"), Package::Tshark),
+            Need::Browser => browser(),
         };
         for package in of_need {
             if !packages.contains(&package) {
@@ -68,8 +83,13 @@ pub(crate) fn install(needs: &[Need]) -> Result<()> {
     system::install(&missing(needs))
 }
 
-fn tshark() -> Vec<Package> {
-    if system::runs("tshark") { Vec::new() } else { vec![Package::Tshark] }
+fn package_unless(is_there: bool, package: Package) -> Vec<Package> {
+    if is_there { Vec::new() } else { vec![package] }
+}
+
+fn browser() -> Vec<Package> {
+    let programs = [("chromium", Package::Chromium), ("chromedriver", Package::Chromedriver)];
+    programs.into_iter().filter(|(program, _)| !system::runs(program)).map(|(_, package)| package).collect()
 }
 
 /// `cargo xtask setup`: brings everything that the test command needs, or only says what is missing.

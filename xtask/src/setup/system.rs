@@ -21,6 +21,10 @@ pub(crate) enum Package {
     Python,
     /// The protocol analyser.
     Tshark,
+    /// The browser.
+    Chromium,
+    /// The program that drives the browser.
+    Chromedriver,
     /// Debian's compiler for the Cortex-M4.
     DebianRust,
     /// Its source of the core library.
@@ -35,6 +39,8 @@ pub(crate) enum Package {
     DebianLlvm,
     /// The target, where only the user can have rustup add it.
     RustTarget,
+    /// probe-rs, which no Debian has.
+    ProbeRs,
 }
 
 /// A package manager.
@@ -64,13 +70,15 @@ impl Manager {
         };
         let names = self.names(packages).join(" ");
         let install = (!names.is_empty()).then(|| format!("{start} {names}"));
-        let add = packages.contains(&Package::RustTarget).then(add_target);
-        install.into_iter().chain(add).collect::<Vec<_>>().join(" && ")
+        install.into_iter().chain(own_commands(packages)).collect::<Vec<_>>().join(" && ")
     }
 
     fn names(self, packages: &[Package]) -> Vec<&'static str> {
-        let from_here = packages.iter().filter(|package| **package != Package::RustTarget);
-        from_here.map(|package| self.name(*package)).collect()
+        let from_here = packages.iter().filter(|package| package.own_command().is_none());
+        let mut names: Vec<&str> = from_here.map(|package| self.name(*package)).collect();
+        // Some have the browser and its driver in one package.
+        names.dedup();
+        names
     }
 
     fn name(self, package: Package) -> &'static str {
@@ -93,6 +101,8 @@ impl Package {
             Package::Libclang => ["libclang-dev", "clang-devel", "clang", "llvm"],
             Package::Python => ["python3-venv", "python3", "python", "python"],
             Package::Tshark => ["tshark", "wireshark-cli", "wireshark-cli", "wireshark"],
+            Package::Chromium => ["chromium"; 4],
+            Package::Chromedriver => ["chromium-driver", "chromedriver", "chromium", "chromedriver"],
             // These are asked for where Debian's packages are the way to the target, and nowhere else.
             Package::DebianRust => ["rustc-web"; 4],
             Package::DebianRustSource => ["rust-web-src"; 4],
@@ -101,6 +111,16 @@ impl Package {
             Package::DebianLinker => ["lld-22"; 4],
             Package::DebianLlvm => ["llvm-22"; 4],
             Package::RustTarget => [TRIPLE; 4],
+            Package::ProbeRs => ["probe-rs"; 4],
+        }
+    }
+
+    /// What brings it, where that is not the package manager.
+    fn own_command(self) -> Option<String> {
+        match self {
+            Package::RustTarget => Some(add_target()),
+            Package::ProbeRs => Some("cargo install --locked probe-rs-tools".to_owned()),
+            _ => None,
         }
     }
 
@@ -111,6 +131,7 @@ impl Package {
             }
             Package::Python => "cmake, libclang and the tests' CANopen clients come from PyPI",
             Package::Tshark => "the tests have it decode what was said on the bus",
+            Package::Chromium | Package::Chromedriver => "the tests look at the page of the bus with it",
             Package::DebianRust
             | Package::DebianRustSource
             | Package::DebianCargo
@@ -120,13 +141,14 @@ impl Package {
             }
             Package::DebianLlvm => "its llvm-cov reads the counters",
             Package::RustTarget => "the firmware is built for it, and rustup cannot add it from here",
+            Package::ProbeRs => "it writes the flash of a board and reads its log (https://probe.rs)",
         }
     }
 }
 
 /// An error with the one command that installs these packages, where this user cannot.
 pub(crate) fn check(packages: &[Package]) -> Result<()> {
-    let is_installable = may_install() && !packages.contains(&Package::RustTarget);
+    let is_installable = may_install() && own_commands(packages).next().is_none();
     if packages.is_empty() || is_installable {
         return Ok(());
     }
@@ -161,8 +183,15 @@ pub(crate) fn describe(packages: &[Package]) -> String {
     }
     text + &match manager {
         Some(manager) => format!("run this, then try again:\n\n    {}\n", manager.command(packages)),
-        None => "install this with your system's package manager, then try again".to_owned(),
+        None => own_commands(packages).fold(
+            "install this with your system's package manager, then try again".to_owned(),
+            |text, command| format!("{text}\n\n    {command}"),
+        ),
     }
+}
+
+fn own_commands(packages: &[Package]) -> impl Iterator<Item = String> {
+    packages.iter().filter_map(|package| package.own_command())
 }
 
 /// The command of a user whose rustup may not download by itself.

@@ -1,0 +1,213 @@
+//! Stopping a program before an instruction, and going back to that moment: what a test of faults needs, which lets the same
+//! moment go on in many ways.
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+
+use canbus::Time;
+use chip::Peripherals;
+use unicorn_engine::{Context, RegisterARM, UcHookId};
+
+use crate::core::CoreMoment;
+use crate::engine;
+use crate::machine::Machine;
+use crate::model::Error;
+use crate::stepping;
+
+/// An instruction, and how often it has run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Point {
+    /// Its address.
+    pub address: u32,
+    /// Which of its visits: 1 is the first.
+    pub visit: u64,
+}
+
+/// What is watched for.
+#[derive(Debug, Default)]
+pub(crate) struct Watch {
+    visits: HashMap<u32, u64>,
+    stops: HashSet<Point>,
+    /// The instructions of an IT block that has begun: the CPU library does not stop inside of it.
+    conditional: Range<u32>,
+    /// Stop before the first instruction that is not one of these, and count nothing.
+    outside: Option<Range<u32>>,
+    /// Where the program was stopped; not counted yet.
+    pub(crate) stopped: Option<Point>,
+}
+
+impl Watch {
+    /// Counts an instruction that is about to run, unless the program is to stop before it.
+    pub(crate) fn stops_before(&mut self, address: u32, size: u32, block: u32) -> bool {
+        if let Some(inside) = &self.outside {
+            return !inside.contains(&address);
+        }
+        let visit = self.visits.get(&address).copied().unwrap_or(0) + 1;
+        let point = Point { address, visit };
+        let goes_on = self.stopped.take() == Some(point);
+        if !goes_on && !self.conditional.contains(&address) && self.stops.contains(&point) {
+            self.stopped = Some(point);
+            return true;
+        }
+        self.visits.insert(address, visit);
+        if block > size {
+            self.conditional = address + size..address + block;
+        }
+        false
+    }
+}
+
+/// A moment of a machine, to go back to.
+pub struct Moment<P> {
+    registers: Context,
+    core: CoreMoment<P>,
+    memory: [Vec<u8>; 2],
+    machine: (bool, Option<u32>, Time, bool),
+}
+
+impl<P: Peripherals + 'static> Machine<P> {
+    /// Counts from now on how often each instruction runs, and stops before each of these points. It is several times slower.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn watch(&mut self, stops: impl IntoIterator<Item = Point>) -> Result<(), Error> {
+        self.unwatch()?;
+        let watch = Watch { stops: stops.into_iter().collect(), ..Watch::default() };
+        self.cpu.get_data_mut().watch = Some(watch);
+        self.resume_watch()
+    }
+
+    /// How often each instruction has run while it was watched, by rising addresses.
+    pub fn visits(&self) -> Vec<Point> {
+        let visits = self.cpu.get_data().watch.iter().flat_map(|watch| &watch.visits);
+        let mut all: Vec<Point> = visits.map(|(&address, &visit)| Point { address, visit }).collect();
+        all.sort_by_key(|point| point.address);
+        all
+    }
+
+    /// Where the program was stopped.
+    pub fn stopped(&self) -> Option<Point> {
+        self.cpu.get_data().watch.as_ref()?.stopped
+    }
+
+    /// Neither counts nor stops any more, at full speed, until [`Machine::resume_watch`].
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn unwatch(&mut self) -> Result<(), Error> {
+        if let Some(hook) = self.watching.take() {
+            self.cpu.remove_hook(hook)?;
+            self.cpu.ctl_flush_tb()?;
+        }
+        Ok(())
+    }
+
+    /// Counts and stops as before.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn resume_watch(&mut self) -> Result<(), Error> {
+        if self.watching.is_none() {
+            let hook: UcHookId = engine::watch(&mut self.cpu)?;
+            self.watching = Some(hook);
+        }
+        Ok(())
+    }
+
+    /// Everything but what was counted.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn moment(&self) -> Result<Moment<P>, Error>
+    where
+        P: Clone,
+    {
+        let (model, core) = (self.model(), self.cpu.get_data());
+        let copy = |range: &Range<u32>| {
+            let mut bytes = vec![0; range.len()];
+            let _ = self.read(range.start, &mut bytes);
+            bytes
+        };
+        Ok(Moment {
+            registers: self.cpu.context_init()?,
+            core: core.moment(),
+            memory: [copy(&model.flash), copy(&model.ram)],
+            machine: self.state(),
+        })
+    }
+
+    /// Goes back to a moment of this machine.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn go_back(&mut self, moment: &Moment<P>) -> Result<(), Error>
+    where
+        P: Clone,
+    {
+        /// What is compared at once: most of memory is as it was, and what was translated from there stays.
+        const CHUNK: usize = 1024;
+        let starts = [self.model().flash.start, self.model().ram.start];
+        for (start, bytes) in starts.into_iter().zip(&moment.memory) {
+            for (address, chunk) in (start..).step_by(CHUNK).zip(bytes.chunks(CHUNK)) {
+                let mut now = [0; CHUNK];
+                let _ = self.read(address, &mut now[..chunk.len()]);
+                if now[..chunk.len()] != *chunk {
+                    engine::store(&mut self.cpu, address, chunk)?;
+                }
+            }
+        }
+        self.set_state(moment.machine);
+        self.cpu.get_data_mut().go_back(&moment.core);
+        self.cpu.context_restore(&moment.registers)?;
+        Ok(())
+    }
+
+    /// The instruction that is next, and those of its block where it is an IT instruction: address and bytes of each.
+    pub fn next_instructions(&self) -> Vec<(u32, u32)> {
+        let mut code = [0; stepping::LONGEST_BLOCK];
+        let address = self.pc();
+        // Code that cannot be read is none.
+        let _ = self.read(address, &mut code);
+        stepping::instructions(&code).into_iter().map(|(at, size)| (address + at, size)).collect()
+    }
+
+    /// The next instruction does not run. Of an IT block it may be any: the others run as their conditions say.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn skip(&mut self, (address, size): (u32, u32)) -> Result<(), Error> {
+        if address == self.pc() {
+            self.set(RegisterARM::PC, (address + size) | 1);
+            return Ok(());
+        }
+        let (first, block) = (self.pc(), self.next_instructions());
+        let end = block.last().map_or(address + size, |(last, size)| last + size);
+        let mut original = [0; 4];
+        let original = &mut original[..size as usize];
+        let _ = self.read(address, original);
+        engine::store(&mut self.cpu, address, &NOPS[..size as usize])?;
+        self.run_until_outside(first..end)?;
+        engine::store(&mut self.cpu, address, original)
+    }
+
+    /// Changes one bit of R0 to R14.
+    pub fn flip(&mut self, register: u8, bit: u8) {
+        let value = engine::core_register(&self.cpu, register.into());
+        self.set_register(register, value ^ 1 << bit);
+    }
+
+    fn run_until_outside(&mut self, block: Range<u32>) -> Result<(), Error> {
+        /// An IT block takes less.
+        const ENOUGH: Time = Time::from_micros(10);
+        let kept = self.cpu.get_data_mut().watch.replace(Watch { outside: Some(block), ..Watch::default() });
+        self.resume_watch()?;
+        let until = self.now() + ENOUGH;
+        self.run_until(until);
+        self.unwatch()?;
+        self.cpu.get_data_mut().watch = kept;
+        Ok(())
+    }
+}
+
+/// Two instructions that do nothing.
+const NOPS: [u8; 4] = [0x00, 0xBF, 0x00, 0xBF];

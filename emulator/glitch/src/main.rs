@@ -1,0 +1,85 @@
+//! The program behind `cargo xtask fault-injection`, which builds the bootloader first.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use clap::Parser;
+use glitch::{Campaign, Extent, Places, Scene};
+
+/// Skips each instruction of the bootloader's decision, and flips bits of registers before it: nothing that is unsigned or older may
+/// start.
+#[derive(Parser)]
+#[command(name = "cargo xtask fault-injection", version)]
+struct Cli {
+    /// The ELF file of the bootloader, built for the key of the tests
+    #[arg(long)]
+    bootloader: PathBuf,
+    /// Only scenes whose name contains this
+    #[arg(long)]
+    scene: Option<String>,
+    /// Take every so many instructions
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    every: u16,
+    /// Take every so many of those in the loops of hashes, sums and points
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    every_of_loops: u16,
+    /// Flip so many bits of registers at each point; there are 480
+    #[arg(long, default_value_t = 4)]
+    flips: usize,
+}
+
+fn main() -> ExitCode {
+    run(&Cli::parse()).map_or_else(
+        |error| {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        },
+        |()| ExitCode::SUCCESS,
+    )
+}
+
+fn run(cli: &Cli) -> Result<()> {
+    let bootloader = std::fs::read(&cli.bootloader)
+        .with_context(|| format!("cannot read {}", cli.bootloader.display()))?;
+    let places = Places::of(&bootloader)?;
+    let boards = std::thread::available_parallelism()?.get();
+    let extent = Extent {
+        every: cli.every.into(),
+        every_of_loops: cli.every_of_loops.into(),
+        flips: cli.flips,
+        boards,
+    };
+    let mut violations = 0;
+    for scene in Scene::all()? {
+        if cli.scene.as_ref().is_some_and(|name| !scene.name.contains(name.as_str())) {
+            continue;
+        }
+        let begin = Instant::now();
+        let campaign = Campaign::run(&bootloader, &scene, extent)?;
+        print(&scene, &campaign, begin.elapsed().as_secs_f64());
+        for violation in &campaign.violations {
+            println!(
+                "  BROKEN {:?}, visit {}: {}",
+                violation.fault,
+                violation.point.visit,
+                places.name(violation.point.address)
+            );
+        }
+        violations += campaign.violations.len();
+    }
+    ensure!(violations == 0, "{violations} faults made run what may not");
+    println!("nothing unsigned and nothing older has started");
+    Ok(())
+}
+
+fn print(scene: &Scene, campaign: &Campaign, seconds: f64) {
+    println!("{}: {}", scene.name, scene.what);
+    let Campaign { instructions, loops, points, .. } = campaign;
+    println!("  {instructions} instructions, {loops} of them in loops of hashes, sums and points");
+    println!("  {} faults at {points} points, {seconds:.0} s", campaign.faults());
+    for ((kind, what), count) in &campaign.outcomes {
+        println!("  {count:>8} {kind}: {what}");
+    }
+}

@@ -1,0 +1,29 @@
+//! Small applications: whichever instruction is the first, they leave a word in RAM and wait for the watchdog.
+
+use bsp::sectors::FLASH;
+use bsp::update_layout::LAYOUT;
+use update::HEADER_LEN;
+
+/// Where the word goes: the far end of the stack, which the bootloader does not reach.
+pub(crate) const PLACE: u32 = 0x2000_0000;
+/// The application that may run.
+pub(crate) const GOOD: u32 = 0x600D_600D;
+/// The application that may not.
+pub(crate) const BAD: u32 = 0x0BAD_0BAD;
+
+const STACK: u32 = 0x2002_0000;
+const NOP: u16 = 0xBF00;
+/// Instructions that do nothing in front of those that do something: a jump to the wrong place is seen too.
+const SLED: usize = 56;
+
+/// The code of an application that leaves this word, with its vector table.
+pub(crate) fn code(word: u32) -> Vec<u8> {
+    let entry = FLASH + LAYOUT.application().start() + HEADER_LEN as u32 + 8;
+    // ldr r0, =PLACE; ldr r1, =word; str r1, [r0]; b .
+    let says = [0x4801, 0x4902, 0x6001, 0xE7FE];
+    let instructions = [NOP; SLED].into_iter().chain(says);
+    let mut code = [STACK, entry | 1].map(u32::to_le_bytes).concat();
+    code.extend(instructions.flat_map(u16::to_le_bytes));
+    code.extend([PLACE, word].map(u32::to_le_bytes).concat());
+    code
+}

@@ -1,0 +1,145 @@
+//! What lies in the flash when a board is switched on, and what the bootloader has to make of it.
+
+use anyhow::{Context, Result, ensure};
+use bsp::sectors;
+use bsp::update_layout::LAYOUT;
+use ed25519_dalek::SigningKey;
+use sign::image::Image;
+use update::mock::MockFlash;
+use update::{Description, HEADER_LEN, Next, Phase, Status, Target, Updater, Version};
+
+use crate::program::{BAD, GOOD, code};
+
+/// The secret key whose public half the bootloader was built with: `cargo xtask` and the tests of the owner's bootloader use it.
+const OWNER: [u8; 32] = [0x42; 32];
+const NEWER: u32 = 3;
+const OLDER: u32 = 2;
+
+/// How it comes to the decision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Start {
+    /// Power comes.
+    Power,
+    /// The watchdog resets the chip, after an application has run whose signature was found good. This is the flash from then on.
+    Reset,
+}
+
+/// A content of the flash that holds a program which must not run.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// What it is called.
+    pub name: &'static str,
+    /// What the program is that must not run.
+    pub what: &'static str,
+    pub(crate) flash: Vec<u8>,
+    pub(crate) start: Start,
+    /// Another program has to run; else the bootloader stays.
+    pub(crate) has_good: bool,
+}
+
+impl Scene {
+    /// All of them.
+    ///
+    /// # Errors
+    /// The images cannot be made.
+    pub fn all() -> Result<Vec<Scene>> {
+        let bare = |application: &[u8]| with(erased(), application);
+        let unsigned = unsigned()?.to_bytes();
+        let headless = [&[0xFF; HEADER_LEN][..], &code(BAD)].concat();
+        let alone = |name, what, flash, start| Scene { name, what, flash, start, has_good: false };
+        let staged = |name, what, flash| Scene { name, what, flash, start: Start::Power, has_good: true };
+        Ok(vec![
+            alone("unsigned", "an application that nobody has signed", bare(&unsigned), Start::Power),
+            alone("bare", "an application without a header", bare(&headless), Start::Power),
+            alone(
+                "exchanged",
+                "an application that took the place of a signed one before a reset",
+                bare(&unsigned),
+                Start::Reset,
+            ),
+            staged(
+                "older",
+                "an older image, signed, that waits to be copied",
+                waiting(&older()?.to_bytes())?,
+            ),
+            staged(
+                "waiting",
+                "an image that nobody has signed and that waits to be copied",
+                waiting(&unsigned)?,
+            ),
+        ])
+    }
+
+    /// A flash with the application that may run.
+    pub(crate) fn good() -> Result<Vec<u8>> {
+        Ok(with(erased(), &newer()?.to_bytes()))
+    }
+}
+
+fn owner() -> SigningKey {
+    SigningKey::from_bytes(&OWNER)
+}
+
+fn signed(word: u32, counter: u32) -> Result<Image> {
+    let version = Version { major: 1, minor: 0, patch: 0 };
+    let about = Description { product: product::BOARD, hardware: 1, version, counter };
+    Image::sign(about, code(word), &owner())
+}
+
+fn newer() -> Result<Image> {
+    signed(GOOD, NEWER)
+}
+
+fn older() -> Result<Image> {
+    signed(BAD, OLDER)
+}
+
+/// Newer than what is there, for this product, with good sums.
+fn unsigned() -> Result<Image> {
+    let image = signed(BAD, NEWER)?;
+    Ok(Image { header: image.header.with_signature([0; 64]), ..image })
+}
+
+/// Of the sectors.
+fn sizes() -> Vec<usize> {
+    sectors::all().map(|sector| sector.size as usize).collect()
+}
+
+fn erased() -> Vec<u8> {
+    vec![0xFF; sizes().iter().sum()]
+}
+
+fn with(mut flash: Vec<u8>, application: &[u8]) -> Vec<u8> {
+    put(&mut flash, LAYOUT.application().start(), application);
+    flash
+}
+
+fn put(flash: &mut [u8], at: u32, bytes: &[u8]) {
+    flash[at as usize..at as usize + bytes.len()].copy_from_slice(bytes);
+}
+
+/// A flash in which an image waits to be copied over the good application. The record that says so was made for an image that was
+/// good: whoever can write the flash writes the record too.
+fn waiting(image: &[u8]) -> Result<Vec<u8>> {
+    let target = Target {
+        layout: LAYOUT,
+        product: product::BOARD,
+        hardware: 0,
+        key: owner().verifying_key().to_bytes(),
+    };
+    let mut flash = MockFlash::new(&sizes(), 1);
+    let mut updater = Updater::new(&mut flash, target, Status::GOOD);
+    updater.clear()?;
+    while updater.poll() != Next::Nothing {}
+    updater.begin(None)?;
+    updater.receive(&newer()?.to_bytes())?;
+    updater.finish()?;
+    while updater.poll() != Next::Nothing {}
+    ensure!(updater.phase() == Phase::Committed, "the image is good: {}", updater.status());
+    let mut flash = with(flash.bytes().to_vec(), &newer()?.to_bytes());
+    let staging = LAYOUT.staging().start();
+    put(&mut flash, staging, image);
+    let length = u32::try_from(image.len()).context("an image of some hundred bytes")?;
+    put(&mut flash, staging + length, &[0xFF; 4]);
+    Ok(flash)
+}

@@ -1,0 +1,65 @@
+//! What `cargo xtask flash` writes into a board on a bench, beside the flash of the emulated board.
+
+use std::ops::Range;
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use ed25519_dalek::SigningKey;
+use flash::Content;
+use sign::key;
+
+use crate::support::{firmware, images, world};
+
+const FLASH: usize = 0x0800_0000;
+/// The pages of the parameter store, which no programmer writes (memory.x).
+const PARAMETERS: Range<usize> = 0x8000..0x1_0000;
+
+fn content(key: SigningKey) -> Result<Content, String> {
+    let bootloader = std::fs::read(images().join("bootloader")).unwrap();
+    Content::new(&bootloader, &firmware(), key).map_err(|error| format!("{error:#}"))
+}
+
+fn emulated() -> Vec<u8> {
+    world("--bitrate 1000").boards()[0].flash()
+}
+
+#[test]
+fn a_board_on_a_bench_gets_what_the_emulated_board_has() {
+    let emulated = emulated();
+    let mut written = vec![0xFF; emulated.len()];
+    for part in content(key::development()).unwrap().parts() {
+        let at = part.address as usize - FLASH;
+        written[at..at + part.bytes.len()].copy_from_slice(&part.bytes);
+    }
+    assert!(written[PARAMETERS].iter().all(|byte| *byte == 0xFF), "parameters are not written");
+    written[PARAMETERS].copy_from_slice(&emulated[PARAMETERS]);
+    let differs = (0..written.len()).find(|at| written[*at] != emulated[*at]);
+    assert_eq!(differs.map(|at| format!("{:#010x}", FLASH + at)), None);
+}
+
+/// A line of a dry run: `bootloader  0x08000000..0x08000080     128 bytes, CRC-32 0x01234567`.
+fn range_and_crc(line: &str) -> Option<(Range<usize>, u32)> {
+    let number = |text: &str| usize::from_str_radix(text.strip_prefix("0x")?, 16).ok();
+    let (start, end) = line.split_whitespace().nth(1)?.split_once("..")?;
+    let crc = number(line.split_whitespace().next_back()?)?;
+    Some((number(start)?..number(end)?, u32::try_from(crc).ok()?))
+}
+
+#[test]
+fn a_dry_run_says_the_ranges_and_what_is_in_them() {
+    let says = content(key::development()).unwrap().to_string();
+    let emulated = emulated();
+    let parts: Vec<_> = says.lines().filter_map(range_and_crc).collect();
+    println!("{says}");
+    assert_eq!(parts.len(), 3, "start-up code and program of the bootloader, and the application");
+    for (range, crc) in parts {
+        let bytes = &emulated[range.start - FLASH..range.end - FLASH];
+        assert_eq!(Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(bytes), crc, "{range:x?}");
+    }
+    assert!(says.contains(env!("CARGO_PKG_VERSION")) && says.contains("known to everybody"), "{says}");
+}
+
+#[test]
+fn a_key_that_the_bootloader_does_not_trust_is_refused_before_anything_is_written() {
+    let refused = content(SigningKey::from_bytes(&[7; 32])).unwrap_err();
+    assert!(refused.contains("another key"), "{refused}");
+}

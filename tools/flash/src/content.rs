@@ -1,0 +1,105 @@
+//! The content of the flash: the bootloader as it was linked, and the application behind a signed header.
+
+use std::fmt;
+
+use anyhow::{Context, Result, ensure};
+use bsp::sectors::FLASH;
+use bsp::update_layout::LAYOUT;
+use ed25519_dalek::SigningKey;
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Endianness, elf};
+use sign::image::Image;
+use sign::{key, product};
+
+/// Bytes that are written at an address.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// What they are.
+    pub what: &'static str,
+    /// The address of the first.
+    pub address: u32,
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// Everything that is written.
+#[derive(Clone, Debug)]
+pub struct Content {
+    bootloader: Vec<Part>,
+    image: Image,
+    key: SigningKey,
+}
+
+impl Content {
+    /// Of the ELF files of both programs. The application is signed with this key.
+    ///
+    /// # Errors
+    /// A file is none for the board, or the bootloader would not start what is signed with this key.
+    pub fn new(bootloader: &[u8], application: &[u8], key: SigningKey) -> Result<Content> {
+        let bootloader = segments(bootloader).context("the bootloader")?;
+        let image = product::image(application, &key).context("the application")?;
+        let content = Content { bootloader, image, key };
+        ensure!(content.is_trusted(), "the bootloader was built with another key than the one to sign with");
+        Ok(content)
+    }
+
+    /// The parts, by rising addresses.
+    pub fn parts(&self) -> impl Iterator<Item = Part> {
+        let address = FLASH + LAYOUT.application().start();
+        let application = Part { what: "application", address, bytes: self.image.to_bytes() };
+        self.bootloader.iter().cloned().chain([application])
+    }
+
+    /// Header and code of the application.
+    #[must_use]
+    pub fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// A bootloader holds the public keys that it trusts.
+    fn is_trusted(&self) -> bool {
+        let key = self.key.verifying_key().to_bytes();
+        self.bootloader.iter().any(|part| part.bytes.windows(key.len()).any(|bytes| bytes == key))
+    }
+}
+
+/// What `--dry-run` prints: a line for each part, with its range, its size and its CRC-32 (ISO HDLC), then the image.
+impl fmt::Display for Content {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Part { what, address, bytes } in self.parts() {
+            let (length, crc) = (bytes.len(), checksum::of(&bytes));
+            let end = address as usize + length;
+            writeln!(f, "{what:<12}{address:#010x}..{end:#010x}  {length:>6} bytes, CRC-32 {crc:#010x}")?;
+        }
+        let about = self.image.header.description();
+        writeln!(f, "{:<12}{}, security counter {}", "version", about.version, about.counter)?;
+        let digits: String =
+            self.key.verifying_key().to_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
+        let whose =
+            if key::is_development(&self.key) { " (the development key, known to everybody)" } else { "" };
+        write!(f, "{:<12}{digits}{whose}", "public key")
+    }
+}
+
+/// What of an ELF file is loaded into the flash.
+fn segments(file: &[u8]) -> Result<Vec<Part>> {
+    let elf = ElfFile32::<Endianness>::parse(file).context("a damaged ELF file, or none of 32 bits")?;
+    let mut parts = Vec::new();
+    for segment in elf.elf_program_headers() {
+        let address = segment.p_paddr(Endianness::Little);
+        let bytes =
+            segment.data(Endianness::Little, file).ok().context("a segment that is not in the file")?;
+        if segment.p_type(Endianness::Little) == elf::PT_LOAD && !bytes.is_empty() {
+            let room = FLASH..FLASH + LAYOUT.application().start();
+            ensure!(
+                room.contains(&address),
+                "{} bytes at {address:#010x} are no place for a bootloader",
+                bytes.len()
+            );
+            parts.push(Part { what: "bootloader", address, bytes: bytes.to_vec() });
+        }
+    }
+    ensure!(!parts.is_empty(), "nothing goes into flash");
+    parts.sort_by_key(|part| part.address);
+    Ok(parts)
+}

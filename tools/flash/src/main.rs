@@ -1,0 +1,79 @@
+//! The program behind `cargo xtask flash`, which builds both programs first.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result, ensure};
+use bsp::sectors::FLASH;
+use bsp::update_layout::LAYOUT;
+use clap::Parser;
+use flash::Content;
+use flash::probe_rs::{Board, Files, line};
+use sign::key;
+
+/// Writes bootloader and signed application into a board at a debug probe, with probe-rs, and prints the log.
+#[derive(Parser)]
+#[command(name = "flash", version)]
+struct Cli {
+    /// The ELF file of the bootloader
+    #[arg(long)]
+    bootloader: PathBuf,
+    /// The ELF file of the application
+    #[arg(long)]
+    application: PathBuf,
+    /// The secret key to sign with, PKCS#8 in PEM [default: the development key, which is known to everybody]
+    #[arg(long)]
+    key: Option<PathBuf>,
+    /// Print what would be written, and the calls of probe-rs, and make none
+    #[arg(long)]
+    dry_run: bool,
+    /// Leave when the program has started
+    #[arg(long)]
+    no_log: bool,
+    /// The chip, as probe-rs calls it
+    #[arg(long, default_value = "STM32F446RETx")]
+    chip: String,
+    /// The probe, when there are several: VID:PID or VID:PID:serial number
+    #[arg(long)]
+    probe: Option<String>,
+}
+
+fn main() -> ExitCode {
+    run(&Cli::parse()).map_or_else(
+        |error| {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        },
+        |()| ExitCode::SUCCESS,
+    )
+}
+
+fn run(cli: &Cli) -> Result<()> {
+    let key = key::read(cli.key.as_deref().unwrap_or(&key::development_path()))?;
+    let content = Content::new(&read(&cli.bootloader)?, &read(&cli.application)?, key)?;
+    println!("{content}");
+    let image = cli.application.with_extension("flash.img");
+    std::fs::write(&image, content.image().to_bytes())
+        .with_context(|| format!("cannot write {}", image.display()))?;
+    let board = Board { chip: cli.chip.clone(), probe: cli.probe.clone() };
+    let address = FLASH + LAYOUT.application().start();
+    let calls = board.write(Files { bootloader: &cli.bootloader, image: &image, address });
+    let log = (!cli.no_log).then(|| board.log(&cli.application));
+    calls.into_iter().chain(log).try_for_each(|call| if cli.dry_run { show(&call) } else { make(call) })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+fn show(call: &Command) -> Result<()> {
+    println!("{}", line(call));
+    Ok(())
+}
+
+/// probe-rs says on its standard error output what is wrong.
+fn make(mut call: Command) -> Result<()> {
+    let status = call.status().with_context(|| format!("cannot start `{}`", line(&call)))?;
+    ensure!(status.success(), "`{}` failed ({status})", line(&call));
+    Ok(())
+}

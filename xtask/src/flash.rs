@@ -1,0 +1,87 @@
+//! `cargo xtask flash`: build bootloader and application, then become the program that writes them to a board on a bench. It is
+//! the runner of `cargo run` in `firmware` too, which has built the application then.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+
+use crate::command::{become_program, built, cargo, output};
+use crate::setup;
+use crate::target::Toolchain;
+use crate::{images, progress};
+
+/// What probe-rs prints where there is nothing to connect to.
+const NO_PROBE: &str = "No debug probes were found";
+
+#[derive(Args)]
+pub(crate) struct Flags {
+    /// The ELF file of the application [default: the application is built]
+    application: Option<PathBuf>,
+    /// Sign with this secret key, and build a bootloader that trusts no other [default: the development key]
+    #[arg(long)]
+    key: Option<PathBuf>,
+    /// Print what would be written, and the calls of probe-rs, and make none
+    #[arg(long)]
+    dry_run: bool,
+    /// Leave when the program has started
+    #[arg(long)]
+    no_log: bool,
+    /// The chip, as probe-rs calls it
+    #[arg(long)]
+    chip: Option<String>,
+    /// The probe, when there are several: VID:PID or VID:PID:serial number
+    #[arg(long)]
+    probe: Option<String>,
+}
+
+impl Flags {
+    /// Whoever has no probe, or no board at it, waits for no build.
+    fn check(&self) -> Result<()> {
+        setup::check(if self.dry_run { setup::IMAGES } else { setup::FLASH })?;
+        if !self.dry_run && output("probe-rs", &["list"]).is_none_or(|list| list.contains(NO_PROBE)) {
+            bail!(
+                "no debug probe was found: connect the board by the USB socket of its ST-LINK. On Linux probe-rs needs its \
+                 udev rules (https://probe.rs/docs/getting-started/probe-setup). `--dry-run` needs neither"
+            );
+        }
+        Ok(())
+    }
+
+    fn tool(&self, bootloader: &Path, application: &Path) -> Command {
+        let mut tool = Command::new(built("flash"));
+        tool.arg("--bootloader").arg(bootloader).arg("--application").arg(application);
+        let flags = [("--dry-run", self.dry_run), ("--no-log", self.no_log)];
+        tool.args(flags.iter().filter(|(_, is_set)| *is_set).map(|(flag, _)| flag));
+        if let Some(key) = &self.key {
+            tool.arg("--key").arg(key);
+        }
+        for (flag, value) in [("--chip", &self.chip), ("--probe", &self.probe)] {
+            tool.args(value.iter().flat_map(|value| [flag, value]));
+        }
+        tool
+    }
+}
+
+pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
+    flags.check()?;
+    let mut tools = cargo();
+    tools.args(["build", "--profile", "sim", "-p", "flash", "-p", "sign"]);
+    progress::build("tools", &mut tools)?;
+    let toolchain = Toolchain::ensure()?;
+    let application = match &flags.application {
+        Some(path) => std::path::absolute(path)?,
+        None => images::compile_application(&toolchain)?,
+    };
+    let bootloader = images::compile_bootloader(&toolchain, flags.key.as_deref().map(variable).transpose()?)?;
+    become_program(&mut flags.tool(&bootloader, &application))
+}
+
+/// The public half of the key in this file, as digits.
+fn variable(key: &Path) -> Result<String> {
+    let path = key.to_str().context("a path that is no text")?;
+    let line = output(built("sign"), &["public", path])
+        .with_context(|| format!("the key cannot be read: `cargo xtask sign public {path}` says more"))?;
+    Ok(line.split_once('=').context("`sign public` prints a variable")?.1.to_owned())
+}
