@@ -1,9 +1,10 @@
-//! The programs start at reset and have the whole flash; zencan's dictionary is generated from its description.
+//! The programs start at reset and have the whole flash. The stack has all of RAM that is left: canopen-rs makes its dictionary there.
+//! zencan's dictionary is generated from its description.
 
 use std::path::Path;
 use std::{env, fs};
 
-const SCRIPT: &str = "MEMORY { BENCH (rx) : ORIGIN = 0x08000000, LENGTH = 512K }\nREGION_ALIAS(\"FLASH\", BENCH);\n_stack_start = ORIGIN(STACK) + LENGTH(STACK);\n_stack_end = ORIGIN(STACK);\n";
+const SCRIPT: &str = "MEMORY { BENCH (rx) : ORIGIN = 0x08000000, LENGTH = 512K }\nREGION_ALIAS(\"FLASH\", BENCH);\n_stack_start = ORIGIN(RAM) + LENGTH(RAM);\n";
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

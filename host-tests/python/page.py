@@ -137,6 +137,18 @@ class Page:
             self.find(f"{row} button.plain").click()
         return f"{row} + tr.details"
 
+    def request(self, what: str, **keys):
+        """Asks the server as the page does, and waits for the answer."""
+        return self.script("return window.canopen.bus.request(arguments[0], arguments[1])", what, keys)
+
+    def read(self, node: int, index: int, sub: int = 0):
+        """The value of an object. A node has one SDO channel for all: the tests read by the server, which shares it."""
+        (value,) = self.request("read", node=node, objects=[[index, sub]])["values"]
+        return value["value"]
+
+    def write(self, node: int, index: int, sub: int, value: int) -> None:
+        self.request("write", node=node, index=index, sub=sub, value=value)
+
     def console(self) -> list[str]:
         """What went wrong in the page's programs."""
         lost = "WebSocket connection to"

@@ -17,7 +17,7 @@ from pathlib import Path
 import pyte
 from page import Page, Server, browser, size
 from PIL import Image
-from simulator import Master, Simulator
+from simulator import Simulator
 
 FOLDER = Path(__file__).parents[2] / "docs/pictures"
 DESK, PHONE = (1440, 900), (390, 844)
@@ -50,15 +50,15 @@ def bus_time(page: Page) -> float:
     return page.script("return window.canopen.recorder.t")
 
 
-def take_page(page: Page, master: Master) -> None:
+def take_page(page: Page) -> None:
     page.view("overview")
     for node in (1, 2, 16):
         page.says(f"tr[data-node='{node}'] td[data-label=Personality]", "")
     page.press("Start all")
     page.says("tr[data-node='1'] td[data-label=State]", "operational")
-    master.write(0x1800, 5, 10, 2)
+    page.write(1, 0x1800, 5, 10)
     # A fault of the device does not take the node out of Operational.
-    master.write(0x1029, 2, 1, 1)
+    page.write(1, 0x1029, 2, 1)
     begin = bus_time(page)
     page.view("live")
     page.until(lambda: bus_time(page) > begin + SECONDS * 0.6, "measure")
@@ -148,7 +148,7 @@ def main() -> None:
     server = Server(simulator)
     driver = browser(*DESK)
     try:
-        take_page(Page(driver, server.url), Master(simulator))
+        take_page(Page(driver, server.url))
         server.stop()
         simulator.process.kill()
         take_terminal(driver)

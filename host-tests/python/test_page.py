@@ -6,7 +6,7 @@ What is measured is told by time stamps of the bus, which are virtual time: no t
 import pytest
 from page import Page, Server, browser, size
 from selenium.webdriver.common.keys import Keys
-from simulator import Master, Simulator
+from simulator import Simulator
 
 PRESSURE, ENCODER = 1, 2
 #: 1029h:2: a fault of the device does not take it out of Operational.
@@ -20,9 +20,7 @@ BUS_TIME = "return window.canopen.recorder.t"
 
 
 def stimulate(page: Page, board: int, kind: str, spec: str) -> None:
-    """Changes a stimulus by the page's connection, and waits for the answer."""
-    request = "return window.canopen.bus.request('stimulate', { board: arguments[0], kind: arguments[1], spec: arguments[2] })"
-    page.script(request, board, kind, spec)
+    page.request("stimulate", board=board, kind=kind, spec=spec)
 
 
 @pytest.fixture(scope="module")
@@ -66,21 +64,14 @@ def start(page: Page) -> None:
         page.says(f"tr[data-node='{node}'] td[data-label=State]", "operational")
 
 
-@pytest.fixture
-def master(simulator: Simulator):
-    master = Master(simulator)
-    yield master
-    master.close()
-
-
 def choose_node(page: Page, view: str, node: int) -> None:
     page.view(view)
     page.choose("Node", str(node))
 
 
-def sample_often(master: Master, milliseconds: int) -> None:
-    """TPDO 1 of the pressure node by its event timer."""
-    master.write(0x1800, 5, milliseconds, 2)
+def sample_often(page: Page) -> None:
+    """TPDO 1 of the pressure node by its event timer, every 10 ms."""
+    page.write(PRESSURE, 0x1800, 5, 10)
 
 
 def test_the_overview_tells_who_is_there_and_commands_them(page: Page):
@@ -95,8 +86,8 @@ def test_the_overview_tells_who_is_there_and_commands_them(page: Page):
     page.says(f"{row} td[data-label=State]", "operational")
 
 
-def test_a_plot_follows_a_step_of_the_stimulus(page: Page, master: Master):
-    sample_often(master, 10)
+def test_a_plot_follows_a_step_of_the_stimulus(page: Page):
+    sample_often(page)
     choose_node(page, "live", PRESSURE)
     page.until(lambda: len(page.drawn(PROCESS_VALUE)) > 20, "plot the pressure")
     stimulate(page, PRESSURE, "pressure", "const:200000")
@@ -120,16 +111,16 @@ def test_a_plot_follows_a_step_of_the_stimulus(page: Page, master: Master):
     page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["x"] > last + 0.5, "follow the bus again")
 
 
-def test_a_slider_moves_the_plot(page: Page, master: Master):
-    sample_often(master, 10)
+def test_a_slider_moves_the_plot(page: Page):
+    sample_often(page)
     choose_node(page, "live", PRESSURE)
     slider = page.field("Pressure, bar")
     page.script("arguments[0].value = 6; arguments[0].dispatchEvent(new Event('input', { bubbles: true }))", slider)
     page.until(lambda: abs(page.drawn(PROCESS_VALUE)[-1]["y"] - 6) < 0.02, "plot what the slider says")
 
 
-def test_a_fault_is_marked_on_the_time_axis(page: Page, master: Master):
-    sample_often(master, 10)
+def test_a_fault_is_marked_on_the_time_axis(page: Page):
+    sample_often(page)
     choose_node(page, "live", PRESSURE)
     page.field("open sensor").click()
     page.says("#view-live .faults", "5006h")
@@ -139,9 +130,9 @@ def test_a_fault_is_marked_on_the_time_axis(page: Page, master: Master):
     start(page)
 
 
-def test_a_value_that_is_not_valid_says_so(page: Page, master: Master):
-    sample_often(master, 10)
-    master.write(0x1029, 2, STAY_OPERATIONAL, 1)
+def test_a_value_that_is_not_valid_says_so(page: Page):
+    sample_often(page)
+    page.write(PRESSURE, 0x1029, 2, STAY_OPERATIONAL)
     choose_node(page, "live", PRESSURE)
     page.says("#view-live .signals tr[data-signal='1:6130:1']", "\tvalid")
     page.field("open sensor").click()
@@ -151,7 +142,7 @@ def test_a_value_that_is_not_valid_says_so(page: Page, master: Master):
     page.until(lambda: "not valid" not in page.text("#view-live .signals tr[data-signal='1:6130:1']"), "say that the value is valid again")
 
 
-def test_an_edit_is_checked_refused_and_accepted(page: Page, master: Master):
+def test_an_edit_is_checked_refused_and_accepted(page: Page):
     choose_node(page, "dictionary", PRESSURE)
     outcome = ".outcome"
 
@@ -160,31 +151,31 @@ def test_an_edit_is_checked_refused_and_accepted(page: Page, master: Master):
     field.send_keys(Keys.ENTER)
     page.says(f"{details} {outcome}", "Too high: 0 to 38")
     assert field.get_attribute("aria-invalid") == "true"
-    assert master.read(0x6132, 1) == 0, "what is wrong is not sent"
+    assert page.read(PRESSURE, 0x6132, 1) == 0, "what is wrong is not sent"
 
     details = page.open_object("1A00h:0")
     page.fill("New value", "3", details).send_keys(Keys.ENTER)
     page.says(f"{details} {outcome}", "060")
-    assert master.read(0x1A00) == 2, "what the node refuses stays as it was"
+    assert page.read(PRESSURE, 0x1A00) == 2, "what the node refuses stays as it was"
 
     details = page.open_object("61A1h:1")
     page.fill("New value", "7", details).send_keys(Keys.ENTER)
     page.says(f"{details} {outcome}", "written, reads 7")
-    assert master.read(0x61A1, 1) == 7
+    assert page.read(PRESSURE, 0x61A1, 1) == 7
 
 
-def test_what_differs_from_the_default_is_listed(page: Page, master: Master):
-    master.write(0x61A1, 1, 9, 1)
+def test_what_differs_from_the_default_is_listed(page: Page):
+    page.write(PRESSURE, 0x61A1, 1, 9)
     choose_node(page, "dictionary", PRESSURE)
     page.until(lambda: "objects" in page.text("#view-dictionary .hint"), "list the objects")
     page.choose("Show", "differs")
     page.until(lambda: page.find("tr[data-object='61A1h:1']").is_displayed(), "list what differs")
     page.until(lambda: not page.find("tr[data-object='1000h:0']").is_displayed(), "hide what does not")
-    master.write(0x61A1, 1, 1, 1)
+    page.write(PRESSURE, 0x61A1, 1, 1)
 
 
-def test_a_mapping_is_changed_and_plotted(page: Page, master: Master):
-    sample_often(master, 20)
+def test_a_mapping_is_changed_and_plotted(page: Page):
+    sample_often(page)
     choose_node(page, "commissioning", PRESSURE)
     page.choose("PDO", "0")
     page.until(lambda: page.field("Object 1").get_attribute("value") == f"{0x6130}:1", "show the mapping of TPDO 1")
@@ -194,11 +185,11 @@ def test_a_mapping_is_changed_and_plotted(page: Page, master: Master):
     page.press("Map")
     page.says("#view-commissioning [data-pdo='TPDO 1']", "7130h:1")
     assert page.script("return document.querySelectorAll('.steps [data-done=yes]').length") == 5
-    assert (master.read(0x1A00), master.read(0x1A00, 1)) == (1, 0x7130_0110)
+    assert (page.read(PRESSURE, 0x1A00), page.read(PRESSURE, 0x1A00, 1)) == (1, 0x7130_0110)
     choose_node(page, "live", PRESSURE)
     page.until(lambda: len(page.drawn(SAME_AS_INTEGER)) > 20, "plot the object that is mapped now")
     assert "6130h:1" not in page.text("#view-live .signals")
-    master.node.nmt.send_command(0x81)
+    page.request("nmt", node=PRESSURE, command="reset")
 
 
 def test_the_trace_is_filtered_and_paused_and_shows_bits(page: Page):
@@ -266,8 +257,8 @@ def test_every_control_has_a_name_and_no_view_is_wider_than_a_phone(page: Page):
         assert page.script("return document.documentElement.scrollWidth") <= 390, view
 
 
-def test_two_pages_at_once(page: Page, driver, server: Server, master: Master):
-    sample_often(master, 10)
+def test_two_pages_at_once(page: Page, driver, server: Server):
+    sample_often(page)
     first = driver.current_window_handle
     driver.switch_to.new_window("window")
     second = driver.current_window_handle
@@ -289,8 +280,8 @@ def test_two_pages_at_once(page: Page, driver, server: Server, master: Master):
         driver.switch_to.window(first)
 
 
-def test_the_server_goes_away_and_comes_back(page: Page, simulator: Simulator, server: Server, master: Master):
-    sample_often(master, 10)
+def test_the_server_goes_away_and_comes_back(page: Page, simulator: Simulator, server: Server):
+    sample_often(page)
     choose_node(page, "live", PRESSURE)
     page.until(lambda: len(page.drawn(PROCESS_VALUE)) > 20, "plot")
     address = server.url.split("/")[2].split("?")[0]

@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 
 from page import Page, Server, browser
-from simulator import Master, Simulator
-from test_update import identification, image, until
+from simulator import Simulator
+from test_update import identification, image
 
 
 def checked(page: Page, file: Path) -> str:
@@ -18,6 +18,10 @@ def may_start(page: Page) -> bool:
     return page.script("return [...document.querySelectorAll('#view-update button')].some((button) => !button.disabled)")
 
 
+def runs(page: Page, program: Path) -> bool:
+    return page.read(1, 0x1F56, 1) == identification(program)
+
+
 def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path):
     a = Path(os.environ["NODE_IMAGES"]) / "firmware.img"
     b = image(tmp_path / "b.img", "0.2.0")
@@ -26,26 +30,22 @@ def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path):
     simulator = Simulator("--bitrate", "1000", "--control", "127.0.0.1:0", speed="real")
     server, driver = Server(simulator), browser()
     try:
-        master = Master(simulator)
-        # What a restarting node swallows must be noticed soon, and what a busy machine answers late is no loss.
-        master.node.sdo.RESPONSE_TIMEOUT = 5.0
         page = Page(driver, server.url)
         page.says("tr[data-node='1']", "STM32F4")
         page.view("update")
         assert "does not fit" in checked(page, cut)
         assert not may_start(page)
-        assert master.read(0x1F56, 1) == identification(a)
+        assert runs(page, a)
         checked(page, a)
         page.script("document.querySelector('#view-update .outcome').textContent = ''")
         assert "the program fits" in checked(page, b)
         page.press("Update the node")
         page.says("#view-update .outcome", f"is now version 0.1.0, identification {identification(b):08X}h")
-        until(lambda: master.read(0x1F56, 1) == identification(b), "run B")
+        page.until(lambda: runs(page, b), "read the identification of B in the node")
         page.press("Put back firmware.img")
         page.says("#view-update .outcome", f"is now version 0.1.0, identification {identification(a):08X}h")
-        until(lambda: master.read(0x1F56, 1) == identification(a), "run A")
+        page.until(lambda: runs(page, a), "read the identification of A in the node")
         assert page.console() == []
-        master.close()
     finally:
         driver.quit()
         server.stop()

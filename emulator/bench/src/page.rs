@@ -72,7 +72,7 @@ mod tests {
     use crate::report::{Optimisation, Row};
 
     fn report(ours: u64) -> Report {
-        let row = Row { name: "an operation", cells: [Some(ours), None, Some(1)] };
+        let row = Row { name: "an operation", cells: [Some(ours), None, None, Some(1)] };
         Report {
             optimisation: Optimisation::Size,
             compiler: "rustc 1.0.0".into(),

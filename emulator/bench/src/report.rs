@@ -6,7 +6,8 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use budget::Compiler;
 
-use crate::operations::{OPERATIONS, operational};
+use crate::client::Client;
+use crate::operations::{OPERATIONS, Operation, operational};
 use crate::program::Program;
 use crate::sizes::Sizes;
 
@@ -45,11 +46,14 @@ impl Optimisation {
     }
 }
 
-/// A line: ours, zencan-node, CANopenNode.
+/// The other libraries that are run: the name of the image, and of the library.
+const OTHERS: [(&str, &str); 2] = [("zencan", "zencan-node"), ("canopen-rs", "canopen-rs")];
+
+/// A line: ours, those of [`OTHERS`], and CANopenNode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Row {
     pub(crate) name: &'static str,
-    pub(crate) cells: [Option<u64>; 3],
+    pub(crate) cells: [Option<u64>; OTHERS.len() + 2],
 }
 
 /// All that was measured.
@@ -68,7 +72,7 @@ impl Report {
         Ok(Report {
             optimisation,
             compiler: format!("rustc {}", Compiler::of(&ours)?.version()),
-            operations: operations(&ours, &images.join("zencan"), optimisation)?,
+            operations: operations(images, optimisation)?,
             sizes: sizes(images, optimisation)?,
         })
     }
@@ -79,30 +83,42 @@ impl Report {
     }
 }
 
-fn operations(ours: &Path, zencan: &Path, optimisation: Optimisation) -> Result<Vec<Row>> {
-    let mut ours = operational(Program::start(ours)?)?;
-    let mut zencan = operational(Program::start(zencan)?)?;
+fn operations(images: &Path, optimisation: Optimisation) -> Result<Vec<Row>> {
+    let start = |image: &str| operational(Program::start(&images.join(image))?);
+    let mut ours = start("ours")?;
+    let mut others = [start(OTHERS[0].0)?, start(OTHERS[1].0)?];
     let mut rows = vec![];
     for operation in &OPERATIONS {
         let mine = operation.measure(&mut ours).with_context(|| operation.name)?;
-        let theirs = operation.measure(&mut zencan);
-        if let Err(error) = &theirs {
-            eprintln!("zencan-node, {}: {error:#}", operation.name);
-        }
+        let mut theirs =
+            OTHERS.iter().zip(&mut others).map(|((_, name), client)| measure(operation, name, client));
+        let (zencan, canopen_rs) = (theirs.next().flatten(), theirs.next().flatten());
         let [small, fast] = operation.published;
         let published = if optimisation == Optimisation::Size { small } else { fast };
-        rows.push(Row { name: operation.name, cells: [Some(mine), theirs.ok(), published] });
+        rows.push(Row { name: operation.name, cells: [Some(mine), zencan, canopen_rs, published] });
     }
     Ok(rows)
 }
 
+/// What the operation takes in somebody else's library, if the library can do the operation.
+fn measure(operation: &Operation, name: &str, client: &mut Client) -> Option<u64> {
+    let taken = operation.measure(client);
+    if let Err(error) = &taken {
+        eprintln!("{name}, {}: {error:#}", operation.name);
+    }
+    // A library that is never asked what time it is does nothing when time passes.
+    taken.ok().filter(|&instructions| instructions > 0)
+}
+
 fn sizes(images: &Path, optimisation: Optimisation) -> Result<Vec<Row>> {
     let empty = Sizes::of(&images.join("empty"))?;
-    let ours = Sizes::of(&images.join("ours"))?.without(empty);
-    let zencan = Sizes::of(&images.join("zencan"))?.without(empty);
+    let size_of = |image: &str| Sizes::of(&images.join(image)).map(|size| size.without(empty));
+    let [zencan, canopen_rs] = OTHERS.map(|(image, _)| size_of(image));
+    let nodes = [size_of("ours")?, zencan?, canopen_rs?];
     let row = |name, size: fn(Sizes) -> u64, published: Option<u64>| {
         let published = published.and_then(|bytes| optimisation.published_size(bytes));
-        Row { name, cells: [Some(size(ours)), Some(size(zencan)), published] }
+        let [ours, zencan, canopen_rs] = nodes.map(|node| Some(size(node)));
+        Row { name, cells: [ours, zencan, canopen_rs, published] }
     };
     Ok(vec![
         row("instructions", |sizes| sizes.code, None),
@@ -123,11 +139,11 @@ impl fmt::Display for Report {
 }
 
 fn table(f: &mut fmt::Formatter<'_>, first: &str, rows: &[Row]) -> fmt::Result {
-    writeln!(f, "| {first} | ours | zencan-node | CANopenNode |\n|---|---:|---:|---:|")?;
+    let [zencan, canopen_rs] = OTHERS.map(|(_, name)| name);
+    writeln!(f, "| {first} | ours | {zencan} | {canopen_rs} | CANopenNode |\n|---|---:|---:|---:|---:|")?;
     for Row { name, cells } in rows {
-        let [ours, zencan, published] =
-            cells.map(|cell| cell.map_or("n/a".into(), |number| number.to_string()));
-        writeln!(f, "| {name} | {ours} | {zencan} | {published} |")?;
+        let cells = cells.map(|cell| cell.map_or("n/a".into(), |number| number.to_string()));
+        writeln!(f, "| {name} | {} |", cells.join(" | "))?;
     }
     Ok(())
 }

@@ -223,7 +223,7 @@ fn once(words: Vec<Transition>, noise: &[Range<u64>]) -> Vec<Transition> {
 #[test]
 fn random_presses_on_a_full_bus_with_bus_off_in_between() {
     const NODES: [u8; 2] = [1, 2];
-    let presses = either(25, 2500);
+    let presses = either(12, 2500);
     let mut world = world("--bitrate 125 --load 100 --node 1:lift --node 2:lift");
     let master = Master::join_at(&mut world, 125_000);
     world.run_until(SECOND);

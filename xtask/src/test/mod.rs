@@ -33,6 +33,6 @@ pub(crate) fn run(flags: &Flags) -> Result<()> {
     let report = Report::new(flags.only.as_deref())?;
     report.run([builds_for_host(), builds_for_target()], Vec::new())?;
     let tests = suite::collect(flags.thorough, report.only())?;
-    report.run([checks_for_host(), checks_for_target()], tests)?;
+    report.run([checks_for_host(), checks_for_target(flags.thorough)], tests)?;
     report.finish()
 }

@@ -26,6 +26,13 @@ export class Mapping {
     this.#edit();
   }
 
+  /** What others have changed comes into the list. What the user is about to change stays as it is. */
+  async refresh() {
+    const { pdos } = await this.bus.request("pdos", { node: this.bus.chosen });
+    this.pdos = pdos;
+    this.#fillList();
+  }
+
   #layout() {
     this.choice = select([], null, () => this.#edit());
     this.slots = Array.from({ length: SLOTS }, () => select([["", "-"]], "", () => this.#countBits()));

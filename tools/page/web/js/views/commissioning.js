@@ -24,7 +24,7 @@ class Commissioning {
     this.content = el("div", {}, el("div", { class: "bar" }, nodeChoice(bus)), this.error, ...this.panels.map(([, panel]) => panel.element), this.mapping.element, lss(bus));
     bus.on("chosen", () => this.isShown && this.show());
     bus.on("connected", () => this.isShown && this.show());
-    bus.connection.on("mapping", ({ node }) => node === bus.chosen && this.isShown && this.#load([this.mapping]));
+    bus.connection.on("mapping", ({ node }) => node === bus.chosen && this.isShown && this.mapping.refresh().catch((error) => text(this.error, error.message)));
   }
 
   async show() {

@@ -35,11 +35,13 @@ class Live {
   show() {
     this.isShown = true;
     this.isStale = true;
+    this.#follow();
     this.#tick();
   }
 
   hide() {
     this.isShown = false;
+    this.#follow();
   }
 
   #layout() {
@@ -86,11 +88,17 @@ class Live {
       if (node !== this.bus.chosen) return;
       this.offered = signals;
       this.#showSignals();
-      const statuses = signals.map(statusKey).filter(Boolean);
-      await this.recorder.want("live", [...new Set([...signals.map(({ signal }) => signal), ...statuses])]);
+      await this.#follow();
     } catch (error) {
       text(this.empty, error.message);
     }
+  }
+
+  /** What no PDO carries is read by SDO: only while somebody looks, as a node has one SDO channel for all of its masters. */
+  async #follow() {
+    const signals = this.offered.filter(({ tpdo }) => tpdo != null || this.isShown);
+    const statuses = this.isShown ? signals.map(statusKey).filter(Boolean) : [];
+    await this.recorder.want("live", [...new Set([...signals.map(({ signal }) => signal), ...statuses])]).catch(() => {});
   }
 
   #showSignals() {

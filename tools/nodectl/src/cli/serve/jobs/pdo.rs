@@ -151,21 +151,20 @@ fn remap(context: &mut Context, pdo: &Pdo, catalogue: &Catalogue, mapping: &Mapp
     };
     let transmission = mapping.transmission.or(before.transmission);
     let wanted = Mapped { cob_id: cob_id & !OFF, entries, transmission };
-    pdo.remap(session, &before, &wanted)?;
-    times(context, pdo, mapping, &wanted)
+    times(context, pdo, mapping, &before)?;
+    pdo.remap(&mut context.session, &before, &wanted)
 }
 
-/// Inhibit time and event timer. The inhibit time is changed while the PDO is switched off (CiA 301, 7.5.2.37).
-fn times(context: &mut Context, pdo: &Pdo, mapping: &Mapping, wanted: &Mapped) -> Result<(), Failure> {
+/// Inhibit time and event timer, while the PDO is switched off (CiA 301, 7.5.2.37).
+fn times(context: &mut Context, pdo: &Pdo, mapping: &Mapping, before: &Mapped) -> Result<(), Failure> {
     let session = &mut context.session;
-    if let Some(inhibit) = mapping.inhibit {
-        pdo.switch(session, wanted.cob_id | OFF)?;
-        let written = pdo.write(session, at(pdo.communication, 3), &inhibit.to_le_bytes());
-        pdo.switch(session, wanted.cob_id)?;
-        written?;
-    }
-    if let Some(event) = mapping.event {
-        pdo.write(session, at(pdo.communication, 5), &event.to_le_bytes())?;
+    for (sub, time) in [(3, mapping.inhibit), (5, mapping.event)] {
+        let Some(time) = time else { continue };
+        pdo.switch(session, before.cob_id | OFF)?;
+        if let Err(failure) = pdo.write(session, at(pdo.communication, sub), &time.to_le_bytes()) {
+            pdo.switch(session, before.cob_id)?;
+            return Err(failure);
+        }
     }
     Ok(())
 }
