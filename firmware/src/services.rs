@@ -21,7 +21,8 @@ use crate::{PROCESS, STORAGE};
 /// The task runs at least this often: the watchdog wants a sign of life, and a recovery of the bus raises no interrupt.
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// So long after its start the application is well: crashes before that add up, and the bootloader stays after three.
+/// So long after its start the application is well, if it is on the bus and measures: crashes before that add up, and the bootloader
+/// stays after three.
 const CONFIRMATION: Instant = Instant(10_000_000);
 
 /// What the task owns.
@@ -106,13 +107,18 @@ impl Services {
         let now = Clock::now();
         let next = self.call(node, |protocol, out| protocol.poll_services(now, out));
         let next = self.settle(next, node);
-        if now >= CONFIRMATION {
+        if now >= CONFIRMATION && self.is_well(node) {
             retained::set_trial(retained::trial().confirmed());
         }
         self.led.set(blink(now));
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
         // It tells the watchdog that it is there, whether there is something to store or not.
         rtic::pend(STORAGE);
+    }
+
+    /// Whether it is on the bus and measures.
+    fn is_well(&self, node: &mut impl Shared) -> bool {
+        self.can.state() != BusState::Off && node.call(|protocol, _| protocol.is_at_work())
     }
 
     /// The parameters that have changed, once.

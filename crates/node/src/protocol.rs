@@ -67,6 +67,12 @@ impl Protocol {
         self.device.state()
     }
 
+    /// Whether the node does what it is for: it has said its boot-up message, and values were measured.
+    #[must_use]
+    pub fn is_at_work(&self) -> bool {
+        self.state() != State::Initialising && !matches!(self.device.application().snapshot, Snapshot::Nothing)
+    }
+
     /// A frame of FIFO 0: NMT, SYNC, RPDO, or a remote request for a TPDO.
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
         let next = self.device.on_process_frame(frame, now, out);

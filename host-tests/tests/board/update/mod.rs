@@ -141,6 +141,20 @@ fn an_application_that_crashes_again_and_again_stays_reachable() {
     assert_eq!(bench.read(CONTROL).unwrap(), [1], "a crash after it was well counts for itself");
 }
 
+/// On a silent bus it listens for the bit rate, for however long: that does not make it well.
+#[test]
+fn an_application_that_is_not_on_the_bus_does_not_confirm_itself() {
+    const PC: u8 = 15;
+    let mut bench = Bench::new("--bitrate 1000 --node 1:pressure@auto", 1_000_000, 1);
+    for _ in 0..3 {
+        bench.run(SECOND * 12);
+        bench.machine().set_register(PC, 0x3000_0000);
+    }
+    bench.run(SECOND);
+    assert!((0..20).any(|_| bench.read(DEVICE_TYPE) == Ok(BOOT.to_vec())), "it stays in the bootloader");
+    assert_eq!((bench.status().code, bench.status().detail), (70, 3));
+}
+
 /// The counter is not in the application area: neither damage there, nor an update, nor a debugger that programs that area, takes
 /// it back.
 #[test]
