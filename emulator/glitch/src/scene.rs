@@ -1,5 +1,7 @@
 //! What lies in the flash when a board is switched on, and what the bootloader has to make of it.
 
+use std::sync::LazyLock;
+
 use anyhow::{Context, Result, ensure};
 use bsp::sectors;
 use bsp::update_layout::LAYOUT;
@@ -76,13 +78,16 @@ impl Scene {
     }
 }
 
+static PUBLIC_KEYS: LazyLock<[[u8; 32]; 1]> = LazyLock::new(|| [owner().verifying_key().to_bytes()]);
+
 fn owner() -> SigningKey {
     SigningKey::from_bytes(&OWNER)
 }
 
 fn signed(word: u32, counter: u32) -> Result<Image> {
     let version = Version { major: 1, minor: 0, patch: 0 };
-    let about = Description { product: product::BOARD, hardware: 1, version, counter };
+    let about =
+        Description { product: product::BOARD, hardware: 1, version, counter, ..Description::default() };
     Image::sign(about, code(word), &owner())
 }
 
@@ -121,12 +126,7 @@ fn put(flash: &mut [u8], at: u32, bytes: &[u8]) {
 /// A flash in which an image waits to be copied over the good application. The record that says so was made for an image that was
 /// good: whoever can write the flash writes the record too.
 fn waiting(image: &[u8]) -> Result<Vec<u8>> {
-    let target = Target {
-        layout: LAYOUT,
-        product: product::BOARD,
-        hardware: 0,
-        key: owner().verifying_key().to_bytes(),
-    };
+    let target = Target { layout: LAYOUT, product: product::BOARD, hardware: 0, keys: &*PUBLIC_KEYS };
     let mut flash = MockFlash::new(&sizes(), 1);
     let mut updater = Updater::new(&mut flash, target, Status::GOOD);
     updater.clear()?;
