@@ -174,6 +174,22 @@ def test_what_differs_from_the_default_is_listed(page: Page):
     page.write(PRESSURE, 0x61A1, 1, 1)
 
 
+def test_a_configuration_is_shown_before_it_is_written(page: Page, tmp_path):
+    page.write(PRESSURE, 0x61A1, 1, 9)
+    file = tmp_path / "node.dcf"
+    file.write_text(page.request("dcf", node=PRESSURE, all=False)["text"])
+    page.write(PRESSURE, 0x61A1, 1, 1)
+    choose_node(page, "dictionary", PRESSURE)
+    page.find("summary").click()
+    page.field("Apply a file").send_keys(str(file))
+    page.says("#view-dictionary details.box table", "61A1h:1")
+    assert page.read(PRESSURE, 0x61A1, 1) == 1, "nothing is written before the user has seen it"
+    page.press("Write these")
+    page.says("#view-dictionary details.box", "objects written")
+    assert page.read(PRESSURE, 0x61A1, 1) == 9
+    page.write(PRESSURE, 0x61A1, 1, 1)
+
+
 def test_a_mapping_is_changed_and_plotted(page: Page):
     sample_often(page)
     choose_node(page, "commissioning", PRESSURE)
