@@ -117,7 +117,7 @@ impl Services {
     }
 
     /// Whether it is on the bus and measures.
-    fn is_well(&self, node: &mut impl Shared) -> bool {
+    fn is_well(&mut self, node: &mut impl Shared) -> bool {
         self.can.state() != BusState::Off && node.call(|protocol, _| protocol.is_at_work())
     }
 
