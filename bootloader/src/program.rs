@@ -85,6 +85,9 @@ impl Readings {
 }
 
 impl Application for Program {
+    /// The longest entry is a name.
+    const BLOCK_UPLOAD: bool = false;
+
     fn initialise(&mut self, image: &mut [u8]) {
         HARDWARE.set(image, board::NAME.as_bytes());
         let identity = [VENDOR, PRODUCT, REVISION, factory::serial_number()];

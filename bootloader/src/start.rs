@@ -27,6 +27,7 @@ pub(crate) enum Outcome {
 
 /// Counts the reset, takes the request out of the note in RAM, and decides.
 pub(crate) fn decide(loader: &mut Loader) -> Outcome {
+    retained::set_development(cfg!(feature = "development"));
     let note = retained::handover();
     if let Some(note) = note {
         retained::hand_over(&Handover { stay: false, ..note });
@@ -52,15 +53,14 @@ fn stay(why: Stay, note: Option<Handover>) -> Outcome {
     Outcome::Stay(Reason::Stay(why.status()), note)
 }
 
-/// An application that a debugger has put there: vectors that can be, and no header at all. A development build starts it,
-/// as it trusts a key that everybody knows anyway.
-#[cfg(not(feature = "production"))]
+/// An application that a debugger has put there: vectors that can be, and no header at all. A bootloader for development starts it.
+#[cfg(feature = "development")]
 pub(crate) fn unsigned() -> Option<Vectors> {
     application::vectors().filter(|_| application::has_no_header())
 }
 
-/// What leaves the house starts nothing that was not signed.
-#[cfg(feature = "production")]
+/// Nothing starts that was not signed.
+#[cfg(not(feature = "development"))]
 pub(crate) fn unsigned() -> Option<Vectors> {
     None
 }

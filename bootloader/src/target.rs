@@ -2,7 +2,7 @@
 
 use bsp::update_layout::LAYOUT;
 use update::Target;
-use update::key::PUBLIC_KEY;
+use update::key::{HAS_DEVELOPMENT_KEY, PUBLIC_KEYS};
 
 pub(crate) use product::{BOARD as PRODUCT, REVISION, VENDOR_ID as VENDOR};
 
@@ -10,4 +10,9 @@ pub(crate) use product::{BOARD as PRODUCT, REVISION, VENDOR_ID as VENDOR};
 const HARDWARE: u8 = 0;
 
 pub(crate) const TARGET: Target =
-    Target { layout: LAYOUT, product: PRODUCT, hardware: HARDWARE, key: PUBLIC_KEY };
+    Target { layout: LAYOUT, product: PRODUCT, hardware: HARDWARE, keys: &PUBLIC_KEYS };
+
+const _: () = assert!(
+    cfg!(feature = "development") || !HAS_DEVELOPMENT_KEY,
+    "the bootloader needs a key of its owner in UPDATE_PUBLIC_KEY, or the feature `development` (docs/update.md)"
+);

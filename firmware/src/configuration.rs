@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use bsp::reset_cause::ResetCause;
-use bsp::{ParameterFlash, Sums, board, crash, factory, memory};
+use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
 use node::{BitRate, Fault, Identity, LastingRecord, NodeId, Parameters, Personality, Protocol, Setup};
 use profiles::board::{ChipThermometer, LASTING_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
@@ -104,6 +104,9 @@ pub(crate) fn report_start(setup: &Setup, cause: ResetCause) -> bool {
         setup.serial_number,
         cause.name()
     );
+    if retained::is_development() {
+        defmt::warn!("the bootloader is for development: it starts what nobody has signed");
+    }
     match setup.node_id {
         Some(node_id) => defmt::info!("node {=u8}", node_id.get()),
         None => defmt::info!("no node-ID: waiting for LSS"),

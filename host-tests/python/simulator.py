@@ -32,7 +32,7 @@ class Simulator:
     def __init__(self, *flags: str, speed: str = "max"):
         images = Path(os.environ["NODE_IMAGES"])
         for name in ("bootloader", "firmware"):
-            assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images` builds it"
+            assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images --development` builds it"
         command = [os.environ["SIM_COMMAND"], "--bootloader", images / "bootloader", "--firmware", images / "firmware"]
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

@@ -15,7 +15,10 @@ pub(crate) fn dir() -> PathBuf {
     target_dir().join(TRIPLE).join("release")
 }
 
-/// Compiles the firmware and the bootloader.
+/// A bootloader that starts what nobody has signed, and trusts the key that everybody knows: for a board on a desk, emulated or not.
+pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development"];
+
+/// Compiles the firmware and the bootloader for development.
 pub(crate) fn compile_node(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "firmware 1/2", &["firmware", "bootloader"])
 }
@@ -26,47 +29,70 @@ pub(crate) fn compile_application(toolchain: &Toolchain) -> Result<PathBuf> {
     Ok(dir().join("firmware"))
 }
 
-/// Compiles the bootloader alone, and says where it is: that of a development board, or one that trusts nothing but this key.
+/// Compiles the bootloader alone, and says where it is: one for development, or one that trusts nothing but this key.
 pub(crate) fn compile_bootloader(toolchain: &Toolchain, key: Option<String>) -> Result<PathBuf> {
     let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
-    if let Some(key) = key {
-        command.args(["--features", "production"]).env("UPDATE_PUBLIC_KEY", key);
-    }
+    match key {
+        Some(key) => command.env(KEYS[0], key).env_remove(KEYS[1]),
+        None => command.args(DEVELOPMENT),
+    };
     progress::build("bootloader", &mut command)?;
     Ok(dir().join("bootloader"))
 }
 
-/// Compiles everything that the tests run on the emulated core.
+/// Compiles everything that the tests run on the emulated core, for development.
 pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "images", &["firmware", "bootloader", "mechanics-images"])
 }
 
-/// Compiles the bootloader as its owner does, with a key that only the tests know, and puts the file beside the one of a
-/// development board.
+/// Compiles the firmware and the bootloader for the owner of the keys in the environment. The owner signs the firmware.
+pub(crate) fn build_for_owner() -> Result<()> {
+    ensure!(
+        std::env::var_os("UPDATE_PUBLIC_KEY").is_some(),
+        "the bootloader needs the key of its owner in UPDATE_PUBLIC_KEY; `cargo xtask sign key FILE` makes one. \
+         For a board on a desk: cargo xtask images --development"
+    );
+    let packages = ["--release", "-p", "firmware", "-p", "bootloader"];
+    progress::build("images", &mut Toolchain::ensure()?.cargo("build", &packages))?;
+    println!("{} is to be signed: cargo xtask sign image", dir().join("firmware").display());
+    Ok(())
+}
+
+/// Compiles the bootloader as its owner does, with keys that only the tests know, and puts the file beside the one for
+/// development.
 pub(crate) fn compile_owners(toolchain: &Toolchain) -> Result<PathBuf> {
-    let key = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-key.hex"))?;
-    let bootloader = compile_bootloader(toolchain, Some(key.trim().to_owned()))?;
-    let owners = dir().join("bootloader-production");
-    std::fs::copy(bootloader, &owners)?;
+    let keys = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-keys.hex"))?;
+    let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
+    command.envs(KEYS.into_iter().zip(keys.lines()));
+    progress::build("bootloader of an owner", &mut command)?;
+    let owners = dir().join("bootloader-owner");
+    std::fs::copy(dir().join("bootloader"), &owners)?;
     Ok(owners)
 }
 
-/// The same; and without a key of the owner's there is no such bootloader.
-pub(crate) fn compile_production(toolchain: &Toolchain) -> Result<()> {
+/// The same; and without a key it must not compile.
+pub(crate) fn compile_owner(toolchain: &Toolchain) -> Result<()> {
     compile_owners(toolchain)?;
-    let package = ["--release", "-p", "bootloader", "--features", "production"];
-    let refused = toolchain.cargo("build", &package).env_remove("UPDATE_PUBLIC_KEY").output()?;
+    let mut keyless = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
+    for key in KEYS {
+        keyless.env_remove(key);
+    }
+    let refused = keyless.output()?;
     let says = String::from_utf8_lossy(&refused.stderr);
     ensure!(
-        !refused.status.success() && says.contains("needs a key of its own"),
-        "a production bootloader was built with the development key:\n{says}"
+        !refused.status.success() && says.contains("needs a key of its owner"),
+        "a bootloader that is not for development was built with the development key:\n{says}"
     );
     Ok(())
 }
 
+/// The variables that the keys come in.
+const KEYS: [&str; 2] = ["UPDATE_PUBLIC_KEY", "UPDATE_PUBLIC_KEY_2"];
+
 fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {
     let mut command = toolchain.cargo("build", &["--release"]);
-    progress::build(what, command.args(packages.iter().flat_map(|package| ["-p", package])))?;
+    command.args(DEVELOPMENT).args(packages.iter().flat_map(|package| ["-p", package]));
+    progress::build(what, &mut command)?;
     for name in ["firmware", "bootloader"] {
         ensure!(dir().join(name).exists(), "cargo built no {name} in {}", dir().display());
     }

@@ -37,8 +37,13 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Build the firmware, the bootloader and the test images for the Cortex-M4
-    Images,
+    /// Build the firmware and the bootloader for the Cortex-M4, with the keys in UPDATE_PUBLIC_KEY and UPDATE_PUBLIC_KEY_2
+    Images {
+        /// For a board on a desk: the bootloader starts what nobody has signed and trusts the key that everybody knows, the firmware
+        /// is signed with that key. And what the tests run
+        #[arg(long)]
+        development: bool,
+    },
     /// Build both images and run them on the emulated board (all flags go to the simulator; `cargo sim --help`)
     #[command(disable_help_flag = true)]
     Sim {
@@ -119,7 +124,8 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<()> {
     match command {
-        Command::Images => images::build(Tools::ByCargo),
+        Command::Images { development: true } => images::build(Tools::ByCargo),
+        Command::Images { development: false } => images::build_for_owner(),
         Command::Sim { .. } | Command::Flash(_) => unreachable!("these have an exit status of their own"),
         Command::FaultInjection { flags } => fault_injection::try_all(&flags),
         Command::Eds => eds::write(),

@@ -33,6 +33,7 @@ fn build_all() -> Result<()> {
 /// simulator.
 pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     setup::check(setup::SIM)?;
+    eprintln!("images for development: the bootloader starts what nobody has signed (docs/update.md)");
     build_all()?;
     images::sign(Command::new(built("sign")))?;
     become_program(with_images(&built("sim")).args(flags))

@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     const RAM: Range<u32> = 0x2000_0000..0x2002_0000;
-    const IMAGE: Range<u32> = 0x0801_0200..0x0804_0000;
+    const IMAGE: Range<u32> = 0x0802_0200..0x0804_0000;
 
     fn plausible(stack: u32, reset: u32) -> bool {
         Vectors::check([stack, reset], &RAM, &IMAGE).is_some()
@@ -46,7 +46,7 @@ mod tests {
 
     #[test]
     fn a_stack_may_begin_at_the_end_of_ram() {
-        assert!(plausible(0x2002_0000, 0x0801_0401));
+        assert!(plausible(0x2002_0000, 0x0802_0401));
         assert!(plausible(0x2000_4000, 0x0803_FFFF));
     }
 
@@ -54,10 +54,10 @@ mod tests {
     fn erased_or_foreign_content_is_refused() {
         assert!(!plausible(0xFFFF_FFFF, 0xFFFF_FFFF));
         assert!(!plausible(0, 0));
-        assert!(!plausible(0x2000_0000, 0x0801_0401), "no stack at all");
-        assert!(!plausible(0x2002_0008, 0x0801_0401), "beyond RAM");
-        assert!(!plausible(0x2000_4004, 0x0801_0401), "not aligned");
-        assert!(!plausible(0x2000_4000, 0x0801_0400), "not Thumb");
+        assert!(!plausible(0x2000_0000, 0x0802_0401), "no stack at all");
+        assert!(!plausible(0x2002_0008, 0x0802_0401), "beyond RAM");
+        assert!(!plausible(0x2000_4004, 0x0802_0401), "not aligned");
+        assert!(!plausible(0x2000_4000, 0x0802_0400), "not Thumb");
         assert!(!plausible(0x2000_4000, 0x0800_0401), "in the bootloader");
         assert!(!plausible(0x2000_4000, 0x0804_0001), "behind the image");
     }

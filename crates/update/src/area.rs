@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use crate::commit::RECORD_ROOM;
 use crate::header::HEADER;
+use crate::security::Security;
 
 /// Consecutive sectors, of whatever sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,20 +53,27 @@ impl Area {
     }
 }
 
-/// The two areas of an update.
+/// The areas of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
+    security: Area,
     application: Area,
     staging: Area,
 }
 
 impl Layout {
-    /// A layout; `None` when staging could not hold every image of the application area and the commit record.
+    /// A layout; `None` when there is no room for an image, or for a security counter.
     #[must_use]
-    pub const fn new(application: Area, staging: Area) -> Option<Layout> {
-        let fits = staging.size() >= application.size().saturating_add(RECORD_ROOM);
-        let holds_a_header = application.size() > HEADER;
-        if fits && holds_a_header { Some(Layout { application, staging }) } else { None }
+    pub const fn new(security: Area, application: Area, staging: Area) -> Option<Layout> {
+        let layout = Layout { security, application, staging };
+        let fits = layout.longest_image() > HEADER && layout.highest_counter() > 0;
+        if fits { Some(layout) } else { None }
+    }
+
+    /// Where the security counter and the revoked keys are: an update programs it, and nothing erases it.
+    #[must_use]
+    pub const fn security(&self) -> Area {
+        self.security
     }
 
     /// Where the application runs: its header, then its vector table.
@@ -78,6 +86,20 @@ impl Layout {
     #[must_use]
     pub const fn staging(&self) -> Area {
         self.staging
+    }
+
+    /// Bytes of the longest image, header and code: it fits the application area, and staging beside the commit record.
+    #[must_use]
+    pub const fn longest_image(&self) -> u32 {
+        let (application, staged) =
+            (self.application.size(), self.staging.size().saturating_sub(RECORD_ROOM));
+        if application < staged { application } else { staged }
+    }
+
+    /// The highest security counter that an image may have.
+    #[must_use]
+    pub const fn highest_counter(&self) -> u32 {
+        Security(self.security).highest_counter()
     }
 }
 
@@ -95,10 +117,19 @@ mod tests {
     }
 
     #[test]
-    fn staging_that_is_too_small_is_refused() {
-        let application = Area::new(0, &[1024, 2048]);
-        assert!(Layout::new(application, Area::new(3072, &[2048, 1024])).is_none());
-        assert!(Layout::new(application, Area::new(3072, &[2048, 2048])).is_some());
-        assert!(Layout::new(Area::new(0, &[512]), Area::new(512, &[2048])).is_none());
+    fn the_longest_image_fits_where_it_runs_and_where_it_is_staged() {
+        let (security, application) = (Area::new(0, &[256]), Area::new(256, &[1024, 2048]));
+        let longest = |staging: Area| Layout::new(security, application, staging).unwrap().longest_image();
+        assert_eq!(longest(Area::new(3328, &[2048, 2048])), 3072);
+        assert_eq!(longest(Area::new(3328, &[2048, 1024])), 2560, "the commit record takes 512");
+    }
+
+    #[test]
+    fn areas_that_are_too_small_are_refused() {
+        let (security, image) = (Area::new(0, &[256]), Area::new(256, &[2048]));
+        assert!(Layout::new(security, image, image).is_some());
+        assert!(Layout::new(Area::new(0, &[128]), image, image).is_none());
+        assert!(Layout::new(security, Area::new(256, &[512]), image).is_none());
+        assert!(Layout::new(security, image, Area::new(256, &[1024])).is_none());
     }
 }

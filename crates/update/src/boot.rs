@@ -70,13 +70,17 @@ impl Stay {
 
 /// Decides at every start. It reads the application once for its CRC and, without a [`Proof`], for its signature, so the clock
 /// should be fast by then: whoever has put an application there, and whatever has become of it since, only one that is signed
-/// starts. It writes only where a commit was cut: a record that may read
-/// otherwise next time is revoked, so what this start decides holds for good.
+/// starts. It writes where a commit was cut: a record that may read
+/// otherwise next time is revoked, so what this start decides holds for good. And it keeps the security counter of an application
+/// that is found to be signed, and the keys that this application revokes.
 ///
 /// `flash` must not be busy.
 pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {
     let commit = commit(flash, target);
     let crashes = start.trial.crashes();
+    if let Ok(header) = proven(flash, target, start.proof) {
+        note(flash, target, &header);
+    }
     if commit == Commit::Pending {
         return Decision::Copy;
     }
@@ -87,7 +91,12 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
         return Decision::Stay(Stay::Crashes(crashes));
     }
     match application(flash, target, start.proof) {
-        Ok(header) => Decision::Start(header),
+        Ok(header) => {
+            if start.proof != Proof::Waived {
+                note(flash, target, &header);
+            }
+            Decision::Start(header)
+        }
         // The mark that the copy is done may have been cut, read as not programmed, and the copy begun again. Now it
         // reads as programmed, but the image that it speaks of is still in staging.
         Err(_) if commit == Commit::Done => Decision::Copy,
@@ -106,6 +115,18 @@ fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
     commit
 }
 
+/// The header of the application, when its signature was found good since power-on. It has run, and may be about to be replaced.
+fn proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Result<Header, Refusal> {
+    let header = image::header(flash, target.layout.application())?;
+    if proof == Proof::Of(header.crc()) { Ok(header) } else { Err(Refusal::Signature) }
+}
+
+/// Nothing older than this application runs from now on.
+fn note<F: Flash>(flash: &mut F, target: &Target, header: &Header) {
+    // Should it fail, the next start tries again.
+    let _ = target.security().note(flash, header);
+}
+
 /// The header of the application, when all of it is there, it is one of this node, and its signature is or was found good.
 ///
 /// # Errors
@@ -113,11 +134,11 @@ fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
 pub fn application<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Result<Header, Refusal> {
     let area = target.layout.application();
     let header = image::header(flash, area)?;
-    target.admit(&header)?;
+    target.admit(flash, &header)?;
     let is_proven = proof == Proof::Waived || proof == Proof::Of(header.crc());
     let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
     loop {
-        if let Some(header) = check.step(flash, &target.key)? {
+        if let Some(header) = check.step(flash, target)? {
             return Ok(header);
         }
     }

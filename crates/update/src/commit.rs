@@ -13,8 +13,10 @@
 use crate::flash::{Flash, first, program};
 use crate::refusal::Refusal;
 
-/// Bytes at the end of staging that a record may take: that of a flash with words of 8 bytes.
-pub(crate) const RECORD_ROOM: u32 = 24;
+/// Bytes at the end of staging that belong to the record.
+pub(crate) const RECORD_ROOM: u32 = 512;
+/// Bytes of the longest record, that of a flash with words of 8 bytes.
+const RECORD_LEN: usize = 24;
 
 const MAGIC: [u8; 8] = *b"COPYTHIS";
 const MAGIC_LEN: u32 = 8;
@@ -39,7 +41,7 @@ pub(crate) struct Record(pub(crate) u32);
 impl Record {
     pub(crate) fn read<F: Flash>(self, flash: &mut F) -> Result<Commit, Refusal> {
         let word = flash.word_size();
-        let mut bytes = [0; RECORD_ROOM as usize];
+        let mut bytes = [0; RECORD_LEN];
         let record = first(&mut bytes, len(word));
         flash.read(self.start(word), record).map_err(|_| Refusal::Unspecified)?;
         let (magic, marks) = record.split_at(record.len().min(MAGIC.len()));
@@ -77,7 +79,7 @@ impl Record {
     pub(crate) fn revoke<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         self.done(flash)?;
         let word = flash.word_size();
-        program(flash, self.start(word), first(&mut [0; RECORD_ROOM as usize], len(word)))
+        program(flash, self.start(word), first(&mut [0; RECORD_LEN], len(word)))
     }
 
     fn start(self, word: u32) -> u32 {

@@ -16,6 +16,8 @@ const CRC_LEN: usize = 4;
 
 /// First word of every image, whatever its format.
 const MAGIC: u32 = u32::from_le_bytes(*b"CNFW");
+/// Keys that a header can name.
+pub(crate) const MOST_KEYS: u32 = 8;
 /// The format that this crate reads and writes.
 const FORMAT: u32 = 1;
 
@@ -37,7 +39,7 @@ impl fmt::Display for Version {
 }
 
 /// What the maker of an image says of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Description {
     /// The product that it is for, as in 1018h:2.
     pub product: u32,
@@ -45,9 +47,13 @@ pub struct Description {
     pub hardware: u32,
     /// Its version, for people. Nothing is decided by it.
     pub version: Version,
-    /// Security counter: an image with a lower one than the application in place is refused. It grows only when an
-    /// older image must never run again.
+    /// Security counter: where an image has run, none with a lower counter is accepted. It grows only when an older image must
+    /// never run again.
     pub counter: u32,
+    /// The number of the key that it is signed with, 0 to 7: its place among the keys of the bootloader.
+    pub key: u8,
+    /// Keys that are revoked when it runs: bit n for key n. Its own key cannot be one of them.
+    pub revokes: u8,
 }
 
 /// The header of one image. A value of this type is always well-formed; whether it is for this node, and whether the
@@ -62,12 +68,13 @@ pub struct Header {
 
 impl Header {
     /// The header of `code`, not signed yet. `None` when the code is empty or no whole number of words, which is
-    /// what flash is programmed in.
+    /// what flash is programmed in, or when it would revoke its own key.
     #[must_use]
     pub fn describe(description: Description, code: &[u8]) -> Option<Header> {
         let length = u32::try_from(code.len()).ok()?;
         let code_crc = checksum::of(code);
-        is_length(length).then_some(Header { description, length, code_crc, signature: [0; SIGNATURE_LEN] })
+        let header = Header { description, length, code_crc, signature: [0; SIGNATURE_LEN] };
+        header.is_sensible().then_some(header)
     }
 
     /// The same header with this signature, made over [`Header::signed_part`] and the code.
@@ -103,11 +110,11 @@ impl Header {
     /// The bytes before the signature.
     #[must_use]
     pub fn signed_part(&self) -> [u8; SIGNED_LEN] {
-        let Description { product, hardware, version: Version { major, minor, patch }, counter } =
-            self.description;
+        let Description { product, hardware, version, counter, key, revokes } = self.description;
+        let Version { major, minor, patch } = version;
         let number = u32::from(major) | u32::from(minor) << 16;
-        let words =
-            [MAGIC, FORMAT, product, hardware, number, patch.into(), self.length, self.code_crc, counter];
+        let keys = u32::from(patch) | u32::from(key) << 16 | u32::from(revokes) << 24;
+        let words = [MAGIC, FORMAT, product, hardware, number, keys, self.length, self.code_crc, counter];
         let mut bytes = [0; SIGNED_LEN];
         bytes.as_chunks_mut().0.iter_mut().zip(words).for_each(|(to, word)| *to = word.to_le_bytes());
         bytes
@@ -138,18 +145,19 @@ impl Header {
     /// The header in `bytes`. Nothing is left open: exactly the bytes that [`Header::encode`] writes are accepted.
     ///
     /// # Errors
-    /// [`Refusal::UnknownFormat`], [`Refusal::HeaderCrc`], or [`Refusal::HeaderContent`] when reserved bytes are not 0
-    /// or the length is none that an image can have.
+    /// [`Refusal::UnknownFormat`], [`Refusal::HeaderCrc`], or [`Refusal::HeaderContent`] when reserved bytes are not 0, the length is
+    /// none that an image can have, or the key is none or revokes itself.
     pub fn parse(bytes: &[u8; HEADER_LEN]) -> Result<Header, Refusal> {
         let mut words = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word));
         let mut next = || words.next().unwrap_or_default();
         if (next(), next()) != (MAGIC, FORMAT) {
             return Err(Refusal::UnknownFormat);
         }
-        let (product, hardware, number, patch) = (next(), next(), next(), next());
+        let (product, hardware, number, keys) = (next(), next(), next(), next());
         let (length, code_crc, counter) = (next(), next(), next());
-        let version = Version { major: low(number), minor: low(number >> 16), patch: low(patch) };
-        let description = Description { product, hardware, version, counter };
+        let version = Version { major: low(number), minor: low(number >> 16), patch: low(keys) };
+        let [_, _, key, revokes] = keys.to_le_bytes();
+        let description = Description { product, hardware, version, counter, key, revokes };
         let header = Header { description, length, code_crc, signature: signature_in(bytes) };
         header.agrees_with(bytes)
     }
@@ -157,16 +165,19 @@ impl Header {
     fn agrees_with(self, bytes: &[u8; HEADER_LEN]) -> Result<Header, Refusal> {
         if !has_good_crc(bytes) {
             Err(Refusal::HeaderCrc)
-        } else if self.encode() != *bytes || !is_length(self.length) {
+        } else if self.encode() != *bytes || !self.is_sensible() {
             Err(Refusal::HeaderContent)
         } else {
             Ok(self)
         }
     }
-}
 
-fn is_length(length: u32) -> bool {
-    length != 0 && length.is_multiple_of(4)
+    /// Whether there is code, in whole words, and the key of the image is one that there can be and stays good.
+    fn is_sensible(&self) -> bool {
+        let Description { key, revokes, .. } = self.description;
+        let is_length = self.length != 0 && self.length.is_multiple_of(4);
+        is_length && u32::from(key) < MOST_KEYS && revokes.checked_shr(key.into()).unwrap_or(0) & 1 == 0
+    }
 }
 
 fn low(word: u32) -> u16 {

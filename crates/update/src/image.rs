@@ -7,7 +7,6 @@ use checksum::Digest;
 use crate::area::Area;
 use crate::flash::{Flash, read_step};
 use crate::header::{HEADER, HEADER_LEN, Header};
-use crate::key::KEY_LEN;
 use crate::refusal::Refusal;
 use crate::signature::{Message, Verification};
 use crate::target::{Target, image_len};
@@ -25,11 +24,11 @@ pub(crate) fn code(header: &Header, area: Area) -> Range<u32> {
     start.saturating_add(HEADER)..start.saturating_add(image_len(header))
 }
 
-/// The header of the staged image, when it may take the place of the application: it is for this node and does not turn
-/// the security counter back.
+/// The header of the staged image, when it may take the place of the application: it may run on this node, and its security counter
+/// is not lower than that of the application, which may not have been noted yet.
 pub(crate) fn candidate<F: Flash>(flash: &mut F, target: &Target) -> Result<Header, Refusal> {
     let staged = header(flash, target.layout.staging())?;
-    target.admit(&staged)?;
+    target.admit(flash, &staged)?;
     let least = header(flash, target.layout.application()).map_or(0, |header| header.description().counter);
     if staged.description().counter < least { Err(Refusal::Counter { least }) } else { Ok(staged) }
 }
@@ -94,10 +93,10 @@ impl FullCheck {
     pub(crate) fn step<F: Flash>(
         &mut self,
         flash: &mut F,
-        key: &[u8; KEY_LEN],
+        target: &Target,
     ) -> Result<Option<Header>, Refusal> {
         match &mut self.signature {
-            None => self.read(flash, key),
+            None => self.read(flash, target),
             Some(signature) => match signature.step() {
                 None => Ok(None),
                 Some(true) => Ok(Some(self.header)),
@@ -106,13 +105,13 @@ impl FullCheck {
         }
     }
 
-    fn read<F: Flash>(&mut self, flash: &mut F, key: &[u8; KEY_LEN]) -> Result<Option<Header>, Refusal> {
+    fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<Option<Header>, Refusal> {
         let message = &mut self.message;
         if !self.crc.step(flash, |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {
             return Ok(None);
         }
         let Some(message) = message else { return Ok(Some(self.header)) };
-        let signature = message.end(self.header.signature(), key);
+        let signature = message.end(self.header.signature(), target.key_of(&self.header)?);
         self.signature = Some(signature.ok_or(Refusal::Signature)?);
         Ok(None)
     }

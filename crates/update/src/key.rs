@@ -1,7 +1,7 @@
-//! The key that images are signed with: its public half, as the build of the bootloader was given it.
+//! The keys that images are signed with: their public halves, as the build of the bootloader was given them.
 //!
 //! `cargo xtask sign key` makes a pair and prints the variable to build the bootloader with; docs/update.md says how to keep the
-//! secret half.
+//! secret half, and what the second key is for.
 
 /// Bytes of an Ed25519 public key.
 pub const KEY_LEN: usize = 32;
@@ -13,23 +13,31 @@ pub const DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY: [u8; KEY_LEN] = [
     0x53, 0x25, 0xCA, 0x80, 0xD8, 0x06, 0x8B, 0xDA, 0x9B, 0x5F, 0x44, 0xA3, 0x9F, 0xE4, 0x66,
 ];
 
-/// The key that this bootloader trusts: 64 hexadecimal digits in the variable `UPDATE_PUBLIC_KEY` when the bootloader is built,
-/// else the development key. The feature `production` does not compile with the development key.
-pub const PUBLIC_KEY: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY") {
+/// Keys that a bootloader trusts.
+pub const KEYS: usize = 2;
+
+/// The keys that this bootloader trusts, by their number: what the variables `UPDATE_PUBLIC_KEY` and `UPDATE_PUBLIC_KEY_2` say when the
+/// bootloader is built, 64 hexadecimal digits each. Without the second variable, key 1 is the same as key 0; without the first,
+/// key 0 is the development key.
+pub static PUBLIC_KEYS: [[u8; KEY_LEN]; KEYS] = [FIRST, SECOND];
+
+const FIRST: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY") {
     Some(digits) => key(digits.as_bytes()),
     None => DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY,
 };
+const SECOND: [u8; KEY_LEN] = match option_env!("UPDATE_PUBLIC_KEY_2") {
+    Some(digits) => key(digits.as_bytes()),
+    None => FIRST,
+};
 
-#[cfg(feature = "production")]
-const _: () = assert!(
-    !is_same(&PUBLIC_KEY, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY),
-    "a production build needs a key of its own in UPDATE_PUBLIC_KEY (docs/update.md)"
-);
+/// Whether one of these keys is the development key.
+pub const HAS_DEVELOPMENT_KEY: bool = is_same(&FIRST, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY)
+    || is_same(&SECOND, &DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
 
 /// The key of these digits, for the compiler: anything else than 64 hexadecimal digits ends the build.
 #[allow(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "evaluated by the compiler")]
 const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
-    assert!(digits.len() == 2 * KEY_LEN, "UPDATE_PUBLIC_KEY is not 64 hexadecimal digits");
+    assert!(digits.len() == 2 * KEY_LEN, "a key is not 64 hexadecimal digits");
     let (mut key, mut at) = ([0; KEY_LEN], 0);
     while at < KEY_LEN {
         key[at] = nibble(digits[2 * at]) << 4 | nibble(digits[2 * at + 1]);
@@ -44,12 +52,11 @@ const fn nibble(digit: u8) -> u8 {
         b'0'..=b'9' => digit - b'0',
         b'a'..=b'f' => digit - b'a' + 10,
         b'A'..=b'F' => digit - b'A' + 10,
-        _ => panic!("UPDATE_PUBLIC_KEY is not 64 hexadecimal digits"),
+        _ => panic!("a key is not 64 hexadecimal digits"),
     }
 }
 
 /// `==` of arrays, for the compiler.
-#[cfg(any(feature = "production", test))]
 const fn is_same(mut a: &[u8], mut b: &[u8]) -> bool {
     while let ([x, rest_of_a @ ..], [y, rest_of_b @ ..]) = (a, b) {
         if *x != *y {

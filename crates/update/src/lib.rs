@@ -61,6 +61,7 @@ pub mod key;
 pub mod mock;
 mod receive;
 mod refusal;
+mod security;
 mod signature;
 mod status;
 mod target;

@@ -60,7 +60,7 @@ impl Receiver {
     fn flush<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<(), Refusal> {
         let staging = target.layout.staging();
         let len = u32::try_from(self.count.next_multiple_of(4)).unwrap_or(u32::MAX);
-        if self.programmed.saturating_add(len) > target.layout.application().size() {
+        if self.programmed.saturating_add(len) > target.layout.longest_image() {
             return Err(Refusal::Excess);
         }
         let at = staging.start().saturating_add(self.programmed);

@@ -33,10 +33,15 @@ pub enum Refusal {
         /// The revision of this node.
         revision: u8,
     },
-    /// The security counter of the image is lower than that of the application in place.
+    /// The security counter of the image is lower than that of one that has run, or of the application in place.
     Counter {
         /// The lowest that is accepted.
         least: u32,
+    },
+    /// The key that the image is signed with was revoked.
+    Revoked {
+        /// Its number.
+        key: u8,
     },
     /// The signature does not belong to this image and the key of this node.
     Signature,
@@ -70,6 +75,7 @@ impl Refusal {
             Refusal::Truncated => 68,
             Refusal::Excess => 69,
             Refusal::Crashes { .. } => 70,
+            Refusal::Revoked { .. } => 71,
         }
     }
 
@@ -81,6 +87,7 @@ impl Refusal {
             Refusal::Hardware { revision } => revision.into(),
             Refusal::Counter { least } => u16::try_from(least).unwrap_or(u16::MAX),
             Refusal::Crashes { count } => count.into(),
+            Refusal::Revoked { key } => key.into(),
             _ => 0,
         }
     }

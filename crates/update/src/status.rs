@@ -64,6 +64,7 @@ impl fmt::Display for Status {
             68 => f.write_str("the download ended before the image did"),
             69 => f.write_str("the download went on after the end of the image"),
             70 => write!(f, "the application crashed {detail} times without confirming itself"),
+            71 => write!(f, "the key number {detail}, with which the image is signed, is revoked"),
             code => write!(f, "error {code} of the manufacturer, detail {detail}"),
         }
     }
@@ -76,7 +77,7 @@ mod tests {
 
     use super::*;
 
-    const ALL: [Refusal; 16] = [
+    const ALL: [Refusal; 17] = [
         Refusal::NoProgram,
         Refusal::UnknownFormat,
         Refusal::HeaderCrc,
@@ -93,6 +94,7 @@ mod tests {
         Refusal::Truncated,
         Refusal::Excess,
         Refusal::Crashes { count: 3 },
+        Refusal::Revoked { key: 1 },
     ];
 
     #[test]
@@ -114,6 +116,7 @@ mod tests {
             (Refusal::Counter { least: 9 }, 9),
             (Refusal::Counter { least: 70_000 }, u16::MAX),
             (Refusal::Crashes { count: 5 }, 5),
+            (Refusal::Revoked { key: 1 }, 1),
             (Refusal::Signature, 0),
         ] {
             assert_eq!(Status::refused(refusal).detail, detail, "{refusal}");

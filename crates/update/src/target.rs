@@ -1,9 +1,11 @@
 //! What this node is, and whether an image is for it.
 
 use crate::area::Layout;
+use crate::flash::Flash;
 use crate::header::{HEADER, Header};
 use crate::key::KEY_LEN;
 use crate::refusal::Refusal;
+use crate::security::Security;
 
 /// What an image must fit.
 #[derive(Clone, Copy, Debug)]
@@ -14,20 +16,38 @@ pub struct Target {
     pub product: u32,
     /// The hardware revision, 0 to 31.
     pub hardware: u8,
-    /// The public key that images are signed with; [`crate::key::PUBLIC_KEY`] in the product.
-    pub key: [u8; KEY_LEN],
+    /// The public keys that images are signed with, by their number; [`crate::key::PUBLIC_KEYS`] in the product.
+    pub keys: &'static [[u8; KEY_LEN]],
 }
 
 impl Target {
-    /// Whether the image is for this product and hardware, and not longer than the application area.
-    pub(crate) fn admit(&self, header: &Header) -> Result<(), Refusal> {
+    /// The key of an image.
+    pub(crate) fn key_of(&self, header: &Header) -> Result<&'static [u8; KEY_LEN], Refusal> {
+        self.keys.get(usize::from(header.description().key)).ok_or(Refusal::Signature)
+    }
+
+    /// The counter and the revoked keys.
+    pub(crate) fn security(&self) -> Security {
+        Security(self.layout.security())
+    }
+
+    /// Whether the image may run on this node as it is now, if its signature is good.
+    pub(crate) fn admit<F: Flash>(&self, flash: &mut F, header: &Header) -> Result<(), Refusal> {
+        self.fits(header)?;
+        self.security().admit(flash, header.description())
+    }
+
+    /// Whether the image is for this product and hardware, not longer than there is room, and its counter one that can be kept.
+    fn fits(&self, header: &Header) -> Result<(), Refusal> {
         let about = header.description();
         if about.product != self.product {
             Err(Refusal::Product { expected: self.product })
         } else if about.hardware.checked_shr(self.hardware.into()).unwrap_or(0) & 1 == 0 {
             Err(Refusal::Hardware { revision: self.hardware })
-        } else if image_len(header) > self.layout.application().size() {
+        } else if image_len(header) > self.layout.longest_image() {
             Err(Refusal::TooLong)
+        } else if about.counter > self.layout.highest_counter() {
+            Err(Refusal::HeaderContent)
         } else {
             Ok(())
         }

@@ -142,7 +142,7 @@ impl<F: Flash> Updater<F> {
         if !matches!(self.state, State::Cleared) {
             return self.refuse(Refusal::NotCleared);
         }
-        if size.is_some_and(|size| size > self.target.layout.application().size()) {
+        if size.is_some_and(|size| size > self.target.layout.longest_image()) {
             return self.refuse(Refusal::TooLong);
         }
         self.settle(Ok(State::Receiving(Receiver::new())))
@@ -239,7 +239,7 @@ impl<F: Flash> Updater<F> {
         match &mut self.state {
             State::Clearing(erase) => Ok(erase.step(flash)?.then_some(State::Cleared)),
             State::Checking(check, then) => {
-                let (then, checked) = (*then, check.step(flash, &target.key));
+                let (then, checked) = (*then, check.step(flash, target));
                 self.follow(then, checked)
             }
             State::Erasing(erase, header) => {

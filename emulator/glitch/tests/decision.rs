@@ -8,8 +8,7 @@ use glitch::{Campaign, Extent, Places, Scene, Watcher};
 /// $NODE_IMAGES, or where cargo puts them.
 fn bootloader() -> Vec<u8> {
     let built = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/thumbv7em-none-eabihf/release");
-    let path =
-        std::env::var_os("NODE_IMAGES").map_or_else(built, PathBuf::from).join("bootloader-production");
+    let path = std::env::var_os("NODE_IMAGES").map_or_else(built, PathBuf::from).join("bootloader-owner");
     std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}; run `cargo xtask test`", path.display()))
 }
 

@@ -20,7 +20,7 @@ use crate::summary::NodeSummary;
 use crate::traffic::Heard;
 
 /// Where the application's header is (memory.x).
-const HEADER_ADDRESS: u32 = 0x0801_0000;
+const HEADER_ADDRESS: u32 = 0x0802_0000;
 /// Where RAM begins.
 const RAM: u32 = 0x2000_0000;
 

@@ -10,7 +10,7 @@ use update::{
     Updater, Version, boot,
 };
 
-/// Bootloader; application in two sectors; staging in two.
+/// Security counter; application in two sectors; staging in two.
 const SECTORS: [usize; 5] = [256, 512, 512, 512, 1024];
 const APPLICATION: usize = 256;
 const PRODUCT: u32 = 0x8271;
@@ -61,14 +61,18 @@ fn keys() -> salty::Keypair {
     salty::Keypair::from(&[7; 32])
 }
 
+static PUBLIC_KEYS: LazyLock<[[u8; 32]; 1]> = LazyLock::new(|| [keys().public.to_bytes()]);
+
 fn target() -> Target {
-    let layout = Layout::new(Area::new(256, &[512, 512]), Area::new(1280, &[512, 1024])).expect("they fit");
-    Target { layout, product: PRODUCT, hardware: 0, key: keys().public.to_bytes() }
+    let application = Area::new(256, &[512, 512]);
+    let layout = Layout::new(Area::new(0, &[256]), application, Area::new(1280, &[512, 1024]));
+    Target { layout: layout.expect("they fit"), product: PRODUCT, hardware: 0, keys: &*PUBLIC_KEYS }
 }
 
 fn image(major: u16, len: usize) -> Image {
     let version = Version { major, minor: 0, patch: 0 };
-    let description = Description { product: PRODUCT, hardware: 1, version, counter: 1 };
+    let description =
+        Description { product: PRODUCT, hardware: 1, version, counter: 1, ..Description::default() };
     let code: Vec<u8> = (1..=u8::MAX).cycle().skip(usize::from(major)).take(len).collect();
     let header = Header::describe(description, &code).expect("it fits");
     let hash = salty::Sha512::new().updated(&header.signed_part()).updated(&code).finalize();

@@ -1,4 +1,4 @@
-//! What the application may take. Its slot has 127.5 KiB of flash: the rest is for what it grows by in the field.
+//! What the application may take. The longest image has 127 KiB of code: the rest is for what it grows by in the field.
 
 use budget::{Budget, Compiler};
 

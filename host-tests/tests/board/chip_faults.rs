@@ -14,7 +14,7 @@ const TIM2: u32 = 28;
 const CAN1_SCE: u32 = 22;
 const DMA2_STREAM0: u32 = 56;
 /// The application's vector table (memory.x), an instruction that never ends, and one that there is not.
-const VECTORS: u32 = 0x0801_0200;
+const VECTORS: u32 = 0x0802_0200;
 const BRANCH_TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
 /// UDF #0.
 const UNDEFINED: [u8; 2] = [0x00, 0xDE];

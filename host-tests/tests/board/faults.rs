@@ -8,7 +8,7 @@ use canbus::Time;
 const RAM: u32 = 0x2000_0000;
 const UNUSED: u32 = RAM + 0x1_0000;
 /// The start of what the bootloader looks at: the application's vector table (memory.x).
-const APPLICATION: u32 = 0x0801_0200;
+const APPLICATION: u32 = 0x0802_0200;
 const VECTORS: usize = 512;
 /// Control register 1 of the timer that starts the conversions.
 const TIM3_CR1: u32 = 0x4000_0400;

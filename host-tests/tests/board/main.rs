@@ -1,4 +1,4 @@
-//! The images on the emulated board. Needs the ELF files: `cargo xtask images` builds them.
+//! The images on the emulated board. Needs the ELF files: `cargo xtask images --development` builds them.
 
 mod adapter;
 mod budget;

@@ -29,7 +29,7 @@ pub(crate) fn images() -> PathBuf {
     for name in ["bootloader", "firmware"] {
         assert!(
             dir.join(name).exists(),
-            "no {name} in {}; run `cargo xtask images` to build it",
+            "no {name} in {}; run `cargo xtask images --development` to build it",
             dir.display()
         );
     }

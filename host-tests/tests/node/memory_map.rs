@@ -49,36 +49,46 @@ fn sector_starts() -> Vec<u32> {
 #[test]
 fn every_part_of_flash_that_is_erased_on_its_own_is_made_of_whole_sectors() {
     let regions = regions();
-    let application = regions["IMAGE_HEADER"].start..regions["APPLICATION"].end;
     let starts = sector_starts();
     let end = FLASH + SECTORS.iter().sum::<u32>() * KIB;
-    for range in [
-        regions["BOOTLOADER"].clone(),
-        regions["PARAMETERS"].clone(),
-        application,
-        regions["STAGING"].clone(),
-    ] {
+    for range in [regions["BOOTLOADER"].clone(), regions["PARAMETERS"].clone(), regions["STAGING"].clone()] {
         assert!(starts.contains(&range.start), "{:#x} is no sector's start", range.start);
         assert!(starts.contains(&range.end) || range.end == end, "{:#x} is no sector's end", range.end);
     }
 }
 
+/// Whatever is erased, the security counter is not in one sector with it.
 #[test]
-fn flash_is_used_without_gap_or_overlap() {
+fn the_security_counter_has_a_sector_of_its_own() {
     let regions = regions();
-    let order = ["BOOTLOADER", "PARAMETERS", "IMAGE_HEADER", "APPLICATION", "STAGING"];
-    let mut next = FLASH;
-    for name in order {
-        assert_eq!(regions[name].start, next, "{name}");
-        next = regions[name].end;
+    let sector = |place: u32| sector_starts().into_iter().rfind(|start| *start <= place).unwrap();
+    let inside = sector(regions["SECURITY"].start);
+    assert_eq!(sector(regions["SECURITY"].end - 1), inside);
+    for (name, region) in
+        regions.iter().filter(|(name, region)| *name != "SECURITY" && region.start < RAM.start)
+    {
+        assert!(sector(region.start) != inside && sector(region.end - 1) != inside, "{name}");
     }
-    assert_eq!(next, FLASH + 512 * KIB);
 }
 
 #[test]
-fn the_staging_slot_holds_any_image_of_the_application_slot() {
+fn the_regions_of_the_flash_do_not_overlap() {
     let regions = regions();
-    assert!(regions["STAGING"].len() >= regions["IMAGE_HEADER"].len() + regions["APPLICATION"].len());
+    let order = ["BOOTLOADER", "PARAMETERS", "SECURITY", "IMAGE_HEADER", "APPLICATION", "STAGING"];
+    let mut next = FLASH;
+    for name in order {
+        assert!(regions[name].start >= next, "{name}");
+        next = regions[name].end;
+    }
+    assert!(next <= FLASH + 512 * KIB);
+}
+
+#[test]
+fn staging_holds_any_image_of_the_application_area_beside_the_commit_record() {
+    let regions = regions();
+    let image = regions["IMAGE_HEADER"].len() + regions["APPLICATION"].len();
+    assert_eq!(bsp::update_layout::LAYOUT.longest_image() as usize, image);
+    assert!(regions["STAGING"].len() >= image + 512);
 }
 
 /// What the bootloader erases is what memory.x says, sector by sector.
@@ -86,11 +96,12 @@ fn the_staging_slot_holds_any_image_of_the_application_slot() {
 fn the_update_knows_the_areas_and_their_sectors() {
     let regions = regions();
     let layout = bsp::update_layout::LAYOUT;
-    let application = regions["IMAGE_HEADER"].start..regions["APPLICATION"].end;
     assert_eq!(regions["IMAGE_HEADER"].len(), update::HEADER_LEN);
-    for (area, region) in
-        [(layout.application(), application), (layout.staging(), regions["STAGING"].clone())]
-    {
+    for (area, region) in [
+        (layout.security(), regions["SECURITY"].clone()),
+        (layout.application(), regions["IMAGE_HEADER"].start..regions["APPLICATION"].end + 512),
+        (layout.staging(), regions["STAGING"].clone()),
+    ] {
         assert_eq!(FLASH + area.start()..FLASH + area.end(), region);
         let inside = sector_starts().into_iter().filter(|start| region.contains(start));
         assert!(area.sectors().map(|sector| FLASH + sector.start).eq(inside));

@@ -164,5 +164,6 @@ impl<'a> Image<'a> {
 
 /// Reads a file; an error names it.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| format!("{}; `cargo xtask images` builds it", path.display()))
+    std::fs::read(path)
+        .with_context(|| format!("{}; `cargo xtask images --development` builds it", path.display()))
 }

@@ -20,7 +20,7 @@ pub fn start() -> u32 {
 /// The most code that there is room for, in bytes.
 #[must_use]
 pub fn most() -> usize {
-    LAYOUT.application().size() as usize - HEADER_LEN
+    LAYOUT.longest_image() as usize - HEADER_LEN
 }
 
 /// The code in a file, as whole words: of an ELF file what is loaded into flash, anything else as it is.

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
+use bsp::update_layout::LAYOUT;
 use clap::{Args, Parser, Subcommand};
 use sign::product::{self, version};
 use sign::{code, image::Image, key};
@@ -43,7 +44,7 @@ enum Command {
 
 #[derive(Args)]
 struct ImageArgs {
-    /// The ELF file, or the binary from 0x08010200 on
+    /// The ELF file, or the binary from 0x08020200 on
     file: PathBuf,
     /// The secret key, PKCS#8 in PEM [default: the development key, which is known to everybody]
     #[arg(long)]
@@ -60,6 +61,12 @@ struct ImageArgs {
     /// The security counter: raise it when no older image may ever run again
     #[arg(long, default_value_t = 0)]
     counter: u32,
+    /// Which of the keys of the bootloader it is: 0 for UPDATE_PUBLIC_KEY, 1 for UPDATE_PUBLIC_KEY_2
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..2))]
+    key_number: u8,
+    /// A key that no node accepts any more where this image has run
+    #[arg(long, value_parser = clap::value_parser!(u8).range(0..2))]
+    revokes: Option<u8>,
     /// Where the image goes [default: the name of the file with .img]
     #[arg(long, short)]
     out: Option<PathBuf>,
@@ -96,8 +103,22 @@ fn make_image(args: &ImageArgs) -> Result<()> {
     let key = signing_key(args.key.as_deref())?;
     let code = code::read(&read(&args.file)?).with_context(|| args.file.display().to_string())?;
     let hardware = args.hardware.iter().fold(0, |mask, revision| mask | 1 << revision);
-    let description =
-        Description { product: args.product, hardware, version: args.version, counter: args.counter };
+    ensure!(
+        args.counter <= LAYOUT.highest_counter(),
+        "a node keeps counters up to {}, and not {}",
+        LAYOUT.highest_counter(),
+        args.counter
+    );
+    let revokes = args.revokes.iter().fold(0, |mask, number| mask | 1 << number);
+    ensure!(revokes >> args.key_number & 1 == 0, "an image cannot revoke the key that it is signed with");
+    let description = Description {
+        product: args.product,
+        hardware,
+        version: args.version,
+        counter: args.counter,
+        key: args.key_number,
+        revokes,
+    };
     let image = Image::sign(description, code, &key)?;
     let out = args.out.clone().unwrap_or_else(|| args.file.with_extension("img"));
     std::fs::write(&out, image.to_bytes()).with_context(|| format!("cannot write {}", out.display()))?;
@@ -114,6 +135,10 @@ fn show(image: &Image) {
     println!("product     {:#010x}", about.product);
     println!("hardware    {}", revisions.join(", "));
     println!("counter     {}", about.counter);
+    println!("key         number {}", about.key);
+    if let Some(revoked) = (0..8).find(|key| about.revokes >> key & 1 != 0) {
+        println!("revokes     key number {revoked}");
+    }
     println!("code        {} bytes, CRC-32 {:#010x} (1F56h)", image.header.length(), image.header.code_crc());
 }
 

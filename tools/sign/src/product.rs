@@ -30,7 +30,7 @@ pub fn version(text: &str) -> Result<Version> {
 /// The file is no application.
 pub fn image(file: &[u8], key: &SigningKey) -> Result<Image> {
     let version = version(env!("CARGO_PKG_VERSION"))?;
-    let about = Description { product: PRODUCT, hardware: HARDWARE, version, counter: 0 };
+    let about = Description { product: PRODUCT, hardware: HARDWARE, version, ..Description::default() };
     Image::sign(about, code::read(file)?, key)
 }
 

@@ -3,7 +3,7 @@
 use bsp::update_layout::LAYOUT;
 use sign::image::Image;
 use sign::{code, key};
-use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, PUBLIC_KEY};
+use update::key::{DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, HAS_DEVELOPMENT_KEY, PUBLIC_KEYS};
 use update::mock::MockFlash;
 use update::{Decision, Description, HEADER_LEN, Next, Start, Status, Target, Updater, Version, boot};
 
@@ -11,12 +11,11 @@ const SECTORS: [usize; 8] = [16, 16, 16, 16, 64, 128, 128, 128];
 
 fn description() -> Description {
     let version = Version { major: 1, minor: 2, patch: 3 };
-    Description { product: 0x8271, hardware: 1, version, counter: 1 }
+    Description { product: 0x8271, hardware: 1, version, counter: 1, ..Description::default() }
 }
 
 fn target() -> Target {
-    let key = DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY;
-    Target { layout: LAYOUT, product: 0x8271, hardware: 0, key }
+    Target { layout: LAYOUT, product: 0x8271, hardware: 0, keys: &PUBLIC_KEYS }
 }
 
 /// An update of a node with the flash of the chip; what 1F57h reads at the end.
@@ -65,7 +64,7 @@ fn the_development_key_is_the_one_in_the_file_and_in_the_bootloader() {
     assert_eq!(key.verifying_key().to_bytes(), DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY, "{}", key::variable(&key));
     assert!(key::is_development(&key));
     assert!(!key::is_development(&key::random().unwrap()));
-    assert_eq!(PUBLIC_KEY, DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY);
+    assert!(HAS_DEVELOPMENT_KEY && PUBLIC_KEYS == [DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY; 2]);
 }
 
 #[test]
@@ -117,7 +116,7 @@ fn elf(segments: &[Vec<u8>]) -> Vec<u8> {
 #[test]
 fn segments_of_an_elf_file_lie_where_they_are_loaded() {
     let start = code::start();
-    assert_eq!(start, 0x0801_0200);
+    assert_eq!(start, 0x0802_0200);
     let file = elf(&[segment(0, start, 16), segment(16, start + 20, 3)]);
     let code = code::read(&file).unwrap();
     assert_eq!(code, [&file[..16], &[0xFF; 4], &file[16..19], &[0xFF]].concat());
@@ -135,7 +134,7 @@ fn what_is_no_application_is_refused() {
         (elf(&[]), "there is no code"),
         (elf(&[segment(0, start, 16)])[..30].to_vec(), "a damaged ELF file"),
         (Vec::new(), "there is no code"),
-        (vec![0; code::most() + 1], "room for 196096"),
+        (vec![0; code::most() + 1], "room for 130048"),
     ] {
         let error = format!("{:#}", code::read(&file).unwrap_err());
         assert!(error.contains(words), "{error}");

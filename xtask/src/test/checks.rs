@@ -26,7 +26,7 @@ pub(super) fn builds_for_host() -> Vec<Step> {
 pub(super) fn builds_for_target() -> Vec<Step> {
     vec![
         Step::new("system packages", || setup::install(setup::TEST)),
-        Step::new("production bootloader", || images::compile_production(&Toolchain::ensure()?)),
+        Step::new("bootloader of an owner", || images::compile_owner(&Toolchain::ensure()?)),
         Step::new("build images", || images::compile_all(&Toolchain::ensure()?)),
         Step::new("build bench images", || bench::build(&bench::Options::default()).map(|_| ())),
     ]
@@ -68,7 +68,8 @@ fn document_host() -> Result<()> {
 fn lint_images() -> Result<()> {
     let toolchain = Toolchain::ensure()?;
     let packages = host::IMAGES.iter().chain(&["bsp"]).flat_map(|package| ["-p", package]);
-    let packages: Vec<&str> = std::iter::once("--release").chain(packages).collect();
+    let packages: Vec<&str> =
+        std::iter::once("--release").chain(images::DEVELOPMENT).chain(packages).collect();
     let mut clippy = toolchain.cargo("clippy", &packages);
     progress::build("lint images", clippy.args(["--", "-D", "warnings"]))?;
     let mut doc = toolchain.cargo("doc", &packages);
@@ -78,9 +79,10 @@ fn lint_images() -> Result<()> {
 fn other_chips() -> Result<()> {
     let toolchain = Toolchain::ensure()?;
     for chip in OTHER_CHIPS {
-        let images = ["-p", "firmware", "-p", "bootloader"];
+        let packages = ["-p", "firmware", "-p", "bootloader"];
         let features = ["--release", "--no-default-features", "--features", chip];
-        progress::build(chip, toolchain.cargo("check", &features).args(images))?;
+        let mut command = toolchain.cargo("check", &features);
+        progress::build(chip, command.args(images::DEVELOPMENT).args(packages))?;
     }
     Ok(())
 }

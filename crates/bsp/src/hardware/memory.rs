@@ -14,6 +14,7 @@ unsafe extern "C" {
     static _application_end: u8;
     static _updatable_start: u8;
     static _updatable_end: u8;
+    static _erasable_start: u8;
     static _program_end: u8;
 }
 
@@ -51,10 +52,16 @@ pub fn parameter_pages() -> &'static [u8; 2 * PARAMETER_PAGE as usize] {
     unsafe { &*(parameters().start as *const _) }
 }
 
-/// What an update may erase and program: the application with its header, and staging.
+/// What an update may program: the security counter and the revoked keys, the application with its header, and staging.
 pub(super) fn updatable() -> Range<u32> {
     // SAFETY: only the addresses are used.
     unsafe { region(&_updatable_start, &_updatable_end) }
+}
+
+/// What of it an update may erase: the application with its header, and staging.
+pub(super) fn erasable() -> Range<u32> {
+    // SAFETY: only the addresses are used.
+    unsafe { region(&_erasable_start, &_updatable_end) }
 }
 
 /// Identifies the program: the CRC-32 of its code and constants, as its header says. A program that a debugger has put
@@ -67,7 +74,7 @@ pub fn program_id() -> u32 {
 pub(super) fn header() -> &'static [u8; HEADER_LEN] {
     // SAFETY: it lies in front of the application (memory.x): flash, readable whatever it holds. Whoever programs it does
     // not hold on to this reference meanwhile: it is used to start the application, and by the application.
-    unsafe { &*(updatable().start as *const [u8; HEADER_LEN]) }
+    unsafe { &*(erasable().start as *const [u8; HEADER_LEN]) }
 }
 
 fn own_crc() -> u32 {

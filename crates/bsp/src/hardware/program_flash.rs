@@ -1,4 +1,4 @@
-//! The flash that an update works on: the application with its header, and staging.
+//! The flash that an update works on: the security counter and the revoked keys, the application with its header, and staging.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlashErrorKind, ReadNorFlash};
 
@@ -12,13 +12,17 @@ use crate::sectors;
 pub struct ProgramFlash {
     flash: Flash,
     area: FlashArea,
+    /// Nothing before it is ever erased.
+    erasable: FlashArea,
     /// An erase was begun whose end nobody has seen.
     erases: bool,
 }
 
 impl ProgramFlash {
     pub(super) fn new(flash: Flash) -> ProgramFlash {
-        ProgramFlash { flash, area: FlashArea::new(sectors::FLASH, memory::updatable()), erases: false }
+        let [area, erasable] =
+            [memory::updatable(), memory::erasable()].map(|range| FlashArea::new(sectors::FLASH, range));
+        ProgramFlash { flash, area, erasable, erases: false }
     }
 }
 
@@ -44,7 +48,7 @@ impl update::Flash for ProgramFlash {
     }
 
     fn start_erase(&mut self, offset: u32) -> Result<(), Error> {
-        let address = self.area.address(offset, 0, 4)?;
+        let address = self.erasable.address(offset, 0, 4)?;
         let sector = sectors::starting_at(address).ok_or(NorFlashErrorKind::NotAligned)?;
         self.flash.start_erase(sector.number)?;
         self.erases = true;

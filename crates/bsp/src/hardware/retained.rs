@@ -14,6 +14,7 @@ struct Retained {
     trial: AtomicU32,
     crash: [AtomicU32; WORDS],
     proven: [AtomicU32; 2],
+    bootloader: AtomicU32,
 }
 
 /// `used` keeps the compiler from taking the initial values for granted: a reset does not write them.
@@ -24,7 +25,11 @@ static RETAINED: Retained = Retained {
     trial: AtomicU32::new(0),
     crash: [const { AtomicU32::new(0) }; WORDS],
     proven: [const { AtomicU32::new(0) }; 2],
+    bootloader: AtomicU32::new(0),
 };
+
+/// What a bootloader for development leaves: 'DEVL'.
+const DEVELOPMENT: u32 = u32::from_be_bytes(*b"DEVL");
 
 /// The note of the other image; `None` when there is none since power-on.
 #[must_use]
@@ -65,6 +70,17 @@ pub fn set_proof(header: &Header) {
 /// Power came: nothing is proven.
 pub fn forget_proof() {
     store(&RETAINED.proven, [0, 0]);
+}
+
+/// Leaves word whether this bootloader is one for development.
+pub fn set_development(is_for_development: bool) {
+    RETAINED.bootloader.store(if is_for_development { DEVELOPMENT } else { 0 }, Ordering::Relaxed);
+}
+
+/// Whether the bootloader that has started the application is one for development, which starts what nobody has signed.
+#[must_use]
+pub fn is_development() -> bool {
+    RETAINED.bootloader.load(Ordering::Relaxed) == DEVELOPMENT
 }
 
 /// The words of the crash record.

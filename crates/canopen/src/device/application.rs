@@ -15,6 +15,10 @@ pub trait Application {
     /// The faults of the application itself, at most 32. [`Fault::Application`] names one by its place here.
     const CONDITIONS: &'static [Condition] = &[];
 
+    /// Whether clients may upload in blocks (CiA 301, 7.2.4.3.12, optional). A device that is short of flash and has no long entry
+    /// does without: a block upload is refused with [`Abort::Command`], and its client uploads in segments.
+    const BLOCK_UPLOAD: bool = true;
+
     /// The bits of the error register (1001h) that the device has. The generic error, bit 0, must be one of them (CiA 301,
     /// 7.5.2.2).
     fn register_bits(&self) -> u8 {

@@ -9,6 +9,8 @@ use crate::sdo::{Abort, Multiplexer, Objects, Writable};
 use crate::{Instant, emcy, sync};
 
 impl<B: Body> Objects for B {
+    const BLOCK_UPLOAD: bool = B::Application::BLOCK_UPLOAD;
+
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort> {
         let basic = self.basic();
         let entry = basic.dictionary.find(at.index, at.sub)?;

@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::lss::Layer;
-use super::{Next, Node, STALE};
+use super::{Application as _, Next, Node, STALE};
 use crate::lss::{self, BitRate};
 use crate::sdo::{Abort, Server};
 use crate::transmit::{RETRY, Turn};
@@ -125,7 +125,7 @@ impl<B: Body> Node<B> {
         }
         // A reply that still waits is obsolete: its client has gone on.
         *reply_due = Instant::NEVER;
-        if server.is_sending() {
+        if B::Application::BLOCK_UPLOAD && server.is_sending() {
             self.send_block(turn);
         }
     }
@@ -204,7 +204,7 @@ impl<B: Body> Node<B> {
         if turn.now >= self.services.reply_due || self.services.server.expire(turn.now) {
             self.respond(turn);
         }
-        if turn.now >= self.services.block_due {
+        if B::Application::BLOCK_UPLOAD && turn.now >= self.services.block_due {
             self.send_block(turn);
         }
     }

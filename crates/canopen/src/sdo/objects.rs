@@ -19,6 +19,9 @@ pub(crate) enum Writable {
 
 /// The dictionary with its values and rules.
 pub(crate) trait Objects {
+    /// Whether there are block uploads.
+    const BLOCK_UPLOAD: bool;
+
     /// The value of an entry.
     fn read(&self, at: Multiplexer) -> Result<&[u8], Abort>;
     /// How the entry can be written, if it can be at all.

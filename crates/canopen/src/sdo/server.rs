@@ -203,6 +203,7 @@ impl Server {
     }
 
     /// Whether segments of a block wait to be sent.
+    #[inline]
     pub(crate) fn is_sending(&self) -> bool {
         matches!(&self.transfer, Transfer::BlockUpload(sender) if sender.is_sending())
     }

@@ -1,29 +1,40 @@
 //! A small node with sectors of different sizes, images for it, and what bootloader and master do with them.
 
+use std::sync::LazyLock;
+
 use update::mock::MockFlash;
 use update::{
     Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Start, Status, Target,
     Updater, Version, boot,
 };
 
-/// Sectors of the mock: bootloader; application in two; staging in two.
-pub(crate) const SECTORS: [usize; 5] = [256, 1024, 2048, 2048, 2048];
-pub(crate) const APPLICATION: usize = 256;
-pub(crate) const STAGING: usize = 256 + 3072;
-const APPLICATION_AREA: Area = Area::new(256, &[1024, 2048]);
-const STAGING_AREA: Area = Area::new(256 + 3072, &[2048, 2048]);
+/// Sectors of the mock: security counter and revoked keys; application in two; staging in two.
+pub(crate) const SECTORS: [usize; 5] = [512, 1024, 2048, 2048, 2048];
+pub(crate) const APPLICATION: usize = 512;
+pub(crate) const STAGING: usize = 512 + 3072;
+const SECURITY_AREA: Area = Area::new(0, &[512]);
+const APPLICATION_AREA: Area = Area::new(512, &[1024, 2048]);
+const STAGING_AREA: Area = Area::new(512 + 3072, &[2048, 2048]);
 
 pub(crate) const PRODUCT: u32 = 0x0001_8271;
 pub(crate) const REVISION: u8 = 2;
 
-/// The key that the test node trusts.
+/// The first of the two keys that the test node trusts.
 pub(crate) fn keys() -> salty::Keypair {
-    salty::Keypair::from(&[7; 32])
+    key_number(0)
 }
 
+/// One of the two.
+pub(crate) fn key_number(number: u8) -> salty::Keypair {
+    salty::Keypair::from(&[7 + number; 32])
+}
+
+static PUBLIC_KEYS: LazyLock<[[u8; 32]; 2]> =
+    LazyLock::new(|| [0, 1].map(|number| key_number(number).public.to_bytes()));
+
 pub(crate) fn target() -> Target {
-    let layout = Layout::new(APPLICATION_AREA, STAGING_AREA).unwrap();
-    Target { layout, product: PRODUCT, hardware: REVISION, key: keys().public.to_bytes() }
+    let layout = Layout::new(SECURITY_AREA, APPLICATION_AREA, STAGING_AREA).unwrap();
+    Target { layout, product: PRODUCT, hardware: REVISION, keys: &*PUBLIC_KEYS }
 }
 
 /// A header and its code, as far as they make sense; [`Image::bytes`] is what goes over the bus.
@@ -35,7 +46,7 @@ pub(crate) struct Image {
 
 pub(crate) fn description(version: u16, counter: u32) -> Description {
     let version = Version { major: version, minor: 2, patch: 3 };
-    Description { product: PRODUCT, hardware: 1 << REVISION, version, counter }
+    Description { product: PRODUCT, hardware: 1 << REVISION, version, counter, ..Description::default() }
 }
 
 impl Image {

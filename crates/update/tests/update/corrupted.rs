@@ -2,7 +2,7 @@
 
 use crate::bench::{
     HEADER, Image, PRODUCT, REVISION, assert_starts, description, download, flash_with, image_a, image_b,
-    keys, noise, run, target, update,
+    key_number, keys, noise, run, target, update,
 };
 use update::{Area, CONTEXT, Description, Refusal, SIGNED_LEN, Status, Updater};
 
@@ -86,7 +86,9 @@ fn headers() -> Vec<Kind> {
         ("a bit of the reserved bytes flipped", bytes(flip(300)), Refusal::HeaderCrc),
         ("a bit of the header's CRC flipped", bytes(flip(HEADER - 1)), Refusal::HeaderCrc),
         ("reserved bytes in use", header(put(300, 1)), Refusal::HeaderContent),
-        ("a version of more bits", header(put(20, 1 << 16)), Refusal::HeaderContent),
+        ("a number that no key has", header(put(20, 8 << 16)), Refusal::HeaderContent),
+        ("a key that revokes itself", header(put(20, 1 << 24)), Refusal::HeaderContent),
+        ("a counter that cannot be kept", signed(|about| about.counter = 25), Refusal::HeaderContent),
         ("no code by the header", header(put(24, 0)), Refusal::HeaderContent),
         ("no whole number of words", header(put(24, 618)), Refusal::HeaderContent),
         ("a length beyond the area", header(put(24, 10_000)), Refusal::TooLong),
@@ -118,12 +120,15 @@ fn contents() -> Vec<Kind> {
         ("a newer version by hand", header(put(16, 9)), Refusal::Signature),
         ("a higher counter by hand", header(put(32, 6)), Refusal::Signature),
         ("more hardware by hand", header(put(12, u32::MAX)), Refusal::Signature),
+        ("the other key by hand", header(put(20, 3 | 1 << 16)), Refusal::Signature),
+        ("a revocation by hand", header(put(20, 3 | 2 << 24)), Refusal::Signature),
+        ("a key that the node has not", signed(|about| about.key = 2), Refusal::Signature),
     ]
 }
 
 fn signatures() -> Vec<Kind> {
     let b = image_b();
-    let stranger = b.clone().signed_by(&salty::Keypair::from(&[8; 32]));
+    let stranger = b.clone().signed_by(&salty::Keypair::from(&[9; 32]));
     let transplanted = Image { header: b.header.with_signature(*image_a().header.signature()), ..b.clone() };
     let plain = keys().sign(&[&b.header.signed_part()[..], &b.code].concat());
     let of_hash = keys().sign(&b.hash());
@@ -139,6 +144,7 @@ fn signatures() -> Vec<Kind> {
         ("R and S exchanged", header(|bytes| bytes[SIGNED_LEN..HEADER].rotate_left(32))),
         ("S not reduced (RFC 8032, 5.1.7)", malleable),
         ("the key of a stranger", stranger.bytes()),
+        ("the other key of the node", b.clone().signed_by(&key_number(1)).bytes()),
         ("the signature of another image", transplanted.bytes()),
         ("plain Ed25519", with(plain)),
         ("plain Ed25519 of the hash", with(of_hash)),

@@ -6,8 +6,12 @@ use update::{Description, HEADER_LEN, Header, Refusal, SIGNATURE_LEN, SIGNED_LEN
 
 fn description() -> impl Strategy<Value = Description> {
     let version = any::<[u16; 3]>().prop_map(|[major, minor, patch]| Version { major, minor, patch });
-    (any::<u32>(), any::<u32>(), version, any::<u32>())
-        .prop_map(|(product, hardware, version, counter)| Description { product, hardware, version, counter })
+    (any::<u32>(), any::<u32>(), version, any::<u32>(), 0..8_u8, any::<u8>()).prop_map(
+        |(product, hardware, version, counter, key, revokes)| {
+            let revokes = revokes & !(1 << key);
+            Description { product, hardware, version, counter, key, revokes }
+        },
+    )
 }
 
 fn signature() -> impl Strategy<Value = [u8; SIGNATURE_LEN]> {
@@ -86,13 +90,14 @@ fn noise_is_no_header() {
 #[test]
 fn the_fields_are_where_the_table_says() {
     let version = Version { major: 0x0102, minor: 0x0304, patch: 0x0506 };
-    let about = Description { product: 0x1112_1314, hardware: 0x2122_2324, version, counter: 0x3132_3334 };
+    let numbers = Description { product: 0x1112_1314, hardware: 0x2122_2324, ..Description::default() };
+    let about = Description { version, counter: 0x3132_3334, key: 2, revokes: 0xA3, ..numbers };
     let header = Header::describe(about, b"123456781234").unwrap().with_signature([0xA5; 64]);
     let bytes = header.encode();
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     assert_eq!(&bytes[..8], b"CNFW\x01\0\0\0");
     assert_eq!((word(8), word(12)), (0x1112_1314, 0x2122_2324));
-    assert_eq!(&bytes[16..24], [0x02, 0x01, 0x04, 0x03, 0x06, 0x05, 0, 0]);
+    assert_eq!(&bytes[16..24], [0x02, 0x01, 0x04, 0x03, 0x06, 0x05, 2, 0xA3]);
     assert_eq!((word(24), word(28), word(32)), (12, header.code_crc(), 0x3132_3334));
     assert!(bytes[36..SIGNED_LEN].iter().all(|byte| *byte == 0));
     assert_eq!((SIGNED_LEN, &bytes[444..508]), (444, &[0xA5; 64][..]));
@@ -103,8 +108,17 @@ fn the_fields_are_where_the_table_says() {
 /// The check value of CRC-32/ISO-HDLC (catalogue of parametrised CRC algorithms), of a message of whole words.
 #[test]
 fn the_crc_is_the_one_of_zip() {
-    let about = Description { product: 0, hardware: 0, version: Version::default(), counter: 0 };
+    let about = Description::default();
     assert_eq!(Header::describe(about, b"1234").unwrap().code_crc(), 0x9BE3_E0A3);
     assert!(Header::describe(about, b"123").is_none());
     assert!(Header::describe(about, b"").is_none());
+}
+
+#[test]
+fn an_image_names_a_key_that_can_be_and_does_not_revoke_it() {
+    let header =
+        |key, revokes| Header::describe(Description { key, revokes, ..Description::default() }, b"1234");
+    assert!((0..8).all(|key| header(key, !(1 << key)).is_some()));
+    assert!((0..8).all(|key| header(key, 1 << key).is_none()));
+    assert!(header(8, 0).is_none() && header(u8::MAX, 0).is_none());
 }

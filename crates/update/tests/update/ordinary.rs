@@ -2,13 +2,13 @@
 
 use crate::bench::{
     APPLICATION, HEADER, Image, STAGING, assert_starts, description, download, flash_with, holds, image_a,
-    image_b, install, run, stage, start, target, update,
+    image_b, install, key_number, run, stage, start, target, update,
 };
 use embedded_storage::nor_flash::{ErrorType, ReadNorFlash};
 use update::mock::{MockFlash, PowerCut};
 use update::{
-    Decision, Flash, Header, Next, Phase, Proof, Refusal, Reset, Start, Status, Stay, Trial, Updater,
-    application, boot,
+    Decision, Description, Flash, Header, Next, Phase, Proof, Refusal, Reset, Start, Status, Stay, Trial,
+    Updater, application, boot,
 };
 
 #[test]
@@ -190,6 +190,74 @@ fn the_security_counter_may_grow_or_stay_and_never_goes_back() {
         assert_eq!(update(&mut flash, &image.bytes()).is_ok(), good);
     }
     assert_starts(&mut flash, &with(6, 9));
+}
+
+/// What one image has reached, no damage of the application takes back.
+#[test]
+fn the_security_counter_outlives_the_application() {
+    let with = |version, counter| Image::new(description(version, counter), 100);
+    let mut flash = flash_with(&with(1, 5), 1);
+    assert_starts(&mut flash, &with(1, 5));
+    clear(&mut flash);
+    flash.disturb(APPLICATION + 40, |byte| byte ^ 8);
+    assert!(update(&mut flash, &with(2, 4).bytes()).is_err());
+    assert_eq!(start(&mut flash), Decision::Stay(Stay::NoProgram(Refusal::HeaderCrc)));
+    // Nor does a debugger, or whoever programs the application area.
+    put(&mut flash, &with(2, 4));
+    assert_eq!(start(&mut flash), Decision::Stay(Stay::NoProgram(Refusal::Counter { least: 5 })));
+    update(&mut flash, &with(3, 5).bytes()).unwrap();
+    assert_starts(&mut flash, &with(3, 5));
+}
+
+/// It is kept before the bootloader takes the next download, also when the application was told to enter the bootloader.
+#[test]
+fn the_counter_is_kept_before_the_application_can_be_replaced() {
+    let with = |version, counter| Image::new(description(version, counter), 100);
+    let mut flash = flash_with(&with(1, 5), 1);
+    let proof = Proof::Of(with(1, 5).header.crc());
+    let asked = Start { stay: true, proof, ..Start::default() };
+    assert_eq!(boot(&mut flash, &target(), asked), Decision::Stay(Stay::Asked));
+    flash.disturb(APPLICATION, |byte| byte ^ 8);
+    clear(&mut flash);
+    assert!(update(&mut flash, &with(2, 4).bytes()).is_err());
+}
+
+/// Only of an application that is signed: else a header by hand would lock the node for good.
+#[test]
+fn the_counter_of_an_application_that_nobody_has_signed_is_not_kept() {
+    let mut flash = flash_with(&image_a(), 1);
+    clear(&mut flash);
+    let forged = Header::describe(description(1, 20), &image_b().code).unwrap();
+    put(&mut flash, &Image { header: forged, ..image_b() });
+    for stay in [false, true] {
+        boot(&mut flash, &target(), Start { stay, ..Start::default() });
+    }
+    put(&mut flash, &image_a());
+    assert_starts(&mut flash, &image_a());
+}
+
+fn by_key(version: u16, key: u8, revokes: u8) -> Image {
+    let about = Description { key, revokes, ..description(version, 5) };
+    let header = Header::describe(about, &image_b().code).unwrap();
+    Image { header, ..image_b() }.signed_by(&key_number(key))
+}
+
+#[test]
+fn either_key_signs_and_one_revokes_the_other_for_good() {
+    let mut flash = flash_with(&by_key(1, 0, 0), 1);
+    for image in [by_key(2, 1, 0), by_key(3, 0, 0), by_key(4, 1, 1)] {
+        update(&mut flash, &image.bytes()).unwrap();
+        assert_starts(&mut flash, &image);
+    }
+    // From the start of the fourth on, the first key is none any more, whatever becomes of that image.
+    for image in [by_key(3, 0, 0), by_key(5, 0, 2)] {
+        assert!(update(&mut flash, &image.bytes()).is_err());
+        put(&mut flash, &image);
+        clear(&mut flash);
+        assert_eq!(start(&mut flash), Decision::Stay(Stay::NoProgram(Refusal::Revoked { key: 0 })));
+    }
+    update(&mut flash, &by_key(6, 1, 0).bytes()).unwrap();
+    assert_starts(&mut flash, &by_key(6, 1, 0));
 }
 
 #[test]

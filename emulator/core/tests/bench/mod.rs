@@ -74,8 +74,9 @@ impl Bench {
     /// Loads a program of `mechanics-images`.
     pub(crate) fn new(program: &str) -> Bench {
         let path = directory().join(program);
-        let file = std::fs::read(&path)
-            .unwrap_or_else(|error| panic!("{}: {error}; run `cargo xtask images` first", path.display()));
+        let file = std::fs::read(&path).unwrap_or_else(|error| {
+            panic!("{}: {error}; run `cargo xtask images --development` first", path.display())
+        });
         let elf = object::File::parse(file.as_slice()).unwrap();
         let verdict =
             elf.symbols().find(|symbol| symbol.name() == Ok("VERDICT")).expect("a verdict").address();

@@ -25,7 +25,7 @@ const STOP: u8 = 0;
 pub(super) const START: u8 = 1;
 pub(super) const CLEAR: u8 = 3;
 /// First address of the application's header, and what the bootloader may erase besides.
-pub(crate) const HEADER: u32 = 0x0801_0000;
+pub(crate) const HEADER: u32 = 0x0802_0000;
 /// Of the other image.
 pub(super) const VERSION_B: Version = Version { major: 9, minor: 8, patch: 7 };
 /// How long a client waits for a response, the shortest that is known (python-canopen).
@@ -243,7 +243,7 @@ pub(super) fn signed(code: Vec<u8>, change: impl FnOnce(&mut Description)) -> Im
         product: product::PRODUCT,
         hardware: product::HARDWARE,
         version: VERSION_B,
-        counter: 0,
+        ..Description::default()
     };
     change(&mut about);
     Image::sign(about, code, &sign::key::development()).unwrap()

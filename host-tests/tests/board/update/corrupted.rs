@@ -143,7 +143,7 @@ fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
     assert_eq!(bench.start(), version_a().header.code_crc());
 }
 
-/// The counter that counts is that of the application in place, so it takes two updates.
+/// The counter that counts is that of an image that has run, so it takes two updates.
 #[test]
 fn an_image_with_a_lower_counter_is_refused() {
     const COUNTER: u8 = 66;

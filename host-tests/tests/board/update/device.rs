@@ -13,6 +13,7 @@ const RESET_COMMUNICATION: u8 = 0x82;
 const HEARTBEAT: Multiplexer = Multiplexer { index: 0x1017, sub: 0 };
 /// Of SDO (CiA 301, table 22).
 const INVALID_VALUE: Failure = Failure::Refused(0x0609_0030);
+const COMMAND: Failure = Failure::Refused(0x0504_0001);
 const DEVICE_STATE: Failure = Failure::Refused(0x0800_0022);
 
 fn at(index: u16, sub: u8) -> Multiplexer {
@@ -134,12 +135,12 @@ fn a_download_without_a_clear_is_refused_and_one_in_segments_is_taken() {
     assert_eq!(bench.read(CONTROL).unwrap(), [0]);
 }
 
-/// In blocks and in segments.
+/// It refuses with the abort code at which clients go on in segments.
 #[test]
-fn a_client_may_choose_how_it_reads() {
+fn it_is_read_in_segments_and_not_in_blocks() {
     let mut bench = in_bootloader();
     let name = at(0x1008, 0);
-    assert_eq!(Client::new(&mut bench).read_blocks(name, 127).unwrap(), b"Bootloader");
+    assert_eq!(Client::new(&mut bench).read_blocks(name, 127), Err(COMMAND));
     bench.run(Time::from_millis(10));
     assert_eq!(bench.read(name).unwrap(), b"Bootloader");
 }

@@ -92,7 +92,7 @@ mod tests {
     const VERSION: Version = Version { major: 1, minor: 2, patch: 3 };
 
     fn file() -> Vec<u8> {
-        let description = Description { product: 1, hardware: 1, version: VERSION, counter: 0 };
+        let description = Description { product: 1, hardware: 1, version: VERSION, ..Description::default() };
         let code = [0x5A; 100];
         let header = Header::describe(description, &code).expect("a header");
         [header.encode().as_slice(), &code].concat()

@@ -14,11 +14,11 @@ use crate::sdo::{
 impl Server {
     /// A request that is no segment of a block; `is_repeated` for the same as the one before.
     #[inline]
-    pub(super) fn dispatch(
+    pub(super) fn dispatch<O: Objects>(
         &mut self,
         frame: &[u8; 8],
         is_repeated: bool,
-        objects: &mut impl Objects,
+        objects: &mut O,
         now: Instant,
     ) -> Answer {
         let Some(request) = Request::parse(frame) else {
@@ -39,6 +39,11 @@ impl Server {
             }
             Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, objects),
             Request::BlockDownloadEnd(end) => self.block_download_end(end, objects, now),
+            Request::BlockUpload { at, .. } if !O::BLOCK_UPLOAD => {
+                self.begin(at);
+                Err(Abort::Command)
+            }
+            _ if !O::BLOCK_UPLOAD => Err(Abort::Command),
             Request::BlockUpload { at, block_size, threshold, .. } => {
                 self.block_upload(at, block_size, threshold, objects)
             }

@@ -1,0 +1,77 @@
+//! The bootloader as its owner builds it: two keys of the owner's, and not the feature `development`.
+
+use ed25519_dalek::SigningKey;
+use sign::image::Image;
+use sign::key;
+use update::Description;
+
+use super::bench::{BOOT, Bench, DEVICE_TYPE, HEADER, version_a, version_b};
+use crate::support::{SECOND, world_of};
+
+/// The secret halves of the keys that `cargo xtask` builds this bootloader with.
+const OWNER: [[u8; 32]; 2] = [[0x42; 32], [0x43; 32]];
+/// What 1F57h reads after an image whose key is revoked.
+const REVOKED: u8 = 71;
+/// What 1F57h reads after an image that another key has signed.
+const SIGNATURE: u8 = 67;
+
+fn bench() -> Bench {
+    let mut bench = Bench::with(world_of("bootloader-owner", "--bitrate 1000"), 1_000_000, 1);
+    bench.run(SECOND);
+    bench
+}
+
+/// The same code in an image that names this key, and is signed with it.
+fn signed_by_owner(image: &Image, key: u8, revokes: u8) -> Image {
+    let about = Description { key, revokes, ..*image.header.description() };
+    Image::sign(about, image.code.clone(), &SigningKey::from_bytes(&OWNER[usize::from(key)])).unwrap()
+}
+
+#[test]
+fn it_was_built_with_the_owner_s_keys() {
+    let digits = OWNER.map(|secret| {
+        let variable = key::variable(&SigningKey::from_bytes(&secret));
+        variable.split_once('=').unwrap().1.to_owned()
+    });
+    assert!(include_str!("owner-keys.hex").lines().eq(digits));
+}
+
+#[test]
+fn it_takes_what_its_owner_has_signed_and_nothing_else() {
+    let mut bench = bench();
+    // The application that the emulated board brings is signed with the development key: this bootloader does not start it.
+    assert_eq!(bench.settled().code, SIGNATURE);
+    bench.clear();
+    assert!(bench.download(&version_b(0).to_bytes()).is_err() || bench.wait_for_flash().code != 0);
+    assert_eq!(bench.settled().code, SIGNATURE, "the development key is the key of a stranger");
+    bench.clear();
+    let image = signed_by_owner(&version_a(), 0, 0);
+    bench.download(&image.to_bytes()).unwrap();
+    bench.wait_for_flash();
+    assert_eq!(bench.start(), image.header.code_crc());
+}
+
+/// The second key takes the first one's rights: from the start of the image that says so.
+#[test]
+fn one_of_its_keys_revokes_the_other_one() {
+    let mut bench = bench();
+    let take = |bench: &mut Bench, image: &Image| {
+        bench.clear();
+        bench.download(&image.to_bytes()).is_ok() && bench.wait_for_flash().code == 0
+    };
+    let first = signed_by_owner(&version_a(), 0, 0);
+    assert!(take(&mut bench, &first));
+    assert_eq!(bench.start(), first.header.code_crc());
+    bench.stop();
+    let second = signed_by_owner(&version_b(0), 1, 1);
+    assert!(take(&mut bench, &second));
+    assert_eq!(bench.start(), second.header.code_crc());
+    bench.stop();
+    assert!(!take(&mut bench, &first));
+    assert_eq!((bench.settled().code, bench.settled().detail), (REVOKED, 0));
+    // Nor does it start where a debugger has put it.
+    bench.machine().write(HEADER, &first.to_bytes()).unwrap();
+    bench.power_cycle();
+    bench.run(SECOND);
+    assert_eq!(bench.read(DEVICE_TYPE).unwrap(), BOOT);
+}
