@@ -11,6 +11,7 @@ mod fuzz;
 mod images;
 mod mutants;
 mod own_tool;
+mod pictures;
 mod plots;
 mod progress;
 mod setup;
@@ -64,6 +65,8 @@ enum Command {
     Eds,
     /// Write docs/plots/*.svg and the tables of docs/measuring.md from the measurement chain
     Plots,
+    /// Take the pictures of the page and of the simulator's screen for docs/page.md and README
+    Pictures,
     /// Make signing keys and sign images for the field update (docs/update.md; `cargo xtask sign --help`)
     #[command(disable_help_flag = true)]
     Sign {
@@ -96,7 +99,7 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
-    /// Bring what the other commands need: a compiler for the Cortex-M4, cmake, libclang, Python packages, tshark
+    /// Bring what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
     Setup {
         /// Only say what is missing, and how to install it
         #[arg(long)]
@@ -130,6 +133,7 @@ fn run(command: Command) -> Result<()> {
         Command::FaultInjection { flags } => fault_injection::try_all(&flags),
         Command::Eds => eds::write(),
         Command::Plots => plots::write(),
+        Command::Pictures => pictures::take(),
         Command::Sign { arguments } => own_tool::run("sign", &arguments),
         Command::Protect { arguments } => own_tool::run("protect", &arguments),
         Command::Fuzz(flags) => fuzz::run_fuzzer(&flags),

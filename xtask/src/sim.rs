@@ -12,10 +12,10 @@ use crate::setup::{self, emulator};
 use crate::target::Toolchain;
 use crate::{images, progress};
 
-/// Builds the simulator and the tool that signs images.
+/// Builds the simulator, the tool that signs images, and the program that serves the page.
 fn build() -> Result<()> {
     let mut command = emulator::cargo_with_emulator()?;
-    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "sign"]);
+    command.args(["build", "--profile", "sim", "-p", "sim", "-p", "sign", "-p", "nodectl"]);
     progress::build("emulator 2/2", &mut command)
 }
 
@@ -39,10 +39,12 @@ pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     become_program(with_images(&built("sim")).args(flags))
 }
 
-/// The simulator with the two ELF files it loads.
+/// The simulator with the two ELF files it loads, and the program that it has serve the page. That is a program of its own: the
+/// simulator's licence is not that of the tools.
 fn with_images(program: &Path) -> Command {
     let mut command = Command::new(program);
     command.arg("--bootloader").arg(images::dir().join("bootloader"));
     command.arg("--firmware").arg(images::dir().join("firmware"));
+    command.arg("--page-program").arg(built("nodectl"));
     command
 }

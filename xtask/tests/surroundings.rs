@@ -57,6 +57,10 @@ impl Machine {
         self
     }
 
+    fn with_browser(self) -> Machine {
+        self.with("chromium", WORKS).with("chromedriver", WORKS)
+    }
+
     fn closed(mut self) -> Machine {
         self.is_closed = true;
         self
@@ -95,8 +99,8 @@ impl Machine {
 #[test]
 fn whoever_is_not_root_on_debian_is_told_one_command_and_nothing_is_built() {
     let machine = Machine::debian("debian").closed();
-    let command =
-        "sudo apt-get install -y rustc-web rust-web-src cargo-web rust-web-clippy python3-venv tshark";
+    let command = "sudo apt-get install -y rustc-web rust-web-src cargo-web rust-web-clippy python3-venv tshark \
+                   chromium chromium-driver";
     assert_eq!(machine.command(), command);
     for arguments in [&["test"][..], &["sim", "--for", "5"], &["setup"]] {
         let output = machine.xtask(arguments);
@@ -112,7 +116,8 @@ fn whoever_is_not_root_on_debian_is_told_one_command_and_nothing_is_built() {
 #[test]
 fn a_program_that_does_not_work_is_no_program() {
     let machine = Machine::debian("stub").with("tshark", FAILS).with("cc", FAILS);
-    assert_eq!(machine.command(), "sudo apt-get install -y build-essential python3-venv tshark");
+    let command = "sudo apt-get install -y build-essential python3-venv tshark chromium chromium-driver";
+    assert_eq!(machine.command(), command);
 }
 
 #[test]
@@ -130,16 +135,17 @@ fn root_on_debian_types_nothing() {
 
 #[test]
 fn with_a_python_that_makes_environments_the_emulator_s_tools_need_no_package() {
-    let machine = Machine::debian("python").with("python3", WORKS).with("tshark", WORKS);
+    let machine = Machine::debian("python").with("python3", WORKS);
+    let machine = machine.with("tshark", WORKS).with_browser();
     assert_eq!(machine.says(), NOTHING, "rustup adds the target, and PyPI has cmake and libclang");
 }
 
 #[test]
 fn other_systems_are_told_in_their_words() {
     for (manager, command) in [
-        ("dnf", "sudo dnf install -y python3 wireshark-cli"),
-        ("pacman", "sudo pacman -S --needed --noconfirm python wireshark-cli"),
-        ("brew", "brew install python wireshark"),
+        ("dnf", "sudo dnf install -y python3 wireshark-cli chromium chromedriver"),
+        ("pacman", "sudo pacman -S --needed --noconfirm python wireshark-cli chromium"),
+        ("brew", "brew install python wireshark chromium chromedriver"),
     ] {
         let machine = Machine::new(manager).with(manager, WORKS);
         assert_eq!(machine.command(), command);
@@ -148,8 +154,8 @@ fn other_systems_are_told_in_their_words() {
 
 #[test]
 fn a_rustup_that_must_not_download_is_named_where_debian_cannot_help() {
-    let machine =
-        Machine::new("closed").closed().with("dnf", WORKS).with("python3", WORKS).with("tshark", WORKS);
+    let machine = Machine::new("closed").closed().with("dnf", WORKS).with("python3", WORKS);
+    let machine = machine.with("tshark", WORKS).with_browser();
     assert_eq!(machine.command(), "env -u RUSTUP_AUTO_INSTALL rustup target add thumbv7em-none-eabihf");
 }
 

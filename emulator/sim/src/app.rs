@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -12,15 +13,20 @@ use canbus::{Record, Stamped, Time};
 
 use crate::cli::{Options, Speed};
 use crate::console::{self, Command};
+use crate::control::Control;
 use crate::display::Display;
 use crate::gateway::{BUS_NAME, Gateway, Protocol};
 use crate::greeting::Greeting;
 use crate::host_time::{HostTime, Work};
 use crate::keeper::Keeper;
 use crate::pace::Pace;
+use crate::page::{Connections, Page};
 use crate::setup;
 use crate::summary::Summary;
 use crate::world::World;
+
+/// Of this machine, for the page.
+const ANY_PORT: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
 /// Clients, commands and the display are looked at this often, in virtual time.
 const STEP: Time = Time::from_millis(1);
@@ -32,6 +38,9 @@ struct App {
     display: Display,
     commands: Option<Receiver<String>>,
     keeper: Option<Keeper>,
+    control: Option<Control>,
+    /// Ends with this value.
+    _page: Option<Page>,
     candump: Option<BufWriter<File>>,
     interrupted: Arc<AtomicBool>,
     options: Options,
@@ -67,7 +76,25 @@ impl App {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
         ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot catch Ctrl-C")?;
-        let greeting = Greeting { options: &options, socketcand, slcan, boards: world.boards() };
+        let asked = options.page();
+        // The page needs one, whoever else does.
+        let control = options.control.or(asked.map(|_| ANY_PORT)).map(Control::listen).transpose()?;
+        let control_address = control.as_ref().map(Control::address).transpose()?;
+        let page = match (asked, control_address) {
+            (Some((page, program)), Some(control)) => {
+                let socketcand = gateway.listen(ANY_PORT, Protocol::Page)?;
+                Some(Page::start(program, &Connections { socketcand, control, page }))
+            }
+            _ => None,
+        };
+        let greeting = Greeting {
+            options: &options,
+            socketcand,
+            slcan,
+            control: control_address,
+            page: page.as_ref().map(Page::address),
+            boards: world.boards(),
+        };
         let display = if options.json {
             println!("{}", greeting.json());
             Display::quiet()
@@ -85,6 +112,8 @@ impl App {
             display,
             commands,
             keeper,
+            control,
+            _page: page,
             candump,
             interrupted,
             options,
@@ -108,6 +137,9 @@ impl App {
     fn step(&mut self, end: Time) -> Result<()> {
         let start = Instant::now();
         self.gateway.poll(&mut self.world);
+        if self.control.as_mut().is_some_and(|control| control.poll(&mut self.world)) {
+            self.obey(Command::Quit);
+        }
         self.host_time.count(Work::Clients, start);
         self.world.run_until(end.min(self.world.now() + STEP));
         let start = Instant::now();

@@ -4,6 +4,7 @@ use std::rc::Rc;
 
 use anyhow::{Context, Result};
 use canbus::{Controller, Time};
+use chip::plant::FaultKind;
 use chip::{Board as Wiring, FLASH_BASE, Stm32f4, Variant};
 use emulator::{Incident, Machine, Model, Stop};
 use update::HEADER_LEN;
@@ -15,7 +16,7 @@ use crate::log::{Line, Log, Ram};
 use crate::oscillator::Oscillator;
 use crate::personality::Personality;
 use crate::status::NodeStatus;
-use crate::stimuli::Stimulus;
+use crate::stimuli::{BoardStimuli, Knob, Stimulus};
 use crate::summary::NodeSummary;
 use crate::traffic::Heard;
 
@@ -150,6 +151,23 @@ impl Board {
         // It may have run on by a few instructions, and for its chip time only goes forwards.
         let now = now.max(self.machine.now());
         stimulus.act_on(self.machine.peripherals_mut().plant_mut(now), now);
+    }
+
+    /// What its sensors see.
+    pub(crate) fn stimuli(&self, node_id: u8) -> BoardStimuli {
+        let (now, plant) = (self.machine.now(), self.machine.peripherals().plant());
+        let knob = |spec: &dyn ToString, value| Knob { spec: spec.to_string(), value };
+        BoardStimuli {
+            board: self.id,
+            node: node_id,
+            personality: self.personality,
+            pressure: knob(plant.pressure_signal(), plant.pressure(now)),
+            temperature: knob(plant.temperature_signal(), plant.temperature(now)),
+            thermistor: knob(plant.thermistor_signal(), plant.thermistor(now)),
+            shaft: knob(plant.motion(), plant.revolutions(now)),
+            buttons: plant.held(),
+            faults: plant.faults(now).map(FaultKind::name).collect(),
+        }
     }
 
     /// What the firmware has logged since the last call.

@@ -1,7 +1,7 @@
 //! The command line.
 
-use std::net::{SocketAddr, ToSocketAddrs};
-use std::path::PathBuf;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, ToSocketAddrs};
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use canbus::Time;
@@ -108,6 +108,23 @@ pub struct Options {
     #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
     pub load: u8,
 
+    /// Show the page in a browser here, and take the next free port where this one is taken; 127.0.0.1:8301 if it is left out. With
+    /// --speed max there is a page only when it is asked for: virtual time is faster than anybody can look.
+    #[arg(long, value_name = "ADDR:PORT", value_parser = address)]
+    pub page: Option<SocketAddr>,
+
+    /// Show no page.
+    #[arg(long, conflicts_with = "page")]
+    pub no_page: bool,
+
+    /// The program that serves the page (nodectl).
+    #[arg(long, value_name = "PATH", hide = true)]
+    pub page_program: Option<PathBuf>,
+
+    /// Take commands for the stimuli here, for scripts (docs/page.md). Port 0 takes a free one.
+    #[arg(long, value_name = "ADDR:PORT", value_parser = address)]
+    pub control: Option<SocketAddr>,
+
     /// Print JSON only: a line with the addresses served when they are, and the summary as the last line. The log goes to
     /// the standard error output.
     #[arg(long)]
@@ -129,6 +146,9 @@ pub struct Node {
 pub(crate) const BOARD_NUMBERS: &str =
     "a node-ID is a number from 1 to 127, and boards without a node-ID have 201 to 254";
 
+/// Where the page usually is.
+const PAGE: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8301);
+
 /// The first number of boards without a node-ID.
 pub const UNCONFIGURED: u8 = 201;
 
@@ -144,6 +164,15 @@ impl FromStr for Node {
             None => (personality, false),
         };
         Ok(Node { id, personality: personality.parse()?, auto })
+    }
+}
+
+impl Options {
+    /// Where the page is to be, and the program that serves it; `None` where there is to be none.
+    pub(crate) fn page(&self) -> Option<(SocketAddr, &Path)> {
+        let program = self.page_program.as_deref().filter(|_| !self.no_page)?;
+        let usual = (self.speed == Speed::Real).then_some(PAGE);
+        Some((self.page.or(usual)?, program))
     }
 }
 
@@ -225,11 +254,23 @@ mod tests {
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
-             --reflash --interleave 7 --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --load 50 --json --socketcan vcan0";
+             --reflash --interleave 7 --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --load 50 --json --socketcan vcan0 --no-page --control 127.0.0.1:0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));
         assert_eq!((options.shaft[0].node, options.pressure[0].node), (Some(2), None));
+    }
+
+    #[test]
+    fn a_page_is_shown_where_somebody_can_look() {
+        let page = |flags: &str| read(flags).unwrap().page().map(|(address, _)| address.to_string());
+        let usual = Some("127.0.0.1:8301".to_owned());
+        assert_eq!(page("--page-program p"), usual);
+        assert_eq!(page("--page-program p --page 127.0.0.1:1"), Some("127.0.0.1:1".to_owned()));
+        assert_eq!(page("--page-program p --page 127.0.0.1:1 --speed max"), Some("127.0.0.1:1".to_owned()));
+        for flags in ["", "--page-program p --no-page", "--page-program p --speed max"] {
+            assert_eq!(page(flags), None, "{flags}");
+        }
     }
 
     #[test]

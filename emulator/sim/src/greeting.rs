@@ -14,13 +14,16 @@ pub(crate) struct Greeting<'a> {
     pub(crate) options: &'a Options,
     pub(crate) socketcand: SocketAddr,
     pub(crate) slcan: Option<SocketAddr>,
+    pub(crate) control: Option<SocketAddr>,
+    /// Where the page is, or why there is none; `None` where none was asked for.
+    pub(crate) page: Option<Result<&'a str, &'a str>>,
     pub(crate) boards: &'a [Board],
 }
 
 impl Greeting<'_> {
     /// For people: the start of the display.
     pub(crate) fn lines(&self) -> Vec<String> {
-        let Greeting { options, socketcand, slcan, boards } = *self;
+        let Greeting { options, socketcand, slcan, control, page, boards } = *self;
         let nodes: Vec<String> =
             options.nodes.iter().map(|node| format!("{} ({})", node.id, node.personality)).collect();
         let first = options.nodes.first().map_or(1, |node| node.id);
@@ -49,6 +52,14 @@ impl Greeting<'_> {
                 "slcan on {slcan}: can.Bus(interface='slcan', channel='socket://{slcan}', sleep_after_open=0)"
             )
         }));
+        match page {
+            Some(Ok(address)) => lines.insert(1, format!("page: {address}")),
+            Some(Err(reason)) => lines.insert(1, format!("no page: {reason}")),
+            None => {}
+        }
+        lines.extend(
+            control.filter(|_| options.control.is_some()).map(|control| format!("control on {control}")),
+        );
         if options.flash.is_some() {
             lines.extend(boards.iter().map(programs));
         }
@@ -60,7 +71,10 @@ impl Greeting<'_> {
     pub(crate) fn json(&self) -> Value {
         let boards =
             self.boards.iter().map(|board| json!({ "id": board.id(), "programs": name(board.programs()) }));
-        json!({ "socketcand": self.socketcand, "slcan": self.slcan, "bus": BUS_NAME, "boards": boards.collect::<Vec<_>>() })
+        json!({
+            "socketcand": self.socketcand, "slcan": self.slcan, "control": self.control,
+            "page": self.page.and_then(Result::ok), "bus": BUS_NAME, "boards": boards.collect::<Vec<_>>(),
+        })
     }
 }
 

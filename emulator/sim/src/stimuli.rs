@@ -4,9 +4,11 @@ use std::fmt;
 use std::str::FromStr;
 
 use canbus::Time;
-use chip::plant::{Fault, Motion, Plant, Push, Signal};
+use chip::plant::{BUTTONS, Fault, FaultSwitch, Motion, Plant, Push, Signal};
+use serde::Serialize;
 
 use crate::cli::{BOARD_NUMBERS, board_number};
+use crate::personality::Personality;
 
 /// A change of what a board's sensors see.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +25,8 @@ pub enum Stimulus {
     Button(Push),
     /// A defect of the wiring or of a sensor.
     Fault(Fault),
+    /// One that comes now, or goes.
+    Switch(FaultSwitch),
 }
 
 impl Stimulus {
@@ -37,6 +41,9 @@ impl Stimulus {
             "thermistor" => in_kelvin(text).map(|spec| spec.map(Stimulus::Thermistor)),
             "shaft" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Shaft)),
             "button" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Button)),
+            "fault" if text.ends_with(":on") || text.ends_with(":off") => {
+                text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Switch))
+            }
             "fault" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Fault)),
             _ => Err(format!(
                 "{kind:?} is no stimulus; there are pressure, temperature, thermistor, shaft, button and fault"
@@ -53,8 +60,41 @@ impl Stimulus {
             Stimulus::Shaft(motion) => plant.set_shaft(motion, now),
             Stimulus::Button(push) => plant.push(push, now),
             Stimulus::Fault(fault) => plant.add_fault(fault),
+            Stimulus::Switch(switch) => plant.switch_fault(switch, now),
         }
     }
+}
+
+/// What the sensors of one board see at a moment.
+#[derive(Clone, Debug, Serialize)]
+pub struct BoardStimuli {
+    /// Its number on the command line.
+    pub board: u8,
+    /// The node-ID with which it has booted.
+    pub node: u8,
+    /// What it is.
+    pub personality: Personality,
+    /// In Pa.
+    pub pressure: Knob,
+    /// Of the chip, in K.
+    pub temperature: Knob,
+    /// Of the thermistor, in K.
+    pub thermistor: Knob,
+    /// In revolutions.
+    pub shaft: Knob,
+    /// Which of its buttons are held down.
+    pub buttons: [bool; BUTTONS],
+    /// The faults that are there.
+    pub faults: Vec<&'static str>,
+}
+
+/// A quantity.
+#[derive(Clone, Debug, Serialize)]
+pub struct Knob {
+    /// What it is set to, as on the command line.
+    pub spec: String,
+    /// Its value now.
+    pub value: f64,
 }
 
 /// What is colder than -100 degC was meant in degC.

@@ -15,7 +15,7 @@ use crate::log::Line;
 use crate::port::Port;
 use crate::retuning::Retuning;
 use crate::status::{Status, share};
-use crate::stimuli::{Stimulus, Targeted};
+use crate::stimuli::{BoardStimuli, Stimulus, Targeted};
 use crate::summary::{BusSummary, Summary};
 use crate::traffic::Traffic;
 
@@ -50,6 +50,7 @@ pub struct World {
     /// Measured only for who asks: the clock of the host costs time as well.
     host_time: Option<HostTime>,
     enforces_rules: bool,
+    stimuli_changes: u64,
 }
 
 /// A port and whether a client has it.
@@ -57,6 +58,8 @@ pub struct World {
 struct Place {
     port: Port,
     taken: bool,
+    /// A client that leaves the start of the nodes to the host.
+    only_looks: bool,
 }
 
 /// What was seen of the bus.
@@ -95,6 +98,7 @@ impl World {
             records,
             host_time: None,
             enforces_rules: false,
+            stimuli_changes: 0,
         }
     }
 
@@ -128,11 +132,20 @@ impl World {
 
     /// A place on the bus for a client; it takes part once it is attached.
     pub fn open_port(&mut self) -> PortId {
+        self.open(false)
+    }
+
+    /// The same for a client that does not start the nodes, as masters do: the page in the browser.
+    pub fn open_looking_port(&mut self) -> PortId {
+        self.open(true)
+    }
+
+    fn open(&mut self, only_looks: bool) -> PortId {
         let index = self.ports.iter().position(|place| !place.taken).unwrap_or(self.ports.len());
         if index == self.ports.len() {
             self.ports.push(Place::default());
         }
-        self.ports[index].taken = true;
+        (self.ports[index].taken, self.ports[index].only_looks) = (true, only_looks);
         PortId(index)
     }
 
@@ -156,7 +169,18 @@ impl World {
             return Err(NoSuchBoard(node));
         }
         meant.for_each(|board| board.apply(&stimulus.what, self.now));
+        self.stimuli_changes += 1;
         Ok(())
+    }
+
+    /// What the sensors of each board see, in the order of the command line.
+    pub fn stimuli(&self) -> Vec<BoardStimuli> {
+        self.boards.iter().zip(&self.records.node_ids).map(|(board, &id)| board.stimuli(id)).collect()
+    }
+
+    /// How often a stimulus was changed.
+    pub fn stimuli_changes(&self) -> u64 {
+        self.stimuli_changes
     }
 
     /// Lets everything up to `end` happen.
@@ -223,7 +247,7 @@ impl World {
     /// look at the request: now, if there is one.
     fn start_nodes(&mut self) -> Time {
         let booted = std::mem::take(&mut self.records.booted);
-        if booted.is_empty() || self.ports.iter().any(|place| place.taken) {
+        if booted.is_empty() || self.ports.iter().any(|place| place.taken && !place.only_looks) {
             return Time::NEVER;
         }
         booted.iter().for_each(|&node| self.host.send(start_command(node), self.now));

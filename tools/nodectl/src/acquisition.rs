@@ -113,12 +113,7 @@ impl<'n> Acquisition<'n> {
     ) -> Result<Acquisition<'n>, Interruption> {
         let deadline = network.now() + setup.options.limit;
         let mut client = Client::new(network, setup.node, setup.options).by(deadline);
-        let tpdos = tpdo::read(&mut client, catalogue)?;
-        let objects = if objects.is_empty() { mapped(&tpdos) } else { objects.to_vec() };
-        let mut signals = Vec::new();
-        for at in objects {
-            signals.push(signal(&mut client, catalogue, &tpdos, at)?);
-        }
+        let (tpdos, signals) = survey(&mut client, catalogue, objects)?;
         network.forget();
         if setup.start {
             nmt::send(network, Command::Start, Some(setup.node))?;
@@ -270,6 +265,19 @@ impl Signal {
         }
     }
 
+    /// A signal that is read, by what its data sheet says.
+    pub(crate) fn read(at: Multiplexer, catalogue: &Catalogue) -> Signal {
+        let name = catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default();
+        let signal = Signal::polled(at, &name, catalogue.unit(at));
+        Signal { path: catalogue.name(at), data_type: catalogue.data_type(at), ..signal }
+    }
+
+    /// The name of its data type; empty where none is known.
+    #[must_use]
+    pub fn type_name(&self) -> String {
+        self.data_type.map(|data_type| data_type.to_string()).unwrap_or_default()
+    }
+
     /// The name of its data type; that of the bytes of a value where none is known.
     #[must_use]
     pub fn data_type(&self, value: &Value) -> String {
@@ -292,9 +300,28 @@ impl Signal {
         }
     }
 
-    fn decode(&self, bytes: &[u8]) -> Value {
+    /// The value in these bytes.
+    pub(crate) fn decode(&self, bytes: &[u8]) -> Value {
         self.quantity.apply(Value::decode(bytes, self.data_type.unwrap_or_else(|| guess(bytes))))
     }
+}
+
+/// What a node sends in its TPDOs, and these objects as signals; all that are in TPDOs when there are none.
+///
+/// # Errors
+/// Those of SDO.
+pub fn survey(
+    client: &mut Client,
+    catalogue: &Catalogue,
+    objects: &[Multiplexer],
+) -> Result<(Vec<Tpdo>, Vec<Signal>), sdo::Error> {
+    let tpdos = tpdo::read(client, catalogue)?;
+    let objects = if objects.is_empty() { mapped(&tpdos) } else { objects.to_vec() };
+    let mut signals = Vec::new();
+    for at in objects {
+        signals.push(signal(client, catalogue, &tpdos, at)?);
+    }
+    Ok((tpdos, signals))
 }
 
 /// What the TPDOs carry, each object once. Below the communication profile are the data types: they stand for a gap.

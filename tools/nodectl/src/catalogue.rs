@@ -4,6 +4,8 @@ use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use eds::{DEVICES, DataType, DeviceInfo, Eds, Entry, LookupError};
 
+use crate::value::Value;
+
 /// The first index that is not of the communication profile, which is the same in all devices (CiA 301).
 const FIRST_OF_VENDOR: u16 = 0x2000;
 
@@ -104,6 +106,35 @@ impl Catalogue {
             (None, Some(high)) => Some(format!("up to {high}")),
             (None, None) => None,
         }
+    }
+
+    /// Whether a write of an object accepts a value, as far as the data sheet says.
+    #[must_use]
+    pub fn allows(&self, at: Multiplexer, node: NodeId, value: &Value) -> bool {
+        let Some((entry, value)) = self.entry(at).zip(value.as_f64()) else { return true };
+        let limit = |formula: &Option<eds::Formula>| match formula.as_ref()?.evaluate(node) {
+            #[allow(clippy::cast_precision_loss)] // Integers that are limited have 32 bits.
+            eds::Value::Integer(value) => Some(value as f64),
+            eds::Value::Real(value) => Some(value),
+            eds::Value::Text(_) => None,
+        };
+        !limit(&entry.low).is_some_and(|low| value < low)
+            && !limit(&entry.high).is_some_and(|high| value > high)
+    }
+
+    /// All entries of the data sheet; those of the communication profile where there is none.
+    pub fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.sheet.entries()
+    }
+
+    /// What a device of this project is called, by its identity (1018h:1 and 2): `pressure`, `encoder` ...
+    #[must_use]
+    pub fn device_name(vendor: u32, product: u32) -> Option<String> {
+        let is_it = |device: &&eds::Device| {
+            let info = device.eds().device;
+            (info.vendor_number, info.product_number) == (vendor, product)
+        };
+        DEVICES.iter().find(is_it).map(|device| device.file_name.trim_end_matches(".eds").to_owned())
     }
 
     /// All entries of a record or an array that can be read; none where nothing is known of it.

@@ -31,6 +31,8 @@ pub(crate) enum Need {
     Probe,
     /// The protocol analyser that judges what was said on the bus.
     Tshark,
+    /// The browser that shows the page of the bus, and the program that drives it.
+    Browser,
 }
 
 /// What `cargo sim` needs.
@@ -44,7 +46,10 @@ pub(crate) const FLASH: &[Need] = &[Need::Target, Need::Probe];
 
 /// What `cargo xtask test` needs.
 pub(crate) const TEST: &[Need] =
-    &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark];
+    &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark, Need::Browser];
+
+/// What `cargo xtask pictures` needs.
+pub(crate) const PICTURES: &[Need] = &[Need::Target, Need::Emulator, Need::Python, Need::Browser];
 
 /// Ends with the one command that installs what is missing, where this user cannot go on without it.
 pub(crate) fn check(needs: &[Need]) -> Result<()> {
@@ -62,6 +67,7 @@ fn missing(needs: &[Need]) -> Vec<Package> {
             Need::Python => python::missing(),
             Need::Probe => package_unless(system::runs("probe-rs"), Package::ProbeRs),
             Need::Tshark => package_unless(system::runs("tshark"), Package::Tshark),
+            Need::Browser => browser(),
         };
         for package in of_need {
             if !packages.contains(&package) {
@@ -79,6 +85,11 @@ pub(crate) fn install(needs: &[Need]) -> Result<()> {
 
 fn package_unless(is_there: bool, package: Package) -> Vec<Package> {
     if is_there { Vec::new() } else { vec![package] }
+}
+
+fn browser() -> Vec<Package> {
+    let programs = [("chromium", Package::Chromium), ("chromedriver", Package::Chromedriver)];
+    programs.into_iter().filter(|(program, _)| !system::runs(program)).map(|(_, package)| package).collect()
 }
 
 /// `cargo xtask setup`: brings everything that the test command needs, or only says what is missing.

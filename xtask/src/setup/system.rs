@@ -21,6 +21,10 @@ pub(crate) enum Package {
     Python,
     /// The protocol analyser.
     Tshark,
+    /// The browser.
+    Chromium,
+    /// The program that drives the browser.
+    Chromedriver,
     /// Debian's compiler for the Cortex-M4.
     DebianRust,
     /// Its source of the core library.
@@ -71,7 +75,10 @@ impl Manager {
 
     fn names(self, packages: &[Package]) -> Vec<&'static str> {
         let from_here = packages.iter().filter(|package| package.own_command().is_none());
-        from_here.map(|package| self.name(*package)).collect()
+        let mut names: Vec<&str> = from_here.map(|package| self.name(*package)).collect();
+        // Some have the browser and its driver in one package.
+        names.dedup();
+        names
     }
 
     fn name(self, package: Package) -> &'static str {
@@ -94,6 +101,8 @@ impl Package {
             Package::Libclang => ["libclang-dev", "clang-devel", "clang", "llvm"],
             Package::Python => ["python3-venv", "python3", "python", "python"],
             Package::Tshark => ["tshark", "wireshark-cli", "wireshark-cli", "wireshark"],
+            Package::Chromium => ["chromium"; 4],
+            Package::Chromedriver => ["chromium-driver", "chromedriver", "chromium", "chromedriver"],
             // These are asked for where Debian's packages are the way to the target, and nowhere else.
             Package::DebianRust => ["rustc-web"; 4],
             Package::DebianRustSource => ["rust-web-src"; 4],
@@ -122,6 +131,7 @@ impl Package {
             }
             Package::Python => "cmake, libclang and the tests' CANopen clients come from PyPI",
             Package::Tshark => "the tests have it decode what was said on the bus",
+            Package::Chromium | Package::Chromedriver => "the tests look at the page of the bus with it",
             Package::DebianRust
             | Package::DebianRustSource
             | Package::DebianCargo

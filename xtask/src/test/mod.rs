@@ -7,7 +7,7 @@
 mod checks;
 mod host;
 mod report;
-mod suite;
+pub(crate) mod suite;
 
 use anyhow::Result;
 use clap::Args;

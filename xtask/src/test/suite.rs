@@ -73,19 +73,21 @@ fn of_python(thorough: bool) -> Result<Vec<Step>> {
 fn python(file: &Path, thorough: bool) -> Result<()> {
     let mut command = Command::new(python::clients()?);
     command.args(["-m", "pytest", "-q", "--durations=3"]).arg(file).current_dir(root());
-    for (variable, tool) in [
-        ("SIM_COMMAND", "sim"),
-        ("NODECTL_COMMAND", "nodectl"),
-        ("SIGN_COMMAND", "sign"),
-        ("IO_MODULE_COMMAND", "examples/io_module"),
-    ] {
+    command.env("IO_MODULE_COMMAND", built("examples/io_module"));
+    run(with_images(with_programs(&mut command), thorough))
+}
+
+/// Tells Python where the programs of the project are.
+pub(crate) fn with_programs(command: &mut Command) -> &mut Command {
+    for (variable, tool) in [("SIM_COMMAND", "sim"), ("NODECTL_COMMAND", "nodectl"), ("SIGN_COMMAND", "sign")]
+    {
         command.env(variable, built(tool));
     }
-    run(with_images(&mut command, thorough))
+    command
 }
 
 /// Tells tests where the ELF files are, and whether to take all where they otherwise sample.
-fn with_images(command: &mut Command, thorough: bool) -> &mut Command {
+pub(crate) fn with_images(command: &mut Command, thorough: bool) -> &mut Command {
     if thorough {
         command.env("THOROUGH", "1");
     }

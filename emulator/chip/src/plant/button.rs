@@ -26,6 +26,11 @@ impl Button {
         }
     }
 
+    /// Whether it is held down.
+    pub(super) fn is_down(&self) -> bool {
+        self.is_down
+    }
+
     /// Whether the contact is closed.
     pub(super) fn is_closed(&self, now: Time) -> bool {
         let age = self.since.map(|since| now.since(since)).filter(|age| *age < BOUNCES_FOR);

@@ -43,6 +43,62 @@ const NAMES: [(&str, FaultKind); 10] = [
     ("no-crystal", FaultKind::NoCrystal),
 ];
 
+impl FaultKind {
+    /// All there are.
+    pub fn all() -> impl Iterator<Item = FaultKind> {
+        NAMES.into_iter().map(|(_, kind)| kind)
+    }
+
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
+
+    /// What is wrong, in words.
+    pub fn text(self) -> &'static str {
+        match self {
+            FaultKind::OpenSensor => "pressure transducer: broken wire",
+            FaultKind::RailHigh => "pressure transducer: shorted to its supply",
+            FaultKind::RailLow => "pressure transducer: shorted to ground",
+            FaultKind::OpenThermistor => "thermistor: broken wire",
+            FaultKind::ShortedThermistor => "thermistor: shorted",
+            FaultKind::MissingIndex => "incremental encoder: no index pulse",
+            FaultKind::OpenSsi => "absolute encoder: broken data line",
+            FaultKind::WrongCode => "absolute encoder: half a revolution off",
+            FaultKind::BatteryEmpty => "battery: empty",
+            FaultKind::NoCrystal => "crystal: stopped",
+        }
+    }
+
+    fn named(name: &str) -> Result<FaultKind, FaultError> {
+        let known = NAMES.iter().find(|known| known.0 == name);
+        known.map(|known| known.1).ok_or_else(|| FaultError::Name(name.to_owned()))
+    }
+}
+
+/// A fault that comes or goes now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultSwitch {
+    /// What is wrong.
+    pub kind: FaultKind,
+    /// It comes, or goes.
+    pub is_on: bool,
+}
+
+impl FromStr for FaultSwitch {
+    type Err = FaultError;
+
+    /// `NAME:on` or `NAME:off`.
+    fn from_str(spec: &str) -> Result<Self, FaultError> {
+        let (name, is_on) = match spec.split_once(':') {
+            Some((name, "on")) => (name, true),
+            Some((name, "off")) => (name, false),
+            _ => return Err(FaultError::Form(spec.to_owned())),
+        };
+        Ok(Self { kind: FaultKind::named(name)?, is_on })
+    }
+}
+
 /// A fault and when it is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
@@ -68,8 +124,10 @@ impl Fault {
 /// Why a fault cannot be understood. Every message is one line.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum FaultError {
-    /// Not `NAME@SECONDS`.
-    #[error("`{0}` is not of the form NAME@SECONDS or NAME@SECONDS..SECONDS, for example open-sensor@2.5")]
+    /// Neither `NAME@SECONDS` nor `NAME:on`.
+    #[error(
+        "`{0}` is not of the form NAME@SECONDS or NAME@SECONDS..SECONDS, for example open-sensor@2.5; from now on: NAME:on, NAME:off"
+    )]
     Form(String),
     /// No fault has this name.
     #[error("unknown fault `{0}`; known are {known}", known = NAMES.map(|known| known.0).join(", "))]
@@ -88,8 +146,7 @@ impl FromStr for Fault {
     /// `NAME@SECONDS` or `NAME@SECONDS..SECONDS`.
     fn from_str(spec: &str) -> Result<Self, FaultError> {
         let (name, times) = spec.split_once('@').ok_or_else(|| FaultError::Form(spec.to_owned()))?;
-        let kind = NAMES.iter().find(|known| known.0 == name).map(|known| known.1);
-        let kind = kind.ok_or_else(|| FaultError::Name(name.to_owned()))?;
+        let kind = FaultKind::named(name)?;
         let (from, until) = match times.split_once("..") {
             Some((from, until)) => (instant(from)?, instant(until)?),
             None => (instant(times)?, Time::NEVER),
@@ -120,6 +177,19 @@ mod tests {
         let fault: Fault = "missing-index@1..2".parse().unwrap();
         let active = [999, 1000, 1999, 2000].map(|t| fault.is_active(Time::from_millis(t)));
         assert_eq!(active, [false, true, true, false]);
+    }
+
+    #[test]
+    fn a_switch_has_a_name_and_a_side() {
+        assert_eq!("open-ssi:on".parse(), Ok(FaultSwitch { kind: FaultKind::OpenSsi, is_on: true }));
+        assert_eq!("open-ssi:off".parse(), Ok(FaultSwitch { kind: FaultKind::OpenSsi, is_on: false }));
+        for spec in ["open-ssi", "open-ssi:", "open-ssi:1", "broken:on"] {
+            assert!(spec.parse::<FaultSwitch>().is_err(), "{spec}");
+        }
+        let mut names: Vec<&str> = FaultKind::all().map(FaultKind::name).collect();
+        assert!(names.iter().all(|name| name.parse::<FaultSwitch>().is_err() && !name.is_empty()));
+        names.dedup();
+        assert_eq!(names.len(), NAMES.len());
     }
 
     #[test]

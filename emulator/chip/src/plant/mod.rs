@@ -12,7 +12,7 @@ use canbus::Time;
 
 use button::Button;
 pub use button::{BUTTONS, Push, PushError};
-pub use fault::{Fault, FaultError, FaultKind};
+pub use fault::{Fault, FaultError, FaultKind, FaultSwitch};
 pub use front_end::{FULL_SCALE, Rails};
 pub use shaft::Motion;
 use shaft::Shaft;
@@ -82,9 +82,52 @@ impl Plant {
         self.faults.push(fault);
     }
 
+    /// Lets a fault come at `now`, or go, also one that would have come later.
+    pub fn switch_fault(&mut self, FaultSwitch { kind, is_on }: FaultSwitch, now: Time) {
+        self.faults.retain(|fault| fault.kind != kind);
+        if is_on {
+            self.faults.push(Fault { kind, from: now, until: Time::NEVER });
+        }
+    }
+
+    /// The faults that are there at `now`.
+    pub fn faults(&self, now: Time) -> impl Iterator<Item = FaultKind> {
+        FaultKind::all().filter(move |kind| self.has(*kind, now))
+    }
+
     /// Takes all faults away.
     pub fn clear_faults(&mut self) {
         self.faults.clear();
+    }
+
+    /// What the pressure is set to.
+    pub fn pressure_signal(&self) -> &Signal {
+        self.pressure.signal()
+    }
+
+    /// What the temperature of the chip is set to.
+    pub fn temperature_signal(&self) -> &Signal {
+        self.temperature.signal()
+    }
+
+    /// What the temperature of the thermistor is set to.
+    pub fn thermistor_signal(&self) -> &Signal {
+        self.thermistor.signal()
+    }
+
+    /// What the shaft is set to.
+    pub fn motion(&self) -> &Motion {
+        self.shaft.motion()
+    }
+
+    /// Which buttons are held down.
+    pub fn held(&self) -> [bool; BUTTONS] {
+        self.buttons.map(|button| button.is_down())
+    }
+
+    /// The true temperature of the thermistor in kelvin.
+    pub fn thermistor(&self, now: Time) -> f64 {
+        self.thermistor.at(now)
     }
 
     /// The true pressure in pascal.

@@ -37,6 +37,10 @@ impl Shaft {
         self.motion = motion;
     }
 
+    pub(super) fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
     /// Position in revolutions.
     pub(super) fn revolutions(&self, now: Time) -> f64 {
         let age = now.since(self.since);

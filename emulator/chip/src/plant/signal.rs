@@ -111,6 +111,10 @@ impl Stimulus {
         Self { signal, since }
     }
 
+    pub(super) fn signal(&self) -> &Signal {
+        &self.signal
+    }
+
     pub(super) fn at(&self, now: Time) -> f64 {
         self.signal.at(now.since(self.since))
     }

@@ -1,5 +1,6 @@
 //! The text form of stimuli: `NAME:ARGUMENTS`, as on the command line.
 
+use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -54,6 +55,30 @@ impl FromStr for Signal {
             "noise" => noise(arguments),
             "csv" => Ok(Signal::Table(Table::open(Path::new(arguments))?)),
             _ => Err(SpecError::Name(name.to_owned())),
+        }
+    }
+}
+
+/// As it is read, but for a table, whose file is not told.
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Signal::Constant(value) => write!(f, "const:{value}"),
+            Signal::Sine { offset, amplitude, hertz } => write!(f, "sine:{offset},{amplitude},{hertz}"),
+            Signal::Ramp { from, to, seconds } => write!(f, "ramp:{from},{to},{seconds}"),
+            Signal::Step { from, to, at } => write!(f, "step:{from},{to},{at}"),
+            Signal::Noise { mean, sigma, seed } => write!(f, "noise:{mean},{sigma},{seed}"),
+            Signal::Table(_) => f.write_str("csv"),
+        }
+    }
+}
+
+/// As it is read.
+impl fmt::Display for Motion {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Motion::Rpm(rpm) => write!(f, "rpm:{rpm}"),
+            Motion::Angle(signal) => signal.fmt(f),
         }
     }
 }
@@ -148,13 +173,15 @@ mod tests {
             ("noise:5,0.1,7", Signal::Noise { mean: 5.0, sigma: 0.1, seed: 7 }),
         ];
         for (spec, signal) in cases {
-            assert_eq!(spec.parse(), Ok(signal), "{spec}");
+            assert_eq!(spec.parse(), Ok(signal.clone()), "{spec}");
+            assert_eq!(signal.to_string().parse(), Ok(signal), "{spec}");
         }
     }
 
     #[test]
     fn a_shaft_turns_or_stands() {
         assert_eq!("rpm:-6000".parse(), Ok(Motion::Rpm(-6000.0)));
+        assert_eq!(Motion::Rpm(-6000.0).to_string(), "rpm:-6000");
         assert_eq!("const:0.25".parse(), Ok(Motion::Angle(Signal::Constant(0.25))));
         assert_eq!("rpm:1,2".parse::<Motion>().unwrap_err().to_string(), "rpm takes one number, not `1,2`");
     }

@@ -33,8 +33,12 @@ pub(super) struct Client {
 
 impl Client {
     /// Greets a client that has just connected.
-    pub(super) fn new(stream: TcpStream, mut session: Box<dyn Session>, world: &mut World) -> Client {
-        let port = world.open_port();
+    pub(super) fn new(
+        stream: TcpStream,
+        mut session: Box<dyn Session>,
+        port: PortId,
+        world: &mut World,
+    ) -> Client {
         let mut greeting = Vec::new();
         session.greet(&mut greeting);
         let outbox = Outbox::default();

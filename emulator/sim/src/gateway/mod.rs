@@ -41,6 +41,8 @@ const WELCOMED: usize = 16;
 pub enum Protocol {
     /// The protocol of the socketcand daemon.
     Socketcand,
+    /// The same, for the page in the browser: it only looks on when nodes boot.
+    Page,
     /// The line protocol of LAWICEL adapters.
     Slcan,
 }
@@ -181,10 +183,11 @@ impl Gateway {
         let name = self.name();
         self.poll.registry().register(&mut stream, name, Interest::READABLE | Interest::WRITABLE)?;
         let session: Box<dyn Session> = match protocol {
-            Protocol::Socketcand => Box::new(Socketcand::new(BUS_NAME, world.bit_rate())),
+            Protocol::Socketcand | Protocol::Page => Box::new(Socketcand::new(BUS_NAME, world.bit_rate())),
             Protocol::Slcan => Box::new(Slcan::new(world.bit_rate())),
         };
-        self.clients.insert(name, Client::new(stream, session, world));
+        let port = if protocol == Protocol::Page { world.open_looking_port() } else { world.open_port() };
+        self.clients.insert(name, Client::new(stream, session, port, world));
         Ok(())
     }
 

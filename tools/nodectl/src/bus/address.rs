@@ -41,6 +41,12 @@ pub enum Address {
 pub struct AddressError(String);
 
 impl Address {
+    /// Whether the adapter has to be told the bit rate.
+    #[must_use]
+    pub const fn needs_bit_rate(&self) -> bool {
+        matches!(self, Address::SlcanSerial(_) | Address::SlcanTcp(_))
+    }
+
     /// Goes on the bus.
     ///
     /// `bit_rate` in kbit/s is for slcan adapters, which have to be told; the others have theirs.

@@ -9,12 +9,12 @@ use canopen::Instant;
 static START: LazyLock<time::Instant> = LazyLock::new(time::Instant::now);
 
 /// Microseconds since the first use of the clock.
-pub(super) fn now() -> Instant {
+pub(crate) fn now() -> Instant {
     Instant(u64::try_from(START.elapsed().as_micros()).unwrap_or(u64::MAX))
 }
 
 /// What is left until an instant; nothing when it has passed.
-pub(super) fn left(until: Instant) -> time::Duration {
+pub(crate) fn left(until: Instant) -> time::Duration {
     time::Duration::from_micros(until.0.saturating_sub(now().0))
 }
 

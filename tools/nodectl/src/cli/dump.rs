@@ -59,7 +59,7 @@ pub(super) struct Apply {
 }
 
 /// So often what is still different is written again: some parameters change others.
-const PASSES: usize = 3;
+pub(super) const PASSES: usize = 3;
 
 #[derive(Serialize)]
 struct Changed {
@@ -190,7 +190,13 @@ impl Apply {
     }
 }
 
-fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) -> Result<(), Failure> {
+/// Writes parameters in their order.
+pub(super) fn write_all(
+    session: &mut Session,
+    node: NodeId,
+    sheet: &Eds,
+    steps: &[Write],
+) -> Result<(), Failure> {
     for step in steps {
         let Some(entry) = sheet.get(step.at.index, step.at.sub) else { continue };
         let bytes = step.value.encode(entry.data_type);

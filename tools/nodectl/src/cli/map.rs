@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::{Failure, Session};
+use crate::Catalogue;
 use crate::object::{Place, at};
 
 /// Maps objects into a PDO, in the five steps of CiA 301: off, empty, objects, their number, on.
@@ -39,7 +40,7 @@ pub(super) struct Unmap {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Direction {
+pub(super) enum Direction {
     /// What the node sends.
     Tpdo,
     /// What the node receives.
@@ -55,27 +56,28 @@ struct Done {
     bits: u32,
 }
 
-const OFF: u32 = 1 << 31;
+/// Bit 31 of a COB-ID: the PDO is switched off.
+pub(super) const OFF: u32 = 1 << 31;
 
 /// More entries than this stand for a multiplexed PDO (CiA 301, 7.5.2.36).
 const SLOTS: u8 = 64;
 
 /// What a PDO carries, when, and with which COB-ID.
-struct Mapped {
-    cob_id: u32,
-    entries: Vec<u32>,
-    transmission: Option<u8>,
+pub(super) struct Mapped {
+    pub(super) cob_id: u32,
+    pub(super) entries: Vec<u32>,
+    pub(super) transmission: Option<u8>,
 }
 
 /// A PDO of a node.
-struct Pdo {
-    node: NodeId,
-    communication: u16,
+pub(super) struct Pdo {
+    pub(super) node: NodeId,
+    pub(super) communication: u16,
     mapping: u16,
 }
 
 impl Pdo {
-    fn new(node: NodeId, direction: Direction, number: u16) -> Pdo {
+    pub(super) fn new(node: NodeId, direction: Direction, number: u16) -> Pdo {
         let first = match direction {
             Direction::Tpdo => 0x1800,
             Direction::Rpdo => 0x1400,
@@ -90,13 +92,18 @@ impl Pdo {
         })
     }
 
-    fn write(&self, session: &mut Session, object: Multiplexer, bytes: &[u8]) -> Result<(), Failure> {
+    pub(super) fn write(
+        &self,
+        session: &mut Session,
+        object: Multiplexer,
+        bytes: &[u8],
+    ) -> Result<(), Failure> {
         let written = session.client(self.node).download(object, bytes, |_| ());
         written.map_err(|error| session.named(error))
     }
 
     /// What the PDO is now.
-    fn mapped(&self, session: &mut Session) -> Result<Mapped, Failure> {
+    pub(super) fn mapped(&self, session: &mut Session) -> Result<Mapped, Failure> {
         let cob_id = self.cob_id(session)?;
         let byte = |bytes: Option<Vec<u8>>| bytes.and_then(|bytes| bytes.first().copied());
         let transmission = byte(session.optional(self.node, at(self.communication, 2))?);
@@ -106,6 +113,30 @@ impl Pdo {
             entries.extend(session.word(self.node, at(self.mapping, sub))?);
         }
         Ok(Mapped { cob_id, entries, transmission })
+    }
+
+    /// Changes what the PDO carries, in the five steps of CiA 301 (7.5.2.36). What the node refuses leaves the PDO as it was; that
+    /// the node had.
+    pub(super) fn remap(
+        &self,
+        session: &mut Session,
+        before: &Mapped,
+        wanted: &Mapped,
+    ) -> Result<(), Failure> {
+        self.switch(session, before.cob_id | OFF)?;
+        let changed = self.change(session, wanted);
+        if changed.is_err() {
+            let _ = self.change(session, before);
+        }
+        changed
+    }
+
+    /// Switches the PDO off and empties its mapping.
+    pub(super) fn clear(&self, session: &mut Session) -> Result<u32, Failure> {
+        let cob_id = self.cob_id(session)?;
+        self.switch(session, cob_id | OFF)?;
+        self.write(session, at(self.mapping, 0), &[0])?;
+        Ok(cob_id)
     }
 
     /// Steps 2 to 5 of a PDO that is switched off: empty, objects, their number, on if it is to be on.
@@ -122,7 +153,7 @@ impl Pdo {
         self.switch(session, to.cob_id)
     }
 
-    fn switch(&self, session: &mut Session, cob_id: u32) -> Result<(), Failure> {
+    pub(super) fn switch(&self, session: &mut Session, cob_id: u32) -> Result<(), Failure> {
         self.write(session, at(self.communication, 1), &cob_id.to_le_bytes())
     }
 }
@@ -141,14 +172,9 @@ impl Map {
         }
         let before = pdo.mapped(session)?;
         let cob_id = before.cob_id & !OFF;
-        pdo.switch(session, cob_id | OFF)?;
         let wanted = Mapped { cob_id, entries, transmission: self.transmission.or(before.transmission) };
+        pdo.remap(session, &before, &wanted)?;
         let entries = &wanted.entries;
-        if let Err(failure) = pdo.change(session, &wanted) {
-            // What the node refuses leaves the PDO as it was; that the node had.
-            let _ = pdo.change(session, &before);
-            return Err(failure);
-        }
         let name = format!("{:?} {}", self.direction, self.number).to_uppercase();
         session.print(&Done {
             node: node.get(),
@@ -162,21 +188,24 @@ impl Map {
     /// The entry of a mapping: index, sub-index, bits.
     fn entry(&self, session: &mut Session, node: NodeId, query: &str) -> Result<u32, Failure> {
         let object = session.find(node, query)?;
-        let catalogue = session.catalogue(node)?;
-        let is_mappable = |entry: &eds::Entry| match self.direction {
-            Direction::Tpdo => entry.is_tpdo_mappable(),
-            Direction::Rpdo => entry.is_rpdo_mappable(),
-        };
-        if catalogue.entry(object).is_some_and(|entry| !is_mappable(entry)) {
-            let direction = format!("{:?}", self.direction).to_uppercase();
-            let message = format!("{query}: no {direction} can carry {}, says the data sheet", Place(object));
-            return Err(Failure::Usage(message));
-        }
-        let bits = catalogue.data_type(object).and_then(bits).ok_or_else(|| {
-            Failure::Usage(format!("{query}: no data sheet tells how many bits it has, or it is no number"))
-        })?;
-        Ok(u32::from(object.index) << 16 | u32::from(object.sub) << 8 | u32::from(bits))
+        let slot = slot(&session.catalogue(node)?, self.direction, object);
+        slot.map_err(|words| Failure::Usage(format!("{query}: {words}")))
     }
+}
+
+/// The entry of a mapping: index, sub-index, bits. Else why there is none.
+pub(super) fn slot(catalogue: &Catalogue, direction: Direction, object: Multiplexer) -> Result<u32, String> {
+    let is_mappable = |entry: &eds::Entry| match direction {
+        Direction::Tpdo => entry.is_tpdo_mappable(),
+        Direction::Rpdo => entry.is_rpdo_mappable(),
+    };
+    if catalogue.entry(object).is_some_and(|entry| !is_mappable(entry)) {
+        let direction = format!("{direction:?}").to_uppercase();
+        return Err(format!("no {direction} can carry {}, says the data sheet", Place(object)));
+    }
+    let bits = catalogue.data_type(object).and_then(bits);
+    let bits = bits.ok_or("no data sheet tells how many bits it has, or it is no number")?;
+    Ok(u32::from(object.index) << 16 | u32::from(object.sub) << 8 | u32::from(bits))
 }
 
 fn bits(data_type: eds::DataType) -> Option<u8> {
@@ -191,9 +220,7 @@ impl Unmap {
         let node = session.options.node.one()?;
         session.catalogue(node)?;
         let pdo = Pdo::new(node, self.direction, self.number);
-        let cob_id = pdo.cob_id(session)?;
-        pdo.switch(session, cob_id | OFF)?;
-        pdo.write(session, at(pdo.mapping, 0), &[0])?;
+        let cob_id = pdo.clear(session)?;
         let name = format!("{:?} {}", self.direction, self.number).to_uppercase();
         session.print(&Done {
             node: node.get(),

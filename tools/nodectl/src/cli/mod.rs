@@ -18,6 +18,7 @@ mod read;
 mod record;
 mod replacement;
 mod scan;
+mod serve;
 mod session;
 mod store;
 mod trace;
@@ -66,6 +67,7 @@ enum Command {
     Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Update(update::Update),
+    Serve(serve::Serve),
     Check(check::Check),
     Completions(manual::Completions),
     Man(manual::Man),
@@ -77,6 +79,10 @@ impl Cli {
     /// # Errors
     /// Why it failed.
     pub fn run(&self, output: Output) -> Result<(), Failure> {
+        // Its bus is on a thread of its own, for many sessions.
+        if let Command::Serve(serve) = &self.command {
+            return serve.run(&self.options, output);
+        }
         let mut session = if self.needs_a_bus() {
             Session::open(&self.options, output)?
         } else {
@@ -120,6 +126,7 @@ impl Cli {
             Command::Nmt(nmt) => nmt.run(session),
             Command::Lss(lss) => lss.run(session),
             Command::Update(update) => update.run(session),
+            Command::Serve(_) => Err(Failure::Usage("it has sessions of its own".to_owned())),
             Command::Check(check) => check.run(session),
             Command::Completions(completions) => completions.run(session),
             Command::Man(man) => man.run(session),

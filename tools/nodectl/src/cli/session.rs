@@ -107,6 +107,16 @@ impl Session {
         Ok(self.catalogues.entry(node).or_insert(catalogue).clone())
     }
 
+    /// Whether something is known about a node already.
+    pub(super) fn knows(&self, node: NodeId) -> bool {
+        self.catalogues.contains_key(&node)
+    }
+
+    /// Tells what is known about a node.
+    pub(super) fn know(&mut self, node: NodeId, catalogue: Catalogue) {
+        self.catalogues.insert(node, catalogue);
+    }
+
     /// The data sheet of a node, for what needs one.
     pub(super) fn sheet_of(&mut self, node: NodeId) -> Result<Eds, Failure> {
         let sheet = self.catalogue(node)?.into_sheet();

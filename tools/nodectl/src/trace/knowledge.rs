@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
+use std::sync::Arc;
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
@@ -18,7 +19,7 @@ const COMMUNICATION: [u16; 2] = [0x1400, 0x1800];
 /// The data sheet of a node and the numbers that it has told.
 #[derive(Clone, Debug)]
 pub struct Knowledge {
-    catalogue: Catalogue,
+    catalogue: Arc<Catalogue>,
     /// Numbers of up to four bytes.
     numbers: BTreeMap<(u16, u8), u32>,
 }
@@ -33,15 +34,15 @@ impl Default for Knowledge {
 impl Knowledge {
     /// Of a node with a data sheet: what the node has not told is as after a reset with nothing saved.
     #[must_use]
-    pub fn new(catalogue: Catalogue) -> Knowledge {
-        Knowledge { catalogue, numbers: BTreeMap::new() }
+    pub fn new(catalogue: impl Into<Arc<Catalogue>>) -> Knowledge {
+        Knowledge { catalogue: catalogue.into(), numbers: BTreeMap::new() }
     }
 
     /// Asks a node for the PDOs in force and the units of what they carry.
     ///
     /// # Errors
     /// Those of SDO.
-    pub fn ask(client: &mut Client, catalogue: Catalogue) -> Result<Knowledge, Error> {
+    pub fn ask(client: &mut Client, catalogue: impl Into<Arc<Catalogue>>) -> Result<Knowledge, Error> {
         let mut known = Knowledge::new(catalogue);
         for first in COMMUNICATION {
             known.ask_pdos(client, first)?;
@@ -53,7 +54,7 @@ impl Knowledge {
     }
 
     fn ask_pdos(&mut self, client: &mut Client, first: u16) -> Result<(), Error> {
-        let catalogue = self.catalogue.clone();
+        let catalogue = Arc::clone(&self.catalogue);
         walk(&catalogue, first, |pdo| {
             if self.fetch(client, at(pdo.communication, 1))?.is_none() {
                 return Ok(false);
@@ -68,7 +69,7 @@ impl Knowledge {
 
     /// The objects that [`Quantity::of`] asks for.
     fn ask_quantity(&mut self, client: &mut Client, of: Multiplexer) -> Result<(), Error> {
-        let catalogue = self.catalogue.clone();
+        let catalogue = Arc::clone(&self.catalogue);
         Quantity::by(&catalogue, of, |at| self.fetch(client, at)).map(drop)
     }
 

@@ -77,7 +77,7 @@ fn info(bytes: &[u8]) -> Result<ImageInfo, ImageError> {
 }
 
 /// The version that a node tells in 100Ah: three numbers, and anything after them.
-pub(super) fn version(text: &str) -> Option<Version> {
+pub(crate) fn version(text: &str) -> Option<Version> {
     let numbers = text.split(|c: char| c != '.' && !c.is_ascii_digit()).next()?;
     let mut numbers = numbers.split('.').map(|number| number.parse().ok());
     Some(Version { major: numbers.next()??, minor: numbers.next()??, patch: numbers.next()?? })

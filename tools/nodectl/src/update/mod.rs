@@ -14,6 +14,7 @@ mod watcher;
 pub use ::update::{Status, Version};
 pub use error::Error;
 pub use fleet::update;
+pub(crate) use image::version;
 pub use image::{Image, ImageError, ImageInfo};
 pub use job::{Options, Outcome};
 pub use program::{Command, Program};

@@ -1,7 +1,7 @@
 //! `nodectl lss`
 
 mod only;
-mod scan;
+pub(super) mod scan;
 
 use std::fmt;
 
@@ -194,7 +194,7 @@ fn step(session: &Session, given: Option<u32>) -> Duration {
 }
 
 /// Refuses a node-ID that somebody else has.
-fn free(session: &mut Session, id: NodeId, identity: &Identity) -> Result<(), Failure> {
+pub(super) fn free(session: &mut Session, id: NodeId, identity: &Identity) -> Result<(), Failure> {
     let is_used = only::configured(session)?.contains_key(&id);
     if is_used && only::identity(session, id).ok().as_ref() != Some(identity) {
         return Err(Failure::Usage(format!("node-ID {} is in use by another node", id.get())));
@@ -203,7 +203,7 @@ fn free(session: &mut Session, id: NodeId, identity: &Identity) -> Result<(), Fa
 }
 
 /// Waits for the boot-up message of a node that has got a node-ID.
-fn booted(session: &mut Session, id: NodeId) -> Result<(), Failure> {
+pub(super) fn booted(session: &mut Session, id: NodeId) -> Result<(), Failure> {
     let time = session.options.timeout().max(BOOT);
     let heard = heartbeat::wait(&mut session.network, id, time)?;
     heard.map(drop).ok_or_else(|| {
@@ -235,7 +235,7 @@ fn node_id(id: u8) -> Result<Option<NodeId>, Failure> {
     is_valid.then_some(node).ok_or_else(|| Failure::Usage(format!("{id} is no node-ID")))
 }
 
-fn bit_rate(kbit: u16) -> Result<BitRate, Failure> {
+pub(super) fn bit_rate(kbit: u16) -> Result<BitRate, Failure> {
     BitRate::from_kbit(kbit).ok_or_else(|| {
         let rates = "CANopen has 10, 20, 50, 125, 250, 500, 800 and 1000 kbit/s, and 0 to detect it";
         Failure::Usage(rates.to_owned())

@@ -71,29 +71,36 @@ impl Scan {
         Ok(())
     }
 
-    /// Finds a node and leaves it selected. On a slow way to the bus an answer may come after its step: whether there is
-    /// nobody, a question with all of the time-out decides.
     fn find(&self, session: &mut Session) -> Result<Option<Identity>, Failure> {
-        let (step, timeout) = (step(session, self.step), session.options.timeout());
-        for attempt in 0..ATTEMPTS {
-            let step = canopen::Duration(step.0 << attempt);
-            let bar = bar();
-            let found =
-                Master::new(&mut session.network, step).fastscan(|asked| bar.set_position(asked.into()));
-            bar.finish_and_clear();
-            if let Ok(Some(identity)) = found {
-                return Ok(Some(identity));
-            }
-            let mut master = Master::new(&mut session.network, timeout);
-            master.release()?;
-            if !master.is_anybody_unconfigured()? {
-                return Ok(found?);
-            }
-        }
-        let message =
-            "nodes without a node-ID answer, but none can be found: give them more time with --step";
-        Err(Failure::Silence(message.to_owned()))
+        let (step, bar) = (step(session, self.step), bar());
+        let found = find(session, step, |asked| bar.set_position(asked.into()));
+        bar.finish_and_clear();
+        found
     }
+}
+
+/// Finds a node without a node-ID and leaves it selected. On a slow way to the bus an answer may come after its step: whether
+/// there is nobody, a question with all of the time-out decides. `progress` is told how many questions have been asked.
+pub(in crate::cli) fn find(
+    session: &mut Session,
+    step: canopen::Duration,
+    mut progress: impl FnMut(u8),
+) -> Result<Option<Identity>, Failure> {
+    let timeout = session.options.timeout();
+    for attempt in 0..ATTEMPTS {
+        let step = canopen::Duration(step.0 << attempt);
+        let found = Master::new(&mut session.network, step).fastscan(&mut progress);
+        if let Ok(Some(identity)) = found {
+            return Ok(Some(identity));
+        }
+        let mut master = Master::new(&mut session.network, timeout);
+        master.release()?;
+        if !master.is_anybody_unconfigured()? {
+            return Ok(found?);
+        }
+    }
+    let message = "nodes without a node-ID answer, but none can be found: give them more time with --step";
+    Err(Failure::Silence(message.to_owned()))
 }
 
 fn bar() -> ProgressBar {

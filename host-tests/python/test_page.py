@@ -1,0 +1,309 @@
+"""The page of the bus in a real browser: what it shows of the emulated boards, and what they do when it is used.
+
+What is measured is told by time stamps of the bus, which are virtual time: no test looks at a clock of the host.
+"""
+
+import pytest
+from page import Page, Server, browser, size
+from selenium.webdriver.common.keys import Keys
+from simulator import Master, Simulator
+
+PRESSURE, ENCODER = 1, 2
+#: 1029h:2: a fault of the device does not take it out of Operational.
+STAY_OPERATIONAL = 1
+VIEWS = ["overview", "live", "dictionary", "trace", "commissioning", "update", "stimuli"]
+PROCESS_VALUE, SAME_AS_INTEGER = "Pressure process value", "Pressure process value INTEGER16"
+
+
+#: The newest time of the bus that the page has heard of.
+BUS_TIME = "return window.canopen.recorder.t"
+
+
+def stimulate(page: Page, board: int, kind: str, spec: str) -> None:
+    """Changes a stimulus by the page's connection, and waits for the answer."""
+    request = "return window.canopen.bus.request('stimulate', { board: arguments[0], kind: arguments[1], spec: arguments[2] })"
+    page.script(request, board, kind, spec)
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    flags = ["--bitrate", "1000", "--node", "1:pressure", "--node", "2:encoder", "--pressure", "const:200000", "--control", "127.0.0.1:0"]
+    simulator = Simulator(*flags, speed="real")
+    yield simulator
+    simulator.process.kill()
+
+
+@pytest.fixture(scope="module")
+def server(simulator: Simulator):
+    server = Server(simulator)
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def driver():
+    driver = browser()
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture
+def page(driver, server: Server):
+    """The page as a user opens it, with both nodes heard and in operation."""
+    size(driver, 1440, 900)
+    page = Page(driver, server.url)
+    start(page)
+    yield page
+    assert page.console() == []
+
+
+def start(page: Page) -> None:
+    page.view("overview")
+    for node in (PRESSURE, ENCODER):
+        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.press("Start all")
+    for node in (PRESSURE, ENCODER):
+        page.says(f"tr[data-node='{node}'] td[data-label=State]", "operational")
+
+
+@pytest.fixture
+def master(simulator: Simulator):
+    master = Master(simulator)
+    yield master
+    master.close()
+
+
+def choose_node(page: Page, view: str, node: int) -> None:
+    page.view(view)
+    page.choose("Node", str(node))
+
+
+def sample_often(master: Master, milliseconds: int) -> None:
+    """TPDO 1 of the pressure node by its event timer."""
+    master.write(0x1800, 5, milliseconds, 2)
+
+
+def test_the_overview_tells_who_is_there_and_commands_them(page: Page):
+    row = f"tr[data-node='{PRESSURE}']"
+    assert "pressure" in page.text(f"{row} td[data-label=Personality]")
+    assert "encoder" in page.text(f"tr[data-node='{ENCODER}'] td[data-label=Personality]")
+    page.says(f"{row} td[data-label=Heartbeat]", "1.00 s")
+    page.press(f"Stop node {PRESSURE}")
+    page.says(f"{row} td[data-label=State]", "stopped")
+    assert "operational" in page.text(f"tr[data-node='{ENCODER}'] td[data-label=State]")
+    page.press(f"Start node {PRESSURE}")
+    page.says(f"{row} td[data-label=State]", "operational")
+
+
+def test_a_plot_follows_a_step_of_the_stimulus(page: Page, master: Master):
+    sample_often(master, 10)
+    choose_node(page, "live", PRESSURE)
+    page.until(lambda: len(page.drawn(PROCESS_VALUE)) > 20, "plot the pressure")
+    stimulate(page, PRESSURE, "pressure", "const:200000")
+    page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["y"] < 2.1, "plot what is before the step")
+    before = page.script(BUS_TIME)
+    stimulate(page, PRESSURE, "pressure", "step:200000,400000,0.5")
+    after = page.script(BUS_TIME)
+    page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["y"] > 3.9, "plot the step")
+    points = [point for point in page.drawn(PROCESS_VALUE) if point["x"] > before]
+    risen = next(point["x"] for point in points if point["y"] > 3.9)
+    # The plot may have been up to one message behind the bus when the stimulus was sent.
+    assert before + 0.5 <= risen <= after + 0.5 + 1
+    assert all(point["y"] < 2.1 for point in points if point["x"] < before + 0.5), "nothing is plotted before it happens"
+    steps = [later["x"] - earlier["x"] for earlier, later in zip(points, points[1:])]
+    assert max(steps) < 0.02, "each TPDO is a point"
+    page.press("Pause")
+    last = page.drawn(PROCESS_VALUE)[-1]["x"]
+    page.until(lambda: float(page.script(BUS_TIME)) > last + 0.5, "go on recording")
+    assert page.drawn(PROCESS_VALUE)[-1]["x"] <= last + 0.1, "a paused plot stands still"
+    page.press("Follow")
+    page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["x"] > last + 0.5, "follow the bus again")
+
+
+def test_a_slider_moves_the_plot(page: Page, master: Master):
+    sample_often(master, 10)
+    choose_node(page, "live", PRESSURE)
+    slider = page.field("Pressure, bar")
+    page.script("arguments[0].value = 6; arguments[0].dispatchEvent(new Event('input', { bubbles: true }))", slider)
+    page.until(lambda: abs(page.drawn(PROCESS_VALUE)[-1]["y"] - 6) < 0.02, "plot what the slider says")
+
+
+def test_a_fault_is_marked_on_the_time_axis(page: Page, master: Master):
+    sample_often(master, 10)
+    choose_node(page, "live", PRESSURE)
+    page.field("open sensor").click()
+    page.says("#view-live .faults", "5006h")
+    page.says("#view-live .signals", "not sent: pre-operational")
+    page.field("open sensor").click()
+    page.says("#view-live .faults", "0000h")
+    start(page)
+
+
+def test_a_value_that_is_not_valid_says_so(page: Page, master: Master):
+    sample_often(master, 10)
+    master.write(0x1029, 2, STAY_OPERATIONAL, 1)
+    choose_node(page, "live", PRESSURE)
+    page.says("#view-live .signals tr[data-signal='1:6130:1']", "\tvalid")
+    page.field("open sensor").click()
+    page.says("#view-live .signals tr[data-signal='1:6130:1']", "not valid")
+    page.field("open sensor").click()
+    page.says("#view-live .faults", "0000h")
+    page.until(lambda: "not valid" not in page.text("#view-live .signals tr[data-signal='1:6130:1']"), "say that the value is valid again")
+
+
+def test_an_edit_is_checked_refused_and_accepted(page: Page, master: Master):
+    choose_node(page, "dictionary", PRESSURE)
+    outcome = ".outcome"
+
+    details = page.open_object("6132h:1")
+    field = page.fill("New value", "39", details)
+    field.send_keys(Keys.ENTER)
+    page.says(f"{details} {outcome}", "Too high: 0 to 38")
+    assert field.get_attribute("aria-invalid") == "true"
+    assert master.read(0x6132, 1) == 0, "what is wrong is not sent"
+
+    details = page.open_object("1A00h:0")
+    page.fill("New value", "3", details).send_keys(Keys.ENTER)
+    page.says(f"{details} {outcome}", "060")
+    assert master.read(0x1A00) == 2, "what the node refuses stays as it was"
+
+    details = page.open_object("61A1h:1")
+    page.fill("New value", "7", details).send_keys(Keys.ENTER)
+    page.says(f"{details} {outcome}", "written, reads 7")
+    assert master.read(0x61A1, 1) == 7
+
+
+def test_what_differs_from_the_default_is_listed(page: Page, master: Master):
+    master.write(0x61A1, 1, 9, 1)
+    choose_node(page, "dictionary", PRESSURE)
+    page.until(lambda: "objects" in page.text("#view-dictionary .hint"), "list the objects")
+    page.choose("Show", "differs")
+    page.until(lambda: page.find("tr[data-object='61A1h:1']").is_displayed(), "list what differs")
+    page.until(lambda: not page.find("tr[data-object='1000h:0']").is_displayed(), "hide what does not")
+    master.write(0x61A1, 1, 1, 1)
+
+
+def test_a_mapping_is_changed_and_plotted(page: Page, master: Master):
+    sample_often(master, 20)
+    choose_node(page, "commissioning", PRESSURE)
+    page.choose("PDO", "0")
+    page.until(lambda: page.field("Object 1").get_attribute("value") == f"{0x6130}:1", "show the mapping of TPDO 1")
+    page.choose("Object 1", f"{0x7130}:1")
+    page.choose("Object 2", "")
+    page.fill("Event timer, ms", "20")
+    page.press("Map")
+    page.says("#view-commissioning [data-pdo='TPDO 1']", "7130h:1")
+    assert page.script("return document.querySelectorAll('.steps [data-done=yes]').length") == 5
+    assert (master.read(0x1A00), master.read(0x1A00, 1)) == (1, 0x7130_0110)
+    choose_node(page, "live", PRESSURE)
+    page.until(lambda: len(page.drawn(SAME_AS_INTEGER)) > 20, "plot the object that is mapped now")
+    assert "6130h:1" not in page.text("#view-live .signals")
+    master.node.nmt.send_command(0x81)
+
+
+def test_the_trace_is_filtered_and_paused_and_shows_bits(page: Page):
+    page.view("trace")
+    page.says("#view-trace .frames", "pdo")
+    assert "0 dropped" in page.text("#view-trace .hint")
+    for kind in ("nmt", "sync", "time", "emcy", "pdo", "sdo", "lss", "other"):
+        page.field(kind).click()
+    page.view("overview")
+    page.press(f"Pre-operational node {ENCODER}")
+    page.press(f"Start node {ENCODER}")
+    page.view("trace")
+    rows = "return [...document.querySelectorAll('.frames tbody tr')].map((row) => row.dataset.kind)"
+    page.until(lambda: page.script(rows), "show a heartbeat")
+    assert set(page.script(rows)) == {"heartbeat"}
+    page.press("Pause")
+    before = page.text("#view-trace .frames")
+    page.find(".scroll").send_keys(Keys.ARROW_DOWN)
+    page.says("#view-trace .frame-details", "Data, bit 7 first")
+    assert page.text("#view-trace .frames") == before
+
+
+def test_the_keyboard_is_enough(page: Page):
+    page.script("document.activeElement.blur()")
+    page.driver.find_element("tag name", "body").send_keys("2")
+    page.until(lambda: page.script("return location.hash") == "#live", "change the view by a digit")
+    assert page.script("return document.activeElement.innerText") == "Live", "the focus goes to the heading of the view"
+    seen = []
+    for _ in range(8):
+        page.driver.switch_to.active_element.send_keys(Keys.TAB)
+        seen.append(page.script("const e = document.activeElement; return e.ariaLabel ?? e.labels?.[0]?.innerText ?? e.innerText"))
+    assert seen[:3] == ["Node", "Time", "Pause"]
+    canvas = page.until(lambda: page.find("canvas"), "have a plot")
+    page.script("arguments[0].focus()", canvas)
+    canvas.send_keys(" ")
+    page.until(lambda: page.script("return window.canopen.time.follows") is False, "pause by the space bar")
+    canvas.send_keys(Keys.HOME)
+    page.until(lambda: page.script("return window.canopen.time.follows"), "follow by Home")
+    page.script("document.activeElement.blur()")
+    page.driver.find_element("tag name", "body").send_keys("3")
+    page.driver.switch_to.active_element.send_keys("/")
+    assert page.script("return document.activeElement.type") == "search"
+
+
+#: What a screen reader says by its name.
+NAMED = {"button", "checkbox", "combobox", "image", "img", "link", "progressbar", "searchbox", "slider", "spinbutton", "switch", "textbox"}
+
+
+def nameless(page: Page) -> list[str]:
+    """The controls and drawings for which the browser has no name to tell a screen reader."""
+    nodes = page.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+    told = [node for node in nodes if not node["ignored"] and node["role"]["value"] in NAMED]
+    assert len(told) > 8, "the tree has the controls"
+    return [str(node) for node in told if not node.get("name", {}).get("value")]
+
+
+def test_every_control_has_a_name_and_no_view_is_wider_than_a_phone(page: Page):
+    for view in VIEWS:
+        page.view(view)
+        page.until(lambda: page.script("return document.querySelector('main section:not([hidden])').innerText.length > 60"), f"fill {view}")
+        assert nameless(page) == [], view
+    size(page.driver, 390, 844)
+    for view in VIEWS:
+        page.view(view)
+        assert page.script("return document.documentElement.scrollWidth") <= 390, view
+
+
+def test_two_pages_at_once(page: Page, driver, server: Server, master: Master):
+    sample_often(master, 10)
+    first = driver.current_window_handle
+    driver.switch_to.new_window("window")
+    second = driver.current_window_handle
+    try:
+        other = Page(driver, server.url)
+        choose_node(other, "live", PRESSURE)
+        other.until(lambda: len(other.drawn(PROCESS_VALUE)) > 20, "plot in the second page")
+        other.says("#bus-status", "Pages\n2")
+        driver.switch_to.window(first)
+        page.view("overview")
+        page.press(f"Stop node {ENCODER}")
+        page.says(f"tr[data-node='{ENCODER}'] td[data-label=State]", "stopped")
+        driver.switch_to.window(second)
+        other.view("overview")
+        other.says(f"tr[data-node='{ENCODER}'] td[data-label=State]", "stopped")
+    finally:
+        driver.switch_to.window(second)
+        driver.close()
+        driver.switch_to.window(first)
+
+
+def test_the_server_goes_away_and_comes_back(page: Page, simulator: Simulator, server: Server, master: Master):
+    sample_often(master, 10)
+    choose_node(page, "live", PRESSURE)
+    page.until(lambda: len(page.drawn(PROCESS_VALUE)) > 20, "plot")
+    address = server.url.split("/")[2].split("?")[0]
+    server.stop()
+    page.says("#connection", "no server: trying again")
+    again = Server(simulator, address)
+    assert again.url.split("/")[2] == address, "the port is free again"
+    try:
+        page.says("#connection", "connected")
+        newest = page.script(BUS_TIME)
+        page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["x"] != newest and len(page.drawn(PROCESS_VALUE)) > 20, "plot again, without being loaded anew")
+        page.view("overview")
+        page.press(f"Stop node {ENCODER}")
+        page.says(f"tr[data-node='{ENCODER}'] td[data-label=State]", "stopped")
+    finally:
+        server.process, again.process = again.process, server.process

@@ -1,0 +1,104 @@
+//! `nodectl serve`: the bus in a browser. The messages are those of `tools/page/PROTOCOL.md`.
+//!
+//! One thread, the [`pump`], has the bus, and all that is known of it; pages and jobs send it orders. What takes several frames
+//! (a transfer, a search, an update) is a [`jobs`] job on a thread of its own, with a [`port`] to the bus; so a slow node holds up
+//! nobody but who asked it.
+
+mod bus_time;
+mod jobs;
+mod live;
+mod nodes;
+mod pages;
+mod port;
+mod pump;
+mod request;
+mod schedule;
+mod status;
+mod stimuli;
+mod tracer;
+
+use std::io::{self, Read as _};
+use std::net::SocketAddr;
+use std::sync::mpsc;
+use std::thread;
+
+use clap::Args;
+use serde::Serialize;
+
+use self::pump::{Order, Pump, Setup};
+use super::{Failure, Options, Output};
+use crate::bus::Address;
+
+/// Shows the bus in a browser: the nodes, live values, dictionary, trace, commissioning, update.
+///
+/// The page is for this machine only, unless --page gives an address that others reach; they need the token of the printed
+/// address. Without --silent, all node-IDs are asked once who is there, and nodes that are heard for what they are.
+#[derive(Debug, Args)]
+pub(super) struct Serve {
+    /// The bus; that of --bus if it is left out.
+    #[arg(value_name = "BUS")]
+    address: Option<Address>,
+
+    /// Where the page is. Where the port is taken, the next free one is used; port 0 takes any.
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8301")]
+    page: SocketAddr,
+
+    /// The control connection of a simulator, for the stimuli (`cargo sim --control`).
+    #[arg(long, value_name = "ADDR:PORT")]
+    stimuli: Option<SocketAddr>,
+
+    /// Send nothing unless a page asks for something.
+    #[arg(long)]
+    silent: bool,
+
+    /// End with the standard input: for a program that has started this one.
+    #[arg(long, hide = true)]
+    until_end_of_input: bool,
+}
+
+#[derive(Serialize)]
+struct Served {
+    page: String,
+}
+
+impl std::fmt::Display for Served {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "the page is at {}", self.page)
+    }
+}
+
+impl Serve {
+    pub(super) fn run(&self, options: &Options, mut output: Output) -> Result<(), Failure> {
+        let address = self.address.clone().unwrap_or_else(|| options.bus.clone());
+        let options = Options { bus: address, ..options.clone() };
+        // A bus that is not there is told before anybody opens a page. A simulator opens it only when it knows where the page is.
+        let bus = match self.until_end_of_input {
+            true => None,
+            false => Some(options.bus.open(options.bit_rate)?),
+        };
+        let (orders, inbox) = mpsc::channel();
+        let from_pages = orders.clone();
+        let listener = move |said| drop(from_pages.send(Order::Page(said)));
+        let server = page::start(&page::Options { address: self.page }, listener).map_err(|error| {
+            Failure::Usage(format!("the page cannot be served at {}: {error}", self.page))
+        })?;
+        output.print(&Served { page: server.url.clone() })?;
+        if self.until_end_of_input {
+            thread::spawn(end_with_input);
+        }
+        if let Some(control) = self.stimuli {
+            stimuli::watch(control, orders.clone());
+        }
+        let setup = Setup { options, silent: self.silent, control: self.stimuli, hub: server.hub };
+        Pump::new(setup, bus, orders, inbox).run();
+        Ok(())
+    }
+}
+
+/// Ends the process when nobody holds the other end of its standard input any more.
+fn end_with_input() {
+    let mut input = io::stdin().lock();
+    let mut buffer = [0; 256];
+    while input.read(&mut buffer).is_ok_and(|count| count > 0) {}
+    std::process::exit(0);
+}

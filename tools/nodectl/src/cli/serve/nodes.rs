@@ -1,0 +1,296 @@
+//! The nodes that were heard, and what is known of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use canopen::emcy::Message;
+use canopen::nmt::State;
+use canopen::{Frame, NodeId};
+use serde::Serialize;
+
+use super::status::Count;
+use crate::heartbeat::{self, Heartbeat};
+use crate::{Catalogue, meaning};
+
+/// So many heartbeats that do not come, and a node is not there.
+const MISSED: f64 = 3.0;
+/// The same for a node without heartbeats, in seconds.
+const SILENCE: f64 = 5.0;
+
+/// What a node was asked for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub(super) struct Identity {
+    pub(super) name: Option<String>,
+    pub(super) personality: Option<String>,
+    pub(super) data_sheet: bool,
+    pub(super) device_type: Option<u32>,
+    pub(super) vendor: Option<u32>,
+    pub(super) product: Option<u32>,
+    pub(super) revision: Option<u32>,
+    pub(super) serial: Option<u32>,
+    pub(super) version: Option<String>,
+    pub(super) hardware: Option<String>,
+}
+
+/// An emergency message.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct Emergency {
+    t: f64,
+    code: u16,
+    text: String,
+    active: bool,
+}
+
+/// One node.
+#[derive(Default)]
+pub(super) struct Node {
+    pub(super) identity: Option<Identity>,
+    pub(super) catalogue: Option<Arc<Catalogue>>,
+    /// Whether it is asked what it is, and when it was last.
+    pub(super) asked: Option<f64>,
+    pub(super) updating: bool,
+    state: Option<State>,
+    seen: f64,
+    heartbeat: Option<f64>,
+    last_heartbeat: Option<f64>,
+    emergency: Option<Emergency>,
+    count: Count,
+    frames: f64,
+    load: f64,
+    is_alive: bool,
+    is_new: bool,
+}
+
+/// What is to be told at once.
+#[derive(Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "lowercase")]
+pub(super) enum News {
+    State {
+        node: u8,
+        t: f64,
+        state: &'static str,
+    },
+    Emcy {
+        node: u8,
+        #[serde(flatten)]
+        emergency: Emergency,
+    },
+}
+
+#[derive(Serialize)]
+struct Row<'n> {
+    node: u8,
+    #[serde(flatten)]
+    identity: &'n Identity,
+    state: Option<&'static str>,
+    alive: bool,
+    heartbeat: Option<f64>,
+    seen: f64,
+    emcy: Option<&'n Emergency>,
+    frames: f64,
+    load: f64,
+    updating: bool,
+}
+
+/// All of them.
+#[derive(Default)]
+pub(super) struct Nodes {
+    nodes: BTreeMap<NodeId, Node>,
+}
+
+impl Nodes {
+    pub(super) fn get(&self, node: NodeId) -> Option<&Node> {
+        self.nodes.get(&node)
+    }
+
+    /// A node that something is known of now.
+    pub(super) fn change(&mut self, node: NodeId) -> &mut Node {
+        let entry = self.nodes.entry(node).or_default();
+        entry.is_new = true;
+        entry
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = (NodeId, &Node)> {
+        self.nodes.iter().map(|(node, entry)| (*node, entry))
+    }
+
+    /// Takes what a frame tells of a node.
+    pub(super) fn on_frame(&mut self, frame: &Frame, t: f64) -> Option<News> {
+        let (node, is_proof) = sender(frame)?;
+        if !is_proof && !self.nodes.contains_key(&node) {
+            return None;
+        }
+        let entry = self.nodes.entry(node).or_default();
+        entry.is_new |= !entry.is_alive;
+        (entry.seen, entry.is_alive) = (t, true);
+        entry.count.add(frame);
+        match frame.id() & !0x7F {
+            0x080 => entry.on_emergency(node, frame, t),
+            0x700 => entry.on_heartbeat(node, Heartbeat::parse(frame)?, t),
+            _ => None,
+        }
+    }
+
+    /// Counts what the last `seconds` brought, and notices who is no longer there.
+    pub(super) fn look(&mut self, t: f64, seconds: f64, kbit: Option<u16>) {
+        for entry in self.nodes.values_mut() {
+            let rate = entry.count.rate(seconds);
+            let load = rate.load(kbit).unwrap_or(0.0);
+            entry.is_new |= (entry.frames, entry.load) != (rate.frames, load);
+            (entry.frames, entry.load) = (rate.frames, load);
+            let patience = entry.heartbeat.map_or(SILENCE, |period| MISSED * period);
+            if entry.is_alive && t - entry.seen > patience.max(1.0) {
+                (entry.is_alive, entry.is_new, entry.last_heartbeat) = (false, true, None);
+            }
+        }
+    }
+
+    /// The event with all of them.
+    pub(super) fn all(&self) -> serde_json::Value {
+        self.event(true, |_| true)
+    }
+
+    /// The event with those that have changed since the last call; `None` where none has.
+    pub(super) fn changed(&mut self) -> Option<serde_json::Value> {
+        let event =
+            self.nodes.values().any(|entry| entry.is_new).then(|| self.event(false, |entry| entry.is_new));
+        self.nodes.values_mut().for_each(|entry| entry.is_new = false);
+        event
+    }
+
+    fn event(&self, all: bool, is_wanted: impl Fn(&Node) -> bool) -> serde_json::Value {
+        let unknown = Identity::default();
+        let wanted = self.nodes.iter().filter(|(_, entry)| is_wanted(entry));
+        let rows: Vec<Row> = wanted.map(|(node, entry)| entry.row(*node, &unknown)).collect();
+        serde_json::json!({ "event": "nodes", "all": all, "nodes": rows })
+    }
+}
+
+impl Node {
+    pub(super) fn is_alive(&self) -> bool {
+        self.is_alive
+    }
+
+    pub(super) fn state(&self) -> Option<State> {
+        self.state
+    }
+
+    fn on_emergency(&mut self, node: NodeId, frame: &Frame, t: f64) -> Option<News> {
+        let message = Message::parse(frame.data().try_into().ok()?);
+        let emergency = Emergency {
+            t,
+            code: message.code,
+            active: message.code & 0xFF00 != 0,
+            text: meaning::emergency(message),
+        };
+        (self.emergency, self.is_new) = (Some(emergency.clone()), true);
+        Some(News::Emcy { node: node.get(), emergency })
+    }
+
+    fn on_heartbeat(&mut self, node: NodeId, heard: Heartbeat, t: f64) -> Option<News> {
+        let is_boot = heard.state == State::Initialising;
+        let period = self.last_heartbeat.map(|last| round(t - last)).filter(|_| !is_boot);
+        self.is_new |= period != self.heartbeat && period.is_some();
+        self.heartbeat = period.or(self.heartbeat);
+        self.last_heartbeat = Some(t).filter(|_| !is_boot);
+        if self.state.replace(heard.state) == Some(heard.state) && !is_boot {
+            return None;
+        }
+        self.is_new = true;
+        if is_boot {
+            // It may have another program, or be another device.
+            (self.asked, self.emergency) = (None, None);
+        }
+        Some(News::State { node: node.get(), t, state: heartbeat::words(heard.state) })
+    }
+
+    fn row<'n>(&'n self, node: NodeId, unknown: &'n Identity) -> Row<'n> {
+        Row {
+            node: node.get(),
+            identity: self.identity.as_ref().unwrap_or(unknown),
+            state: self.state.map(heartbeat::words),
+            alive: self.is_alive,
+            heartbeat: self.heartbeat,
+            seen: self.seen,
+            emcy: self.emergency.as_ref(),
+            frames: self.frames,
+            load: self.load,
+            updating: self.updating,
+        }
+    }
+}
+
+/// Whose frame it is by the pre-defined connection set, and whether nobody else can have sent it (CiA 301, 7.3.5).
+fn sender(frame: &Frame) -> Option<(NodeId, bool)> {
+    let node = NodeId::new(u8::try_from(frame.id() & 0x7F).ok()?)?;
+    match frame.id() & !0x7F {
+        // A remote frame asks the node.
+        0x700 if frame.is_remote() => None,
+        0x080 | 0x580 | 0x700 => Some((node, true)),
+        // TPDOs. They may have been given other COB-IDs.
+        0x180 | 0x280 | 0x380 | 0x480 => Some((node, false)),
+        _ => None,
+    }
+}
+
+/// To a hundredth of a second: what the host adds to a period is noise.
+fn round(seconds: f64) -> f64 {
+    (seconds * 100.0).round() / 100.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(id: u16, data: &[u8]) -> Frame {
+        Frame::new(id, data).unwrap()
+    }
+
+    fn row(nodes: &Nodes) -> serde_json::Value {
+        nodes.all()["nodes"][0].clone()
+    }
+
+    #[test]
+    fn a_node_is_known_by_its_boot_up_and_lost_after_three_heartbeats() {
+        let mut nodes = Nodes::default();
+        assert_eq!(nodes.on_frame(&frame(0x185, &[1]), 0.0), None, "a PDO proves nothing");
+        let news = nodes.on_frame(&frame(0x705, &[0]), 0.0);
+        assert_eq!(news, Some(News::State { node: 5, t: 0.0, state: "initialising" }));
+        let news = nodes.on_frame(&frame(0x705, &[5]), 0.5);
+        assert_eq!(news, Some(News::State { node: 5, t: 0.5, state: "operational" }));
+        assert_eq!(nodes.on_frame(&frame(0x705, &[5]), 1.0), None);
+        assert_eq!(row(&nodes)["heartbeat"], 0.5);
+        nodes.look(2.4, 1.0, None);
+        assert_eq!(row(&nodes)["alive"], true);
+        nodes.look(2.6, 1.0, None);
+        assert_eq!(row(&nodes)["alive"], false);
+        nodes.on_frame(&frame(0x185, &[1]), 3.0);
+        assert_eq!(row(&nodes)["alive"], true);
+    }
+
+    #[test]
+    fn an_emergency_is_told_and_over_with_no_error() {
+        let mut nodes = Nodes::default();
+        let news = nodes.on_frame(&frame(0x085, &[0x30, 0x81, 0x11, 0, 0, 0, 0, 0]), 1.0).unwrap();
+        let told = serde_json::to_value(&news).unwrap();
+        assert_eq!(
+            (&told["event"], &told["code"], &told["active"]),
+            (&"emcy".into(), &0x8130.into(), &true.into())
+        );
+        nodes.on_frame(&frame(0x085, &[0; 8]), 2.0);
+        assert_eq!(row(&nodes)["emcy"]["active"], false);
+        assert_eq!(nodes.on_frame(&frame(0x085, &[1, 2]), 3.0), None);
+    }
+
+    #[test]
+    fn only_what_has_changed_is_told() {
+        let mut nodes = Nodes::default();
+        nodes.on_frame(&frame(0x701, &[5]), 0.0);
+        nodes.on_frame(&frame(0x702, &[5]), 0.0);
+        assert_eq!(nodes.changed().unwrap()["nodes"].as_array().map(Vec::len), Some(2));
+        assert_eq!(nodes.changed(), None);
+        nodes.change(NodeId::new(2).unwrap()).updating = true;
+        let rows = nodes.changed().unwrap();
+        assert_eq!((rows["nodes"].as_array().map(Vec::len), &rows["nodes"][0]["node"]), (Some(1), &2.into()));
+    }
+}

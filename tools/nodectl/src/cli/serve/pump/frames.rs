@@ -1,0 +1,94 @@
+//! Frames that come and go, and the bus that they are on.
+
+use canopen::{Frame, NodeId};
+use serde_json::json;
+
+use super::{AT_ONCE, LISTEN, Pump, REOPEN};
+use crate::bus::{BusError, Received, clock};
+
+impl Pump {
+    pub(super) fn take_frames(&mut self) {
+        let mut until = if self.outlets.is_empty() { clock::now() + LISTEN } else { clock::now() };
+        for _ in 0..AT_ONCE {
+            let Ok(bus) = &mut self.bus else { return };
+            match bus.receive(until) {
+                Ok(Some(received)) => self.on_frame(&received),
+                Ok(None) => return,
+                Err(error) => return self.lose(error),
+            }
+            until = clock::now();
+        }
+    }
+
+    pub(super) fn on_frame(&mut self, received: &Received) {
+        let t = self.time.of_frame(received.at, clock::now());
+        let frame = &received.frame;
+        self.outlets.retain(|outlet| outlet.hand_over(received));
+        self.count.add(frame);
+        if let Some(news) = self.nodes.on_frame(frame, t) {
+            self.on_news(frame, t);
+            self.pages.tell(&self.setup.hub, &json!(news));
+        }
+        self.live.on_frame(frame, t);
+        self.look_at_writes(frame, t);
+        if self.pages.have_trace() {
+            self.tracer.on_frame(frame, received.at, t, false);
+        }
+    }
+
+    /// A node that boots may have another mapping.
+    pub(super) fn on_news(&mut self, frame: &Frame, t: f64) {
+        let node = u8::try_from(frame.id() & 0x7F).ok().and_then(NodeId::new);
+        if let (0x701..=0x77F, Some(node), [0]) = (frame.id(), node, frame.data()) {
+            self.remapped.push((node, t));
+        }
+    }
+
+    /// Somebody may write to PDO parameters of a node, this side or any other master.
+    pub(super) fn look_at_writes(&mut self, frame: &Frame, t: f64) {
+        let node = frame.id().checked_sub(0x600).and_then(|id| NodeId::new(u8::try_from(id).ok()?));
+        let (Some(node), &[command, low, high, ..]) = (node, frame.data()) else { return };
+        // Initiate download, expedited or not (CiA 301, 7.2.4.3.3).
+        if command >> 5 == 1 && (0x1800..0x1C00).contains(&u16::from_le_bytes([low, high])) {
+            match self.remapped.iter_mut().find(|(other, _)| *other == node) {
+                Some((_, since)) => *since = t,
+                None => self.remapped.push((node, t)),
+            }
+        }
+    }
+
+    pub(super) fn send(&mut self, frame: &Frame) {
+        let Ok(bus) = &mut self.bus else { return };
+        if let Err(error) = bus.send(frame) {
+            return self.lose(error);
+        }
+        let (here, t) = (clock::now(), self.now());
+        self.count.add(frame);
+        self.look_at_writes(frame, t);
+        if self.pages.have_trace() {
+            self.tracer.on_frame(frame, here, t, true);
+        }
+    }
+
+    /// The bus is gone: all jobs are told by their ports.
+    pub(super) fn lose(&mut self, error: BusError) {
+        self.bus = Err(error);
+        self.outlets.clear();
+        self.due.reopen = clock::now() + REOPEN;
+        self.due.status = clock::now();
+    }
+
+    pub(super) fn reopen(&mut self) {
+        let now = clock::now();
+        if self.bus.is_ok() || now < self.due.reopen {
+            return;
+        }
+        self.bus = self.setup.options.bus.open(self.setup.options.bit_rate);
+        self.due.reopen = clock::now() + REOPEN;
+        if self.bus.is_ok() {
+            self.time.restart();
+            self.due.status = now;
+            self.scan();
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Jobs: when they begin, what they find out, and what comes of them.
+
+use std::sync::Arc;
+
+use canopen::NodeId;
+use serde_json::{Value as Json, json};
+
+use super::{Asker, Pump, Refusal, Running, Waiting};
+use crate::cli::serve::jobs::{self, Job, Learned};
+use crate::cli::serve::live::Key;
+use crate::cli::serve::schedule::{Haste, Lane};
+
+impl Pump {
+    pub(super) fn enqueue(
+        &mut self,
+        asker: Option<Asker>,
+        lane: Lane,
+        haste: Haste,
+        node: Option<NodeId>,
+        job: Job,
+    ) {
+        self.schedule.add(lane, haste, Waiting { asker, node, job });
+    }
+
+    pub(super) fn begin_jobs(&mut self) {
+        while let Some((number, Waiting { asker, node, job })) = self.schedule.next() {
+            self.running.push(Running { number, asker, node, is_update: job.is_update });
+            let known = node.and_then(|node| self.nodes.get(node)?.catalogue.clone());
+            jobs::begin(job, number, node.zip(known), &self.setup.options, &self.orders);
+        }
+    }
+
+    pub(super) fn tell_progress(&mut self, number: u64, progress: &Json) {
+        let running = self.running.iter().find(|running| running.number == number);
+        if let Some(Asker { page, id }) = running.and_then(|running| running.asker.as_ref()) {
+            self.setup.hub.send(*page, json!({ "id": id, "progress": progress }).to_string());
+        }
+    }
+
+    pub(super) fn finish(&mut self, number: u64, result: Result<Json, Refusal>) {
+        self.schedule.done(number);
+        let Some(place) = self.running.iter().position(|running| running.number == number) else { return };
+        let Running { asker, node, is_update, .. } = self.running.swap_remove(place);
+        if let Some(node) = node.filter(|_| is_update) {
+            let t = self.now();
+            let entry = self.nodes.change(node);
+            (entry.updating, entry.asked) = (false, None);
+            self.remapped.push((node, t));
+            let (step, key, value) = match &result {
+                Ok(outcome) => ("done", "result", outcome.clone()),
+                Err(refusal) => ("failed", "error", refusal.text.clone().into()),
+            };
+            let event = json!({ "event": "update", "node": node.get(), "step": step, key: value });
+            self.pages.tell(&self.setup.hub, &event);
+        }
+        if let Some(asker) = asker {
+            self.answer(&asker, result);
+        }
+    }
+
+    /// Answers a request that was counted.
+    pub(super) fn answer(&mut self, asker: &Asker, result: Result<Json, Refusal>) {
+        if let Some(page) = self.pages.get(asker.page) {
+            page.answered();
+        }
+        self.answer_now(asker, result);
+    }
+
+    pub(super) fn answer_now(&self, Asker { page, id }: &Asker, result: Result<Json, Refusal>) {
+        let answer = match result {
+            Ok(answer) => json!({ "id": id, "ok": answer }),
+            Err(Refusal { text, abort: None }) => json!({ "id": id, "error": text }),
+            Err(Refusal { text, abort }) => json!({ "id": id, "error": text, "abort": abort }),
+        };
+        self.setup.hub.send(*page, answer.to_string());
+    }
+
+    pub(super) fn learn(&mut self, node: NodeId, learned: Learned) {
+        match learned {
+            Learned::Present => drop(self.nodes.change(node)),
+            Learned::Identity(identity, catalogue) => {
+                // Nodes of a kind share one: a data sheet is large.
+                let kind = (identity.vendor, identity.product);
+                let catalogue = Arc::clone(self.catalogues.entry(kind).or_insert(catalogue));
+                self.tracer.know(node, &catalogue);
+                let entry = self.nodes.change(node);
+                (entry.identity, entry.catalogue) = (Some(identity), Some(catalogue));
+            }
+            Learned::Catalogue(catalogue) => {
+                self.tracer.know(node, &catalogue);
+                self.nodes.change(node).catalogue = Some(catalogue);
+            }
+            Learned::Survey(survey, knowledge) => {
+                self.tracer.learn(node, *knowledge);
+                self.live.learn(node, survey);
+                self.pages.tell(&self.setup.hub, &json!({ "event": "mapping", "node": node.get() }));
+            }
+            Learned::Reading(object, bytes) => {
+                let t = self.now();
+                self.live.on_reading(Key::new(node, object), t, &bytes);
+            }
+        }
+    }
+
+    pub(super) fn on_stimuli(&mut self, mut news: Json) {
+        self.bit_rate = news["bit_rate"].as_u64().and_then(|rate| u16::try_from(rate).ok()).or(self.bit_rate);
+        self.stimuli = Some(news.clone());
+        news["event"] = "stimuli".into();
+        self.pages.tell(&self.setup.hub, &news);
+    }
+}

@@ -1,0 +1,143 @@
+//! Which job runs when. An SDO server serves one transfer at a time, so a node has one job at a time, in the order of the requests.
+
+use canopen::NodeId;
+
+/// What a job needs for itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lane {
+    /// The SDO server of a node.
+    Node(NodeId),
+    /// The SDO servers of all nodes, and LSS.
+    Everything,
+    /// LSS, which selects nodes.
+    Lss,
+    /// Nothing: what is said once.
+    Nothing,
+}
+
+/// How eagerly it is waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Haste {
+    /// A page waits.
+    Asked,
+    /// It is good to know: one such job at a time, and after all others of its lane.
+    Background,
+}
+
+/// Jobs that wait, and the lanes of those that run.
+pub(super) struct Schedule<J> {
+    waiting: Vec<(Lane, Haste, J)>,
+    running: Vec<(u64, Lane, Haste)>,
+    next: u64,
+}
+
+impl<J> Default for Schedule<J> {
+    fn default() -> Schedule<J> {
+        Schedule { waiting: Vec::new(), running: Vec::new(), next: 0 }
+    }
+}
+
+impl Lane {
+    fn excludes(self, other: Lane) -> bool {
+        match (self, other) {
+            (Lane::Nothing, _) | (_, Lane::Nothing) => false,
+            (Lane::Everything, _) | (_, Lane::Everything) => true,
+            (lane, other) => lane == other,
+        }
+    }
+}
+
+impl<J> Schedule<J> {
+    pub(super) fn add(&mut self, lane: Lane, haste: Haste, job: J) {
+        self.waiting.push((lane, haste, job));
+    }
+
+    /// A job that may begin now, with its number. An older one of its lane goes before it, and one that needs everything is not
+    /// overtaken for ever.
+    pub(super) fn next(&mut self) -> Option<(u64, J)> {
+        let place = (0..self.waiting.len()).find(|&place| self.may_begin(place))?;
+        let (lane, haste, job) = self.waiting.remove(place);
+        self.next += 1;
+        self.running.push((self.next, lane, haste));
+        Some((self.next, job))
+    }
+
+    fn may_begin(&self, place: usize) -> bool {
+        let (lane, haste, _) = &self.waiting[place];
+        let is_background = *haste == Haste::Background;
+        let is_held_up_by = |other: Lane, other_haste: Haste| {
+            lane.excludes(other) || (is_background && other_haste == Haste::Background)
+        };
+        let by_running = self.running.iter().any(|(_, other, haste)| is_held_up_by(*other, *haste));
+        let by_older = self.waiting[..place]
+            .iter()
+            .any(|(other, haste, _)| lane.excludes(*other) && (*haste == Haste::Asked || is_background));
+        let by_hasty = is_background
+            && self.waiting.iter().any(|(other, haste, _)| lane.excludes(*other) && *haste == Haste::Asked);
+        !by_running && !by_older && !by_hasty
+    }
+
+    /// A job is over.
+    pub(super) fn done(&mut self, number: u64) {
+        self.running.retain(|(running, ..)| *running != number);
+    }
+
+    /// Whether a job of this lane waits or runs.
+    pub(super) fn has(&self, lane: Lane) -> bool {
+        self.waiting.iter().any(|(other, ..)| *other == lane)
+            || self.running.iter().any(|(_, other, _)| *other == lane)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn node(id: u8) -> Lane {
+        Lane::Node(NodeId::new(id).unwrap())
+    }
+
+    fn begun(schedule: &mut Schedule<&'static str>) -> Vec<&'static str> {
+        std::iter::from_fn(|| schedule.next()).map(|(_, job)| job).collect()
+    }
+
+    #[test]
+    fn a_node_has_one_job_at_a_time_in_their_order() {
+        let mut schedule = Schedule::default();
+        schedule.add(node(1), Haste::Asked, "a");
+        schedule.add(node(1), Haste::Asked, "b");
+        schedule.add(node(2), Haste::Asked, "c");
+        schedule.add(Lane::Nothing, Haste::Asked, "d");
+        assert_eq!(begun(&mut schedule), ["a", "c", "d"]);
+        schedule.done(1);
+        assert_eq!(begun(&mut schedule), ["b"]);
+    }
+
+    #[test]
+    fn what_needs_everything_waits_for_all_and_is_not_overtaken() {
+        let mut schedule = Schedule::default();
+        schedule.add(node(1), Haste::Asked, "a");
+        schedule.add(Lane::Everything, Haste::Asked, "b");
+        schedule.add(node(2), Haste::Asked, "c");
+        schedule.add(Lane::Lss, Haste::Asked, "d");
+        assert_eq!(begun(&mut schedule), ["a"]);
+        schedule.done(1);
+        assert_eq!(begun(&mut schedule), ["b"]);
+        schedule.done(2);
+        assert_eq!(begun(&mut schedule), ["c", "d"]);
+    }
+
+    #[test]
+    fn what_is_good_to_know_comes_one_at_a_time_and_last() {
+        let mut schedule = Schedule::default();
+        schedule.add(node(1), Haste::Background, "a");
+        schedule.add(node(2), Haste::Background, "b");
+        schedule.add(node(1), Haste::Asked, "c");
+        assert_eq!(begun(&mut schedule), ["b", "c"]);
+        schedule.done(1);
+        assert_eq!(begun(&mut schedule), [""; 0]);
+        schedule.done(2);
+        assert_eq!(begun(&mut schedule), ["a"]);
+        assert!(schedule.has(node(1)) && !schedule.has(node(2)));
+    }
+}

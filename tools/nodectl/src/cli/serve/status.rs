@@ -1,0 +1,73 @@
+//! How much is on the bus.
+
+use canopen::Frame;
+
+/// Frames and their bits, since the last look and in all.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Count {
+    frames: u32,
+    bits: u64,
+    pub(super) total: u64,
+}
+
+/// What was counted in a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Rate {
+    /// Frames a second.
+    pub(super) frames: f64,
+    /// Bits a second.
+    bits: f64,
+}
+
+/// Bits of a frame with an 11-bit identifier, interframe space included, and about how many stuff bits there are: one for
+/// sixteen bits that can be stuffed, between what counters and what zeros have.
+fn bits(frame: &Frame) -> u64 {
+    let data = if frame.is_remote() { 0 } else { 8 * frame.len() as u64 };
+    47 + data + (34 + data) / 16
+}
+
+impl Count {
+    pub(super) fn add(&mut self, frame: &Frame) {
+        self.frames = self.frames.saturating_add(1);
+        self.bits += bits(frame);
+        self.total += 1;
+    }
+
+    /// The rate over so many seconds; the count begins anew.
+    #[allow(clippy::cast_precision_loss)]
+    pub(super) fn rate(&mut self, seconds: f64) -> Rate {
+        let (frames, bits) = (std::mem::take(&mut self.frames), std::mem::take(&mut self.bits));
+        if seconds <= 0.0 {
+            return Rate::default();
+        }
+        Rate { frames: (f64::from(frames) / seconds).round(), bits: bits as f64 / seconds }
+    }
+}
+
+impl Rate {
+    /// The share of a bus, 0 to 1.
+    pub(super) fn load(self, kbit: Option<u16>) -> Option<f64> {
+        let share = self.bits / (f64::from(kbit?) * 1000.0);
+        Some((share.min(1.0) * 10_000.0).round() / 10_000.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_bus_is_full() {
+        let mut count = Count::default();
+        let frame = Frame::new(0x181, &[0x55; 8]).unwrap();
+        // 111 bits and 6 stuff bits: 8547 frames at 1 Mbit/s.
+        (0..8547).for_each(|_| count.add(&frame));
+        let rate = count.rate(1.0);
+        assert_eq!(rate.load(Some(1000)), Some(1.0));
+        assert_eq!(rate.load(Some(500)), Some(1.0));
+        assert_eq!((rate.load(None), count.total), (None, 8547));
+        (0..854).for_each(|_| count.add(&frame));
+        assert_eq!(count.rate(1.0).load(Some(1000)), Some(0.0999));
+        assert_eq!(count.rate(1.0), Rate::default());
+    }
+}

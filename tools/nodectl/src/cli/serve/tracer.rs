@@ -1,0 +1,114 @@
+//! Frames in words, for the pages that want a trace.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use canopen::{Frame, Instant, NodeId};
+use serde::Serialize;
+
+use crate::Catalogue;
+use crate::trace::{Decoder, Kind, Knowledge, Line, Shown};
+use crate::value::Value;
+
+/// Rows between two events; what comes on top is counted. A bus at 1 Mbit/s has 450 frames in that time.
+const ROWS: usize = 1000;
+
+/// A row that is ready to be sent.
+pub(super) struct Row {
+    pub(super) kind: Kind,
+    pub(super) node: Option<NodeId>,
+    pub(super) json: String,
+}
+
+/// The decoder, and the rows since the last event.
+#[derive(Default)]
+pub(super) struct Tracer {
+    decoder: Decoder,
+    pub(super) rows: Vec<Row>,
+    /// Rows that did not fit.
+    pub(super) lost: u64,
+}
+
+#[derive(Serialize)]
+struct Shape<'l> {
+    t: f64,
+    id: u16,
+    kind: Kind,
+    node: Option<u8>,
+    text: &'l str,
+    data: String,
+    sent: bool,
+    values: Vec<Cell<'l>>,
+    abort: Option<u32>,
+}
+
+#[derive(Serialize)]
+struct Cell<'l> {
+    index: u16,
+    sub: u8,
+    name: &'l str,
+    value: Option<&'l Value>,
+    unit: &'l str,
+    meaning: Option<&'l str>,
+}
+
+impl Tracer {
+    /// Tells what a node is; what it has configured is then as after a reset, until the trace shows something else.
+    pub(super) fn know(&mut self, node: NodeId, catalogue: &Arc<Catalogue>) {
+        self.decoder.know(node, Knowledge::new(Arc::clone(catalogue)));
+    }
+
+    /// Tells what a node was asked for.
+    pub(super) fn learn(&mut self, node: NodeId, knowledge: Knowledge) {
+        self.decoder.know(node, knowledge);
+    }
+
+    /// A frame was on the bus, or was sent by this side.
+    pub(super) fn on_frame(&mut self, frame: &Frame, stamp: Instant, t: f64, sent: bool) {
+        for line in self.decoder.on_frame(frame, stamp) {
+            if self.rows.len() < ROWS {
+                self.rows.push(row(&line, t, sent));
+            } else {
+                self.lost += 1;
+            }
+        }
+    }
+
+    /// The rows since the last call, and how many did not fit.
+    pub(super) fn take(&mut self) -> (Vec<Row>, u64) {
+        (std::mem::take(&mut self.rows), std::mem::take(&mut self.lost))
+    }
+}
+
+fn row(line: &Line, t: f64, sent: bool) -> Row {
+    let mut data = String::with_capacity(16);
+    // Writing to a string cannot fail.
+    for byte in &line.data {
+        let _ = write!(data, "{byte:02X}");
+    }
+    let shape = Shape {
+        t,
+        id: line.id,
+        kind: line.kind,
+        node: line.node.map(NodeId::get),
+        text: &line.text,
+        data,
+        sent,
+        values: line.values.iter().map(Cell::of).collect(),
+        abort: line.abort,
+    };
+    Row { kind: line.kind, node: line.node, json: serde_json::to_string(&shape).unwrap_or_default() }
+}
+
+impl Cell<'_> {
+    fn of(shown: &Shown) -> Cell<'_> {
+        Cell {
+            index: shown.at.index,
+            sub: shown.at.sub,
+            name: &shown.name,
+            value: shown.value.as_ref(),
+            unit: &shown.unit,
+            meaning: shown.meaning.as_deref(),
+        }
+    }
+}

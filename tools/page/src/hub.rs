@@ -1,0 +1,203 @@
+//! The pages that are there, and what waits for each: bounded, so that a slow page costs memory no more than so much.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::Notify;
+
+/// Bytes that may wait for a page before events for it have to be left out.
+const ROOM: usize = 512 * 1024;
+/// Pages that are connected at the same time.
+const PAGES: usize = 32;
+/// Bytes that may wait at all: a page that lets so many answers wait is let go.
+const MOST: usize = 16 * 1024 * 1024;
+
+/// Names a page for as long as it is connected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PageId(u64);
+
+/// What a page does.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FromPage {
+    /// It has connected.
+    Came {
+        /// Which one.
+        page: PageId,
+        /// Whether it may change something.
+        writes: bool,
+    },
+    /// It has said something.
+    Said {
+        /// Which one.
+        page: PageId,
+        /// What; of any form.
+        text: String,
+    },
+    /// It is gone.
+    Left {
+        /// Which one.
+        page: PageId,
+    },
+}
+
+/// All pages.
+#[derive(Default)]
+pub struct Hub {
+    pages: Mutex<Pages>,
+}
+
+#[derive(Default)]
+struct Pages {
+    next: u64,
+    outboxes: BTreeMap<PageId, Arc<Outbox>>,
+}
+
+/// What waits for one page.
+#[derive(Default)]
+pub(crate) struct Outbox {
+    waiting: Mutex<Waiting>,
+    news: Notify,
+}
+
+#[derive(Default)]
+struct Waiting {
+    texts: VecDeque<String>,
+    bytes: usize,
+    is_closed: bool,
+}
+
+/// What a page is to be sent next.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Next {
+    Text(String),
+    Close,
+}
+
+impl Hub {
+    /// Sends a text. It waits until the page takes it; nothing happens when there is no such page.
+    pub fn send(&self, page: PageId, text: String) {
+        if let Some(outbox) = self.outbox(page) {
+            outbox.push(text);
+        }
+    }
+
+    /// Whether a page has room for an event.
+    #[must_use]
+    pub fn has_room(&self, page: PageId) -> bool {
+        self.outbox(page).is_some_and(|outbox| outbox.waiting().bytes < ROOM)
+    }
+
+    /// Lets go of a page; what waits for it is still sent.
+    pub fn close(&self, page: PageId) {
+        if let Some(outbox) = self.outbox(page) {
+            outbox.waiting().is_closed = true;
+            outbox.news.notify_one();
+        }
+    }
+
+    /// A place for another page; `None` when there are enough.
+    pub(crate) fn enter(&self) -> Option<(PageId, Arc<Outbox>)> {
+        let mut pages = self.pages();
+        if pages.outboxes.len() == PAGES {
+            return None;
+        }
+        pages.next += 1;
+        let (page, outbox) = (PageId(pages.next), Arc::new(Outbox::default()));
+        pages.outboxes.insert(page, Arc::clone(&outbox));
+        Some((page, outbox))
+    }
+
+    pub(crate) fn leave(&self, page: PageId) {
+        self.pages().outboxes.remove(&page);
+    }
+
+    fn outbox(&self, page: PageId) -> Option<Arc<Outbox>> {
+        self.pages().outboxes.get(&page).cloned()
+    }
+
+    /// Nobody panics while holding it; if somebody did, the lists would still be whole.
+    fn pages(&self) -> MutexGuard<'_, Pages> {
+        self.pages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Outbox {
+    fn push(&self, text: String) {
+        let mut waiting = self.waiting();
+        if waiting.bytes + text.len() > MOST {
+            (waiting.texts, waiting.is_closed) = (VecDeque::new(), true);
+        } else if !waiting.is_closed {
+            waiting.bytes += text.len();
+            waiting.texts.push_back(text);
+        }
+        drop(waiting);
+        self.news.notify_one();
+    }
+
+    /// Waits for something to send.
+    pub(crate) async fn next(&self) -> Next {
+        loop {
+            if let Some(next) = self.take() {
+                return next;
+            }
+            self.news.notified().await;
+        }
+    }
+
+    fn take(&self) -> Option<Next> {
+        let mut waiting = self.waiting();
+        match waiting.texts.pop_front() {
+            Some(text) => {
+                waiting.bytes -= text.len();
+                Some(Next::Text(text))
+            }
+            None => waiting.is_closed.then_some(Next::Close),
+        }
+    }
+
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_that_does_not_read_has_no_room_and_at_last_is_let_go() {
+        let hub = Hub::default();
+        let (page, outbox) = hub.enter().unwrap();
+        assert!(hub.has_room(page));
+        hub.send(page, "x".repeat(ROOM));
+        assert!(!hub.has_room(page));
+        let answers = (MOST - ROOM) / ROOM;
+        (0..answers).for_each(|_| hub.send(page, "x".repeat(ROOM)));
+        assert!(matches!(outbox.take(), Some(Next::Text(_))), "answers wait");
+        (0..2).for_each(|_| hub.send(page, "x".repeat(ROOM)));
+        assert_eq!(outbox.take(), Some(Next::Close));
+    }
+
+    #[test]
+    fn pages_come_and_go_each_with_its_own_texts() {
+        let hub = Hub::default();
+        let ((one, first), (two, second)) = (hub.enter().unwrap(), hub.enter().unwrap());
+        hub.send(one, "a".into());
+        hub.send(two, "b".into());
+        hub.leave(one);
+        hub.send(one, "c".into());
+        hub.close(two);
+        assert_eq!((first.take(), first.take()), (Some(Next::Text("a".into())), None));
+        assert_eq!((second.take(), second.take()), (Some(Next::Text("b".into())), Some(Next::Close)));
+        assert!(!hub.has_room(one));
+    }
+
+    #[test]
+    fn there_are_so_many_places_and_who_leaves_makes_room() {
+        let hub = Hub::default();
+        let pages: Vec<PageId> = (0..PAGES).map(|_| hub.enter().unwrap().0).collect();
+        assert!(hub.enter().is_none());
+        hub.leave(pages[0]);
+        assert!(hub.enter().is_some_and(|(page, _)| !pages.contains(&page)));
+    }
+}

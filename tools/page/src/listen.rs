@@ -1,0 +1,103 @@
+//! The port, and the connections at it.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener as StdListener};
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::sleep;
+
+use crate::access::{Access, Token};
+use crate::hub::{FromPage, Hub};
+use crate::routes::{Site, router};
+
+/// Connections that are open at the same time. A browser opens up to six for a page.
+const CONNECTIONS: usize = 128;
+/// How long a request may take to arrive; a connection that says nothing is closed then.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Ports that are tried when the first is taken.
+const PORTS: u16 = 20;
+
+/// Where the server is.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Address and port; port 0 takes a free one.
+    pub address: SocketAddr,
+}
+
+/// A server that runs until the process ends.
+pub struct Server {
+    /// What it listens on.
+    pub address: SocketAddr,
+    /// What a browser opens.
+    pub url: String,
+    /// The pages.
+    pub hub: Arc<Hub>,
+}
+
+/// Starts the server on a thread of its own. `listener` is told what pages do; it must not wait.
+///
+/// # Errors
+/// The address cannot be had, and none of the next ports.
+pub fn start(options: &Options, listener: impl Fn(FromPage) + Send + Sync + 'static) -> io::Result<Server> {
+    let socket = bind(options.address)?;
+    socket.set_nonblocking(true)?;
+    let (address, token) = (socket.local_addr()?, Token::random()?);
+    let hub = Arc::new(Hub::default());
+    let access = Access::new(address, token);
+    let url = url(&access, address);
+    let site = Site { access, hub: Arc::clone(&hub), listener: Arc::new(listener) };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let run = move || runtime.block_on(accept(socket, router(site)));
+    thread::Builder::new().name("page".to_owned()).spawn(run)?;
+    Ok(Server { address, url, hub })
+}
+
+/// The address, or the next free port after it.
+fn bind(address: SocketAddr) -> io::Result<StdListener> {
+    let ports = (address.port()..=address.port().saturating_add(PORTS - 1)).filter(|_| address.port() != 0);
+    for port in ports {
+        match StdListener::bind(SocketAddr::new(address.ip(), port)) {
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => {}
+            result => return result,
+        }
+    }
+    if address.port() == 0 { StdListener::bind(address) } else { Err(io::ErrorKind::AddrInUse.into()) }
+}
+
+fn url(access: &Access, address: SocketAddr) -> String {
+    if access.is_local() {
+        return format!("http://{address}/");
+    }
+    format!("http://{address}/?token={}", access.token().as_str())
+}
+
+async fn accept(socket: StdListener, router: Router) {
+    let Ok(listener) = TcpListener::from_std(socket) else { return };
+    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    // The semaphore is never closed.
+    while let Ok(place) = Arc::clone(&places).acquire_owned().await {
+        match listener.accept().await {
+            Ok((stream, _)) => drop(tokio::spawn(connection(stream, router.clone(), place))),
+            // The host has no room for another; it may have later.
+            Err(_) => sleep(Duration::from_millis(100)).await,
+        }
+    }
+}
+
+async fn connection(stream: TcpStream, router: Router, _place: OwnedSemaphorePermit) {
+    // An event is one small write that must not wait for the next.
+    let _ = stream.set_nodelay(true);
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(64 * 1024);
+    let service = TowerToHyperService::new(router);
+    // A connection that fails is its own business.
+    let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
+}

@@ -1,0 +1,83 @@
+//! One page at its WebSocket.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::body::Bytes;
+use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use tokio::time::{Instant, sleep_until, timeout};
+
+use crate::hub::{FromPage, Hub, Next, Outbox, PageId};
+use crate::pace::Pace;
+
+/// The largest message of a page: a firmware image in base64, or the configuration of a large device.
+pub(crate) const LARGEST: usize = 2 * 1024 * 1024;
+/// How often a page that says nothing is asked whether it is there.
+const PING: Duration = Duration::from_secs(10);
+/// For so long a page may say nothing, and take nothing.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Who is told what pages do.
+pub(crate) type Listener = dyn Fn(FromPage) + Send + Sync;
+
+/// Serves a page until it leaves, or is let go.
+pub(crate) async fn serve(mut socket: WebSocket, writes: bool, hub: Arc<Hub>, listener: Arc<Listener>) {
+    let code = match hub.enter() {
+        Some((page, outbox)) => {
+            listener(FromPage::Came { page, writes });
+            let code = converse(&mut socket, page, &outbox, &*listener).await;
+            hub.leave(page);
+            listener(FromPage::Left { page });
+            code
+        }
+        None => Some(close_code::AGAIN),
+    };
+    if let Some(code) = code {
+        let farewell = Message::Close(Some(CloseFrame { code, reason: "".into() }));
+        // A page that is gone needs none.
+        let _ = timeout(PING, socket.send(farewell)).await;
+    }
+}
+
+/// Both directions; returns with which code the connection is to be closed, where it is not already.
+async fn converse(socket: &mut WebSocket, page: PageId, outbox: &Outbox, listener: &Listener) -> Option<u16> {
+    let mut pace = Pace::new(Instant::now());
+    let mut heard = Instant::now();
+    let mut ping = heard + PING;
+    loop {
+        let open_at = pace.next();
+        let message = async {
+            sleep_until(open_at).await;
+            socket.recv().await
+        };
+        tokio::select! {
+            message = message => {
+                heard = Instant::now();
+                pace.count(heard);
+                match message {
+                    Some(Ok(Message::Text(text))) => listener(FromPage::Said { page, text: text.to_string() }),
+                    // The service answers that this is no message of the protocol.
+                    Some(Ok(Message::Binary(_))) => listener(FromPage::Said { page, text: String::new() }),
+                    Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+                    Some(Ok(Message::Close(_)) | Err(_)) | None => return None,
+                }
+            }
+            next = outbox.next() => match next {
+                Next::Text(text) => send(socket, Message::Text(text.into())).await?,
+                Next::Close => return Some(close_code::POLICY),
+            },
+            () = sleep_until(ping) => {
+                if heard.elapsed() > PATIENCE {
+                    return Some(close_code::AWAY);
+                }
+                ping = Instant::now() + PING;
+                send(socket, Message::Ping(Bytes::new())).await?;
+            }
+        }
+    }
+}
+
+/// `None` for a page that does not take it.
+async fn send(socket: &mut WebSocket, message: Message) -> Option<()> {
+    timeout(PATIENCE, socket.send(message)).await.ok()?.ok()
+}

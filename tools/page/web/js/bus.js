@@ -1,0 +1,86 @@
+// What the page knows of the bus: who is there, how it is, who is chosen. Views listen to it.
+
+export class Bus extends EventTarget {
+  constructor(connection) {
+    super();
+    this.connection = connection;
+    this.hello = null;
+    this.status = null;
+    this.nodes = new Map();
+    this.chosen = null;
+    this.faults = [];
+    connection.on("hello", (hello) => this.#greet(hello));
+    connection.on("status", (status) => this.#update("status", status));
+    connection.on("nodes", (message) => this.#takeNodes(message));
+    connection.on("emcy", (emcy) => this.#takeFault({ ...emcy, kind: "emcy" }));
+    connection.on("state", (state) => this.#takeState(state));
+    connection.on("connected", () => this.#tell("connected"));
+  }
+
+  request(...what) {
+    return this.connection.request(...what);
+  }
+
+  on(name, listener) {
+    this.addEventListener(name, ({ detail }) => listener(detail));
+  }
+
+  /** The nodes in the order of their IDs. */
+  list() {
+    return [...this.nodes.values()].sort((a, b) => a.node - b.node);
+  }
+
+  /** The node that the views are about. */
+  node() {
+    return this.nodes.get(this.chosen) ?? null;
+  }
+
+  choose(node) {
+    if (node === this.chosen || !this.nodes.has(node)) return;
+    this.chosen = node;
+    this.#tell("chosen");
+  }
+
+  get writes() {
+    return this.hello?.writes ?? false;
+  }
+
+  #greet(hello) {
+    // Another run of the bus has a time axis of its own.
+    if (this.hello && hello.t < (this.status?.t ?? 0)) this.#forgetTimes();
+    this.#update("hello", hello);
+  }
+
+  #forgetTimes() {
+    this.faults = [];
+    this.#tell("restart");
+  }
+
+  #takeNodes({ all, nodes }) {
+    if (all) this.nodes.clear();
+    for (const node of nodes) this.nodes.set(node.node, node);
+    if (!this.nodes.has(this.chosen)) this.chosen = this.list()[0]?.node ?? null;
+    this.#tell("nodes");
+    if (this.lastChosen !== this.chosen) this.#tell("chosen");
+    this.lastChosen = this.chosen;
+  }
+
+  #takeState(event) {
+    this.#takeFault({ ...event, kind: "state", text: event.state, active: event.state === "initialising" });
+  }
+
+  #takeFault(fault) {
+    this.faults.push(fault);
+    if (this.faults.length > 500) this.faults.shift();
+    this.#tell("fault", fault);
+  }
+
+  #update(name, value) {
+    this[name] = value;
+    this.#tell(name, value);
+  }
+
+  #tell(name, detail = null) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+}

@@ -1,0 +1,106 @@
+// An encoder: preset, and the cams on a dial.
+
+import { button, el, field, select, svg, text } from "../dom.js";
+import { number, signalKey } from "../format.js";
+import { outcome } from "../outcome.js";
+import { objectField, readAll, write } from "../parts/objects.js";
+import { arc, point } from "./dial.js";
+
+const CAMS = 8;
+const [UNITS, RANGE, PRESET, POSITION] = [0x6001, 0x6002, 0x6003, 0x6004];
+const [STATES, ENABLES, POLARITIES, LOW, HIGH, HYSTERESIS] = [0x6300, 0x6301, 0x6302, 0x6310, 0x6320, 0x6330];
+
+export class Encoder {
+  constructor(bus, recorder) {
+    Object.assign(this, { bus, recorder, cams: [], turn: 1, scale: "turn" });
+    this.position = el("output", { class: "big" }, "-");
+    this.preset = objectField(bus, "Preset", PRESET, 0, "The position now becomes this value.");
+    this.result = outcome();
+    this.rows = el("tbody");
+    this.needle = svg("line", { x1: 110, y1: 110, class: "needle" });
+    this.arcs = svg("g");
+    this.dial = svg("svg", { viewBox: "0 0 220 220", class: "dial", role: "img" }, svg("circle", { cx: 110, cy: 110, r: 100, class: "rim" }), this.arcs, this.needle);
+    this.element = this.#layout();
+  }
+
+  static isFor(personality) {
+    return personality === "encoder" || personality === "combined";
+  }
+
+  get keys() {
+    return [signalKey(this.bus.chosen, POSITION, 0), signalKey(this.bus.chosen, STATES, 1)];
+  }
+
+  async show() {
+    await this.preset.show();
+    await this.#readCams();
+  }
+
+  draw() {
+    const [position, states] = this.keys.map((key) => this.recorder.of(key).newest);
+    if (position == null) return;
+    text(this.position, `${number(position)} units`);
+    const [x, y] = point(this.#angle(position), 96);
+    this.needle.setAttribute("x2", x);
+    this.needle.setAttribute("y2", y);
+    this.#drawArcs(states ?? 0);
+    this.dial.setAttribute("aria-label", `Position ${number(position)}, cams on: ${this.#on(states ?? 0) || "none"}`);
+  }
+
+  #layout() {
+    const scale = select([["turn", "one revolution"], ["range", "the whole range"]], "turn", (value) => ((this.scale = value), this.draw()));
+    const head = ["Cam", "On", "Inverted", "Low", "High", "Hysteresis"].map((name) => el("th", { scope: "col" }, name));
+    const table = el("table", { class: "cams" }, el("caption", { class: "unseen" }, "Cams of channel 1"), el("thead", {}, el("tr", {}, head)), this.rows);
+    return el("section", { class: "box", "aria-labelledby": "encoder-title" }, el("h3", { id: "encoder-title" }, "Encoder"),
+      el("div", { class: "bar" }, this.position), this.preset.element, el("h4", {}, "Cams of channel 1"),
+      el("div", { class: "split" }, el("div", {}, this.dial, field("Dial", scale)), el("div", { class: "wide" }, table)), el("div", { class: "bar" }, button("Write the cams", () => this.#write())), this.result.line);
+  }
+
+  async #readCams() {
+    const limits = Array.from({ length: CAMS }, (_, cam) => [LOW, HIGH, HYSTERESIS].map((first) => [first + cam, 1])).flat();
+    const [turn, range, enables, polarities, ...values] = await readAll(this.bus, [[UNITS, 0], [RANGE, 0], [ENABLES, 1], [POLARITIES, 1], ...limits]);
+    Object.assign(this, { turn, range });
+    this.cams = Array.from({ length: CAMS }, (_, cam) => ({ on: (enables >> cam) & 1, inverted: (polarities >> cam) & 1, low: values[3 * cam], high: values[3 * cam + 1], hysteresis: values[3 * cam + 2] }));
+    this.#showRows();
+    this.draw();
+  }
+
+  #showRows() {
+    this.rows.replaceChildren(...this.cams.map((cam, at) => {
+      const box = (name) => cell(el("input", { type: "checkbox", "aria-label": `Cam ${at + 1} ${name}`, prop: { checked: cam[name] === 1 }, on: { change: (event) => ((cam[name] = Number(event.target.checked)), this.draw()) } }));
+      const limit = (name) => cell(el("input", { type: "number", "aria-label": `Cam ${at + 1} ${name}`, prop: { value: cam[name] }, on: { input: (event) => ((cam[name] = Number(event.target.value)), this.draw()) } }));
+      return el("tr", {}, el("th", { scope: "row" }, String(at + 1)), box("on"), box("inverted"), limit("low"), limit("high"), limit("hysteresis"));
+    }));
+  }
+
+  #write() {
+    return this.result.of("writing", this.#writeAll(), "cams written; save them in the overview");
+  }
+
+  async #writeAll() {
+    for (const [at, cam] of this.cams.entries()) {
+      for (const [first, name] of [[LOW, "low"], [HIGH, "high"], [HYSTERESIS, "hysteresis"]]) await write(this.bus, first + at, 1, cam[name]);
+    }
+    const mask = (name) => this.cams.reduce((bits, cam, at) => bits | (cam[name] << at), 0);
+    await write(this.bus, POLARITIES, 1, mask("inverted"));
+    await write(this.bus, ENABLES, 1, mask("on"));
+  }
+
+  #angle(position) {
+    const whole = this.scale === "turn" ? this.turn : this.range;
+    return ((position % whole) / whole) * 360;
+  }
+
+  #drawArcs(states) {
+    const arcs = this.cams.map((cam, at) => (cam.on ? svg("path", { d: arc(this.#angle(cam.low), this.#angle(cam.high), 92 - at * 8), class: "cam", "data-on": (states >> at) & 1 ? "yes" : null }) : null));
+    this.arcs.replaceChildren(...arcs.filter(Boolean));
+  }
+
+  #on(states) {
+    return this.cams.map((_, at) => at + 1).filter((cam) => (states >> (cam - 1)) & 1).join(", ");
+  }
+}
+
+function cell(content) {
+  return el("td", {}, content);
+}

@@ -1,0 +1,108 @@
+// One WebSocket to the server: requests with their answers, events, and a new connection when the old one is lost.
+
+const RETRY_MS = 1000;
+const WENT_AWAY = "the server has gone away";
+
+/** What an answer with an error becomes. `abort` is the SDO abort code where a node has refused. */
+export class Refusal extends Error {
+  constructor(message, abort = null) {
+    super(message);
+    this.abort = abort;
+  }
+}
+
+export class Connection extends EventTarget {
+  #socket = null;
+  #open = new Map();
+  #lastId = 0;
+  #token;
+
+  constructor(token) {
+    super();
+    this.#token = token;
+    this.connected = false;
+  }
+
+  /** Connects, and again whenever the connection is lost. */
+  start() {
+    const url = new URL("ws", location.href);
+    url.protocol = url.protocol.replace("http", "ws");
+    url.search = new URLSearchParams({ token: this.#token });
+    const socket = new WebSocket(url);
+    socket.addEventListener("message", (message) => this.#receive(message.data));
+    socket.addEventListener("close", () => this.#lost());
+    this.#socket = socket;
+  }
+
+  /** Asks the server. `onProgress` is called with each step. The promise fails with a `Refusal`. */
+  request(what, keys = {}, onProgress = null) {
+    if (!this.connected) return Promise.reject(new Refusal(WENT_AWAY));
+    this.#lastId += 1;
+    const id = this.#lastId;
+    return new Promise((resolve, reject) => {
+      this.#open.set(id, { resolve, reject, onProgress });
+      this.#socket.send(JSON.stringify({ id, do: what, ...keys }));
+    });
+  }
+
+  /** Calls `listener` with each event of a name. */
+  on(name, listener) {
+    this.addEventListener(name, ({ detail }) => listener(detail));
+  }
+
+  #receive(data) {
+    const message = JSON.parse(data);
+    if (message.event) return this.#tell(message);
+    const request = this.#open.get(message.id);
+    if (!request) return;
+    if (message.progress) return request.onProgress?.(message.progress);
+    this.#open.delete(message.id);
+    if (message.error == null) request.resolve(message.ok);
+    else request.reject(new Refusal(message.error, message.abort));
+  }
+
+  #tell(message) {
+    // With the first message the server has taken the connection.
+    const isFirst = message.event === "hello";
+    if (isFirst) this.connected = true;
+    this.dispatchEvent(new CustomEvent(message.event, { detail: message }));
+    if (isFirst) this.#tellConnected();
+  }
+
+  #lost() {
+    for (const { reject } of this.#open.values()) reject(new Refusal(WENT_AWAY));
+    this.#open.clear();
+    if (this.connected) this.#disconnect();
+    setTimeout(() => this.#again(), RETRY_MS);
+  }
+
+  /** A server that was started anew has another token. The page stays as it is and takes the token out of a new copy. */
+  async #again() {
+    this.#token = (await newToken()) ?? this.#token;
+    this.start();
+  }
+
+  #disconnect() {
+    this.connected = false;
+    this.#tellConnected();
+  }
+
+  #tellConnected() {
+    this.dispatchEvent(new CustomEvent("connected", { detail: this.connected }));
+  }
+}
+
+/** The token in a page. */
+export function tokenOf(page) {
+  return page.querySelector("meta[name=token]")?.content ?? "";
+}
+
+async function newToken() {
+  try {
+    const answer = await fetch(location.pathname + location.search);
+    if (!answer.ok) return null;
+    return tokenOf(new DOMParser().parseFromString(await answer.text(), "text/html"));
+  } catch {
+    return null;
+  }
+}

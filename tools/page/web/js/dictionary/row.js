@@ -1,0 +1,120 @@
+// One object of the dictionary: a line of the table, and its details below it when it is opened.
+
+import { button, el, field, newId, set, text } from "../dom.js";
+import { address, hex } from "../format.js";
+import { outcome } from "../outcome.js";
+import { check, isReadable, isWritable, rangeText } from "./check.js";
+import { keyOf } from "./filter.js";
+import { help } from "./help.js";
+
+export class Row {
+  /** `owner`: the view, with `read`, `write` and `favourites`. */
+  constructor(entry, owner) {
+    Object.assign(this, { entry, owner, key: keyOf(entry), details: null });
+    this.value = el("td", { class: "number", data: { label: "Value" } });
+    this.unit = el("td", { data: { label: "Unit" } }, knownUnit(entry));
+    this.opener = el("button", { type: "button", class: "plain", "aria-expanded": "false", on: { click: () => this.toggle() } }, address(entry.index, entry.sub));
+    this.element = el("tr", { data: { object: address(entry.index, entry.sub) } }, el("td", {}, this.#star()), el("th", { scope: "row" }, this.opener), ...this.#cells());
+  }
+
+  show(value) {
+    this.newest = value;
+    text(this.value, value.error ? "-" : shown(value));
+    if (value.unit) text(this.unit, value.unit);
+    set(this.value, "title", value.error ?? (value.raw ? `bytes ${value.raw}` : null));
+  }
+
+  toggle() {
+    if (this.details) return this.close();
+    const id = newId("details");
+    set(this.opener, "aria-expanded", "true");
+    set(this.opener, "aria-controls", id);
+    this.details = el("tr", { id, class: "details" }, el("td", { colspan: 9 }, this.#help(), this.#editor()));
+    this.element.after(this.details);
+    if (isReadable(this.entry)) this.#read();
+  }
+
+  close() {
+    set(this.opener, "aria-expanded", "false");
+    this.details?.remove();
+    this.details = null;
+  }
+
+  remove() {
+    this.close();
+    this.element.remove();
+  }
+
+  #cells() {
+    const { path, type, access } = this.entry;
+    const cell = (label, content) => el("td", { data: { label } }, content);
+    return [cell("Name", path), this.value, this.unit, cell("Type", type), cell("Access", access), cell("Limits", this.#limits()), cell("Default", this.#default())];
+  }
+
+  #limits() {
+    const { low, high } = this.entry;
+    return low == null && high == null ? "" : rangeText(this.entry);
+  }
+
+  #default() {
+    const { default: value, type } = this.entry;
+    if (value == null) return "";
+    return typeof value === "number" && value > 0xffff && /^UNSIGNED/.test(type) ? hex(value, 8) : String(value);
+  }
+
+  #star() {
+    const { favourites } = this.owner;
+    const star = button("", () => (favourites.toggle(this.key), show()), { class: "star", "aria-label": `Favourite ${this.entry.path}` });
+    const show = () => {
+      text(star, favourites.has(this.key) ? "★" : "☆");
+      set(star, "aria-pressed", String(favourites.has(this.key)));
+    };
+    show();
+    return star;
+  }
+
+  #help() {
+    const { type, access, tpdo, rpdo, parameter } = this.entry;
+    const words = help(this.entry, this.owner.bus.node()?.personality);
+    const pdo = [tpdo && "TPDO", rpdo && "RPDO"].filter(Boolean).join(" and ");
+    const facts = [type, access, rangeText(this.entry), pdo && `can be in a ${pdo}`, parameter && "part of a configuration"];
+    return [words ? el("p", {}, words) : null, el("p", { class: "hint" }, facts.filter(Boolean).join(" · "))].filter(Boolean);
+  }
+
+  #editor() {
+    this.result = outcome();
+    const read = isReadable(this.entry) && button("Read", () => this.#read());
+    if (!isWritable(this.entry)) return el("div", { class: "bar" }, read, this.result.line);
+    this.input = el("input", { autocomplete: "off", spellcheck: "false" });
+    const form = el("form", { class: "bar", novalidate: true }, field("New value", this.input), el("button", { type: "submit" }, "Write"), read);
+    form.addEventListener("submit", (event) => (event.preventDefault(), this.#write()));
+    return el("div", {}, form, this.result.line);
+  }
+
+  async #read() {
+    const value = await this.result.of("reading", this.owner.read(this.entry), (value) => value.error ?? (value.meaning ? `reads ${value.text}: ${value.meaning}` : ""));
+    if (!value) return;
+    if (value.error) this.result.bad(value.error);
+    else if (this.input && this.input.value === "" && document.activeElement !== this.input) this.input.value = value.text;
+  }
+
+  async #write() {
+    const wrong = check(this.entry, this.input.value);
+    set(this.input, "aria-invalid", wrong ? "true" : null);
+    if (wrong) return this.result.bad(wrong);
+    const said = (value) => (value?.text == null ? "written" : `written, reads ${shown(value)}`);
+    const value = await this.result.of("writing", this.owner.write(this.entry, this.input.value.trim()), said);
+    set(this.input, "aria-invalid", value ? null : "true");
+  }
+}
+
+/** The unit that the data sheet has. Where it has the object that tells the unit (6131h), a read brings the unit. */
+function knownUnit({ unit }) {
+  return /^[0-9A-F]{4}h/.test(unit) ? "" : unit;
+}
+
+/** A value with what it stands for; the unit has a column of its own where the data sheet has a unit. */
+function shown({ text: value, meaning }) {
+  const known = value ?? "";
+  return meaning ? `${known} (${meaning})` : known;
+}

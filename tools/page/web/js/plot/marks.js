@@ -1,0 +1,34 @@
+// Faults on the time axis of a chart: a line where one came, a thinner one where it went.
+
+import { colour } from "./theme.js";
+
+export function drawMarks(chart, faults) {
+  const { ctx, chartArea: area, scales: { x } } = chart;
+  ctx.save();
+  for (const fault of faults) {
+    if (fault.t < x.min || fault.t > x.max) continue;
+    mark(ctx, area, x.getPixelForValue(fault.t), fault);
+  }
+  ctx.restore();
+}
+
+function mark(ctx, { top, bottom }, at, { kind, active }) {
+  ctx.strokeStyle = ctx.fillStyle = colour(colourOf(kind, active));
+  ctx.lineWidth = active ? 2 : 1;
+  ctx.setLineDash(active ? [] : [3, 3]);
+  ctx.beginPath();
+  ctx.moveTo(at, top);
+  ctx.lineTo(at, bottom);
+  ctx.stroke();
+  ctx.beginPath();
+  ctx.moveTo(at - 5, top);
+  ctx.lineTo(at + 5, top);
+  ctx.lineTo(at, top + 8);
+  ctx.fill();
+}
+
+/** The name of the colour of a fault. */
+export function colourOf(kind, active) {
+  if (kind === "state") return "muted";
+  return active ? "bad" : "good";
+}

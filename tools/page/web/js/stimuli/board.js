@@ -1,0 +1,61 @@
+// The knobs of one board: what its sensors see, its buttons, its faults.
+
+import { button, el } from "../dom.js";
+import { outcome } from "../outcome.js";
+import { toggle } from "../parts/switch.js";
+import { Quantity } from "./quantity.js";
+
+const KELVIN = 273.15;
+
+const QUANTITIES = [
+  { kind: "pressure", name: "Pressure", unit: "bar", low: 0, high: 10, step: 0.01, start: 2.5, factor: 100_000 },
+  { kind: "temperature", name: "Temperature of the chip", unit: "°C", low: -40, high: 125, step: 0.5, start: 25, factor: 1, offset: KELVIN },
+  { kind: "thermistor", name: "Thermistor", unit: "°C", low: -40, high: 125, step: 0.5, start: 25, factor: 1, offset: KELVIN },
+  { kind: "shaft", name: "Shaft", unit: "revolutions", low: -10, high: 10, step: 0.01, start: 0, factor: 1, rpm: true },
+];
+
+export class Board {
+  constructor(bus, board, faults) {
+    Object.assign(this, { bus, id: board.board, buttons: [] });
+    this.result = outcome();
+    this.quantities = QUANTITIES.map((quantity) => new Quantity(quantity, (kind, spec) => this.#send(kind, spec)));
+    this.switches = new Map(faults.map((fault) => [fault.name, this.#fault(fault)]));
+    this.buttons = board.buttons.map((_, at) => this.#button(at + 1));
+    const title = `Board ${board.board}${board.node == null ? "" : `: node ${board.node}, ${board.personality ?? "-"}`}`;
+    this.element = el("fieldset", { class: "box board", data: { board: board.board } }, el("legend", {}, title), this.quantities.map(({ element }) => element),
+      el("fieldset", {}, el("legend", {}, "Faults"), el("div", { class: "switches" }, [...this.switches.values()].map(({ element }) => element))),
+      el("div", { class: "group", role: "group", "aria-label": "Buttons" }, this.buttons), this.result.line);
+    this.show(board);
+  }
+
+  show(board) {
+    for (const quantity of this.quantities) if (board[quantity.kind]) quantity.show(board[quantity.kind]);
+    for (const [name, { box }] of this.switches) box.checked = board.faults.includes(name);
+  }
+
+  #fault({ name, text }) {
+    return toggle(name.replaceAll("-", " "), false, (on) => this.#request("fault", `${name}:${on ? "on" : "off"}`), { title: text });
+  }
+
+  /** A button is down as long as it is held, by mouse, finger or the space bar. */
+  #button(number) {
+    const send = (state) => this.#send("button", `${number}:${state}`);
+    const element = button(`Button ${number}`, () => {});
+    let isDown = false;
+    const press = (down) => isDown !== down && ((isDown = down), send(down ? "down" : "up"));
+    for (const name of ["pointerdown", "keydown"]) element.addEventListener(name, (event) => (event.key ?? " ") === " " && press(true));
+    for (const name of ["pointerup", "pointerleave", "keyup", "blur"]) element.addEventListener(name, () => press(false));
+    return element;
+  }
+
+  #send(kind, spec) {
+    return this.#request(kind, spec).catch(() => {});
+  }
+
+  async #request(kind, spec) {
+    const request = this.bus.request("stimulate", { board: this.id, kind, spec });
+    this.result.clear();
+    await request.catch((error) => this.result.bad(error));
+    return request;
+  }
+}

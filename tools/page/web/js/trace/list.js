@@ -1,0 +1,60 @@
+// The list of the trace: the newest rows, one of which is chosen by mouse or by Up and Down.
+
+import { el, set } from "../dom.js";
+import { hex } from "../format.js";
+
+/** So many rows are in the list; the browser draws no more in time on a full bus. */
+const SHOWN = 400;
+
+export class List {
+  constructor(onChoose) {
+    this.onChoose = onChoose;
+    this.chosen = null;
+    this.body = el("tbody");
+    const head = ["Time s", "CAN-ID", "Kind", "Node", "What"].map((name) => el("th", { scope: "col" }, name));
+    const table = el("table", { class: "frames" }, el("caption", { class: "unseen" }, "Frames, the newest at the end"), el("thead", {}, el("tr", {}, head)), this.body);
+    this.element = el("div", { class: "wide scroll", tabindex: 0, role: "group", "aria-label": "Frames", on: { keydown: (event) => this.#key(event) } }, table);
+    this.body.addEventListener("click", (event) => this.#choose(event.target.closest("tr")));
+  }
+
+  append(rows) {
+    const last = rows.slice(-SHOWN);
+    this.body.append(...last.map(line));
+    for (let excess = this.body.childElementCount - SHOWN; excess > 0; excess -= 1) this.body.firstChild.remove();
+  }
+
+  replace(rows) {
+    this.body.replaceChildren();
+    this.append(rows);
+  }
+
+  toEnd() {
+    this.element.scrollTop = this.element.scrollHeight;
+  }
+
+  #key(event) {
+    const step = { ArrowDown: "nextElementSibling", ArrowUp: "previousElementSibling" }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    const from = this.chosen?.isConnected ? this.chosen[step] : this.body.lastElementChild;
+    this.#choose(from);
+  }
+
+  #choose(element) {
+    if (!element) return;
+    set(this.chosen ?? element, "aria-selected", null);
+    set(element, "aria-selected", "true");
+    this.chosen = element;
+    element.scrollIntoView({ block: "nearest" });
+    this.onChoose(element.row);
+  }
+}
+
+function line(row) {
+  if (row.gap) return el("tr", { class: "gap" }, el("td", { colspan: 5 }, `${row.gap} rows were dropped here: the page was too slow`));
+  const { t, id, kind, node, text, abort } = row;
+  const element = el("tr", { data: { kind, ...(abort == null ? {} : { abort: "yes" }) } },
+    el("td", { class: "number" }, t.toFixed(6)), el("td", {}, hex(id, 3)), el("td", {}, kind), el("td", {}, node ?? "-"), el("td", {}, text));
+  element.row = row;
+  return element;
+}

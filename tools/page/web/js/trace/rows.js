@@ -1,0 +1,55 @@
+// The rows of the trace: those that are kept, and which of them are wanted.
+
+/** So many rows are kept; older ones go, and that is said. */
+export const KEPT = 20_000;
+
+export const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
+
+export class Rows {
+  constructor() {
+    this.rows = [];
+    this.lost = 0;
+    this.forgotten = 0;
+    this.number = 0;
+  }
+
+  /** Takes an event of the trace. What the server dropped before it becomes a row of its own. */
+  take({ lost, rows }) {
+    const fresh = lost > 0 ? [{ gap: lost }, ...rows] : rows;
+    for (const row of fresh) row.number = this.number += 1;
+    this.lost += lost;
+    this.rows.push(...fresh);
+    const excess = this.rows.length - KEPT;
+    if (excess > KEPT / 10) {
+      this.rows.splice(0, excess);
+      this.forgotten += excess;
+    }
+    return fresh;
+  }
+
+  clear() {
+    this.rows = [];
+  }
+}
+
+/** What of the trace is shown. */
+export class Filter {
+  constructor() {
+    this.kinds = new Set(KINDS);
+    this.node = "";
+    this.words = [];
+  }
+
+  setText(text) {
+    this.words = text.toLowerCase().split(/\s+/).filter(Boolean);
+  }
+
+  /** A gap is shown whatever the filter: the rows that are missing may have been wanted. */
+  wants(row) {
+    if (row.gap) return true;
+    if (!this.kinds.has(row.kind)) return false;
+    if (this.node !== "" && String(row.node) !== this.node) return false;
+    const text = `${row.text} ${row.id.toString(16)}h`.toLowerCase();
+    return this.words.every((word) => text.includes(word));
+  }
+}
