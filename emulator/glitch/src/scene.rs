@@ -1,5 +1,7 @@
 //! What lies in the flash when a board is switched on, and what the bootloader has to make of it.
 
+use std::sync::LazyLock;
+
 use anyhow::{Result, ensure};
 use bsp::sectors;
 use bsp::update_layout::LAYOUT;
@@ -78,6 +80,8 @@ impl Scene {
     }
 }
 
+static PUBLIC_KEYS: LazyLock<[[u8; 32]; 1]> = LazyLock::new(|| [owner().verifying_key().to_bytes()]);
+
 fn owner() -> SigningKey {
     SigningKey::from_bytes(&OWNER)
 }
@@ -143,6 +147,5 @@ fn waiting(image: &[u8]) -> Result<Vec<u8>> {
 }
 
 fn target() -> Target {
-    let keys = Vec::leak(vec![owner().verifying_key().to_bytes()]);
-    Target { layout: LAYOUT, product: product::BOARD, hardware: 0, keys }
+    Target { layout: LAYOUT, product: product::BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
 }

@@ -67,7 +67,7 @@ mod tests {
     fn lines(probe: Option<&str>) -> Vec<String> {
         let board = Board { chip: "STM32F446RETx".into(), probe: probe.map(str::to_owned) };
         let files =
-            Files { bootloader: Path::new("bootloader"), image: Path::new("a.img"), address: 0x0801_0000 };
+            Files { bootloader: Path::new("bootloader"), image: Path::new("a.img"), address: 0x0802_0000 };
         let log = board.log(Path::new("firmware"));
         board.write(files).iter().chain([&log]).map(line).collect()
     }
@@ -76,7 +76,7 @@ mod tests {
     fn the_bootloader_comes_first_and_the_log_last() {
         let expected = [
             "probe-rs download --chip STM32F446RETx bootloader",
-            "probe-rs download --chip STM32F446RETx --binary-format bin --base-address 0x08010000 a.img",
+            "probe-rs download --chip STM32F446RETx --binary-format bin --base-address 0x08020000 a.img",
             "probe-rs reset --chip STM32F446RETx",
             "probe-rs attach --chip STM32F446RETx firmware",
         ];

@@ -26,7 +26,7 @@ pub(super) fn builds_for_host() -> Vec<Step> {
 pub(super) fn builds_for_target() -> Vec<Step> {
     vec![
         Step::new("system packages", || setup::install(setup::TEST)),
-        Step::new("bootloader of an owner", || images::compile_owner(&Toolchain::ensure()?)),
+        Step::new("bootloader of an owner", || images::check_owners(&Toolchain::ensure()?)),
         Step::new("build images", || images::compile_all(&Toolchain::ensure()?)),
         Step::new("build bench images", || bench::build(&bench::Options::default()).map(|_| ())),
     ]

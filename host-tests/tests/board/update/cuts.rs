@@ -14,17 +14,17 @@ use crate::support::SECOND;
 const MARK: u32 = 0x2001_0000;
 /// Never comes.
 const NO_CUT: u64 = u64::MAX >> 1;
-/// The operations of a copy: two sectors, the program, the mark that it is done.
-const COPY: u64 = 2 + 133 + 1;
+/// The operations of a copy: a sector, the program, the mark that it is done.
+const COPY: u64 = 1 + 133 + 1;
 /// Of so many cuts in the copy, two are followed by another one.
 const SECOND_CUTS: u64 = 7;
-/// The longest that a recovery takes: two erases, and a start.
+/// The longest that a recovery takes: an erase, and a start.
 const PATIENCE: u32 = 200;
 
 /// Stack pointer, reset vector, and `ldr r0, [pc, #4]`, `str r0, [r0]`, `b .` with the address of the mark (the code starts
-/// at 0801 0200h).
+/// at 0802 0200h).
 fn small() -> Image {
-    let words: [u32; 5] = [0x2000_4000, 0x0801_0209, 0x6000_4801, 0xBF00_E7FE, MARK];
+    let words: [u32; 5] = [0x2000_4000, 0x0802_0209, 0x6000_4801, 0xBF00_E7FE, MARK];
     signed(words.iter().flat_map(|word| word.to_le_bytes()).collect(), |_| ())
 }
 
