@@ -38,9 +38,10 @@ pub(crate) fn decide(loader: &mut Loader) -> Outcome {
         retained::forget_proof();
     }
     let start = Start { stay: note.is_some_and(|note| note.stay), trial, proof: retained::proof() };
-    match update::boot(&mut loader.flash, &TARGET, start) {
-        Decision::Start(header) => {
-            retained::set_proof(&header);
+    let mut seal = 0;
+    match update::boot_sealed(&mut loader.flash, &TARGET, start, &mut seal) {
+        Decision::Start(_) => {
+            retained::set_proof(seal);
             application::vectors().map_or(stay(Stay::Asked, note), Outcome::Application)
         }
         Decision::Copy => Outcome::Stay(Reason::Copy, note),
@@ -56,7 +57,8 @@ fn stay(why: Stay, note: Option<Handover>) -> Outcome {
 /// An application that a debugger has put there: vectors that can be, and no header at all. A bootloader for development starts it.
 #[cfg(feature = "development")]
 pub(crate) fn unsigned() -> Option<Vectors> {
-    application::vectors().filter(|_| application::has_no_header())
+    let vectors = application::vectors().filter(|_| application::has_no_header());
+    vectors.inspect(|_| retained::set_proof(application::SEAL_OF_NO_HEADER))
 }
 
 /// Nothing starts that was not signed.

@@ -26,7 +26,8 @@ pub enum Proof {
     /// Nothing, as after power-on: it is checked.
     #[default]
     None,
-    /// It was found good since power-on, of the image whose header has this CRC: for that image the CRC of the code is enough.
+    /// It was found good since power-on, of the image whose header has this CRC: for that image the CRC of the code is enough. It is
+    /// the word that [`boot_sealed`] has left then.
     Of(u32),
     /// It does not matter now, as another start will decide.
     Waived,
@@ -76,6 +77,12 @@ impl Stay {
 ///
 /// `flash` must not be busy.
 pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {
+    boot_sealed(flash, target, start, &mut 0)
+}
+
+/// The same, with a word that is the CRC of the application's header when its signature is or was found good, by other means than
+/// the decision; what the word was before is lost. To start the application without this word is not allowed: see crate bsp.
+pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal: &mut u32) -> Decision {
     let commit = commit(flash, target);
     let crashes = start.trial.crashes();
     if let Ok(header) = proven(flash, target, start.proof) {
@@ -90,7 +97,7 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
     if crashes >= Trial::LIMIT {
         return Decision::Stay(Stay::Crashes(crashes));
     }
-    match application(flash, target, start.proof) {
+    match sealed(flash, target, start.proof, seal) {
         Ok(header) => {
             if start.proof != Proof::Waived {
                 note(flash, target, &header);
@@ -132,6 +139,10 @@ fn note<F: Flash>(flash: &mut F, target: &Target, header: &Header) {
 /// # Errors
 /// Why it may not be started.
 pub fn application<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Result<Header, Refusal> {
+    sealed(flash, target, proof, &mut 0)
+}
+
+fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32) -> Result<Header, Refusal> {
     let area = target.layout.application();
     let header = image::header(flash, area)?;
     target.admit(flash, &header)?;
@@ -139,6 +150,10 @@ pub fn application<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Re
     let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
     loop {
         if let Some(header) = check.step(flash, target)? {
+            *seal = if let Proof::Of(word) = proof { word } else { 0 };
+            if !is_proven {
+                *seal = check.seal();
+            }
             return Ok(header);
         }
     }

@@ -105,6 +105,11 @@ impl FullCheck {
         }
     }
 
+    /// The CRC of the header once the signature is known to be good; another word before, and with any other signature.
+    pub(crate) fn seal(&self) -> u32 {
+        self.signature.as_ref().map_or(0, |signature| signature.seal(self.header.crc()))
+    }
+
     fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<Option<Header>, Refusal> {
         let message = &mut self.message;
         if !self.crc.step(flash, |bytes| message.iter_mut().for_each(|message| message.add(bytes)))? {

@@ -61,6 +61,7 @@ pub mod key;
 pub mod mock;
 mod receive;
 mod refusal;
+mod seal;
 mod security;
 mod signature;
 mod status;
@@ -69,7 +70,7 @@ mod trial;
 mod updater;
 
 pub use area::{Area, Layout};
-pub use boot::{Decision, Proof, Start, Stay, application, boot};
+pub use boot::{Decision, Proof, Start, Stay, application, boot, boot_sealed};
 pub use flash::Flash;
 pub use header::{Description, HEADER_LEN, Header, SIGNATURE_LEN, SIGNED_LEN, Version};
 pub use refusal::Refusal;

@@ -1,6 +1,6 @@
 //! The application slot as the bootloader sees it.
 
-use super::memory;
+use super::{memory, retained};
 use crate::vectors::Vectors;
 
 /// The vectors of the application; `None` when the slot holds nothing that could be started.
@@ -20,12 +20,19 @@ pub fn has_no_header() -> bool {
     bytes.iter().all(|byte| *byte == 0xFF)
 }
 
+/// What stands for the seal of an application without a header.
+pub const SEAL_OF_NO_HEADER: u32 = u32::MAX;
+
 /// Starts the application as a reset would. Nothing of the caller goes on: interrupts are off until the application has
 /// its own vector table, and its stack replaces the caller's.
 ///
 /// The caller must not have started a peripheral that writes to memory by itself; the bootloader starts none.
+///
+/// The application starts with its seal only (see [`update::boot_sealed`]): with any other word in RAM neither its vectors nor its
+/// entry are where this function goes, and the watchdog resets the chip.
 pub fn start(core: &cortex_m::Peripherals, vectors: Vectors) -> ! {
-    let table = memory::application().start;
+    let wrong = retained::seal() ^ memory::header_crc();
+    let table = memory::application().start ^ wrong;
     cortex_m::interrupt::disable();
     // SAFETY: the slot is aligned as VTOR wants it (memory.x), `vectors` is checked, and this function does not return, so
     // nobody misses the stack. Interrupts are enabled again as a reset leaves them; none of them is in the NVIC.
@@ -37,6 +44,6 @@ pub fn start(core: &cortex_m::Peripherals, vectors: Vectors) -> ! {
         core.SCB.vtor.write(table);
         cortex_m::asm::dsb();
         cortex_m::interrupt::enable();
-        cortex_m::asm::bootstrap(vectors.stack() as *const u32, vectors.reset() as *const u32)
+        cortex_m::asm::bootstrap(vectors.stack() as *const u32, (vectors.reset() ^ wrong) as *const u32)
     }
 }

@@ -77,6 +77,11 @@ pub(super) fn header() -> &'static [u8; HEADER_LEN] {
     unsafe { &*(erasable().start as *const [u8; HEADER_LEN]) }
 }
 
+/// The CRC at the end of the application's header, right or not.
+pub(super) fn header_crc() -> u32 {
+    header().last_chunk().map_or(0, |crc| u32::from_le_bytes(*crc))
+}
+
 fn own_crc() -> u32 {
     let start = application().start;
     let end = (&raw const _program_end) as u32;

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use update::{Header, Proof, Trial};
+use update::{Proof, Trial};
 
 use crate::crash_record::{self, WORDS};
 use crate::handover::{self, Handover};
@@ -61,10 +61,15 @@ pub fn proof() -> Proof {
     if complement == !crc { Proof::Of(crc) } else { Proof::None }
 }
 
-/// Keeps that the signature of the image with this header was found good.
-pub fn set_proof(header: &Header) {
-    let crc = header.crc();
-    store(&RETAINED.proven, [crc, !crc]);
+/// Keeps the word of [`update::boot_sealed`].
+pub fn set_proof(seal: u32) {
+    store(&RETAINED.proven, [seal, !seal]);
+}
+
+/// The word as it is now, whatever it is.
+pub(super) fn seal() -> u32 {
+    let [seal, _] = load(&RETAINED.proven);
+    seal
 }
 
 /// Power came: nothing is proven.
