@@ -107,8 +107,9 @@ impl Services {
         let now = Clock::now();
         let next = self.call(node, |protocol, out| protocol.poll_services(now, out));
         let next = self.settle(next, node);
-        if now >= CONFIRMATION && self.is_well(node) {
-            retained::set_trial(retained::trial().confirmed());
+        let trial = retained::trial();
+        if now >= CONFIRMATION && trial != trial.confirmed() && self.is_well(node) {
+            retained::set_trial(trial.confirmed());
         }
         self.led.set(blink(now));
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));

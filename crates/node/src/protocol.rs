@@ -70,7 +70,8 @@ impl Protocol {
     /// Whether the node does what it is for: it has said its boot-up message, and values were measured.
     #[must_use]
     pub fn is_at_work(&self) -> bool {
-        self.state() != State::Initialising && !matches!(self.device.application().snapshot, Snapshot::Nothing)
+        self.state() != State::Initialising
+            && !matches!(self.device.application().snapshot, Snapshot::Nothing)
     }
 
     /// A frame of FIFO 0: NMT, SYNC, RPDO, or a remote request for a TPDO.

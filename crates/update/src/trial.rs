@@ -3,8 +3,8 @@
 /// The count, kept in RAM that survives a reset (region `RETAINED` of memory.x).
 ///
 /// The bootloader takes it from RAM at every start, counts the reset, puts it back, and asks [`crate::boot`]. The
-/// application [confirms](Trial::confirmed) ten seconds after its start, if it is on the bus and measures then, else as soon as it is. A start that is asked for (1F51h = 1)
-/// confirms too: it is another try.
+/// application [confirms](Trial::confirmed) ten seconds after its start if it is on the bus and measures then, else as soon as it does. A
+/// start that is asked for (1F51h = 1) confirms too: it is another try.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Trial(u8);
 
