@@ -23,6 +23,14 @@ pub struct Extent {
     pub boards: usize,
 }
 
+/// What a campaign asks and tells meanwhile.
+pub struct Watcher<'a> {
+    /// Whether the instruction at this address is to be disturbed.
+    pub takes: &'a (dyn Fn(u32) -> bool + Sync),
+    /// A fault has made run what may not.
+    pub broken: &'a (dyn Fn(Violation) + Sync),
+}
+
 /// What runs more often is a loop of the hashes, of the sums, or of the arithmetic of points: wrong there is the number, not the
 /// decision.
 pub const OFTEN: u64 = 66;
@@ -56,7 +64,7 @@ impl Campaign {
     ///
     /// # Errors
     /// The image is none for the board, or the decision is wrong without any fault.
-    pub fn run(bootloader: &[u8], scene: &Scene, extent: Extent) -> Result<Campaign> {
+    pub fn run(bootloader: &[u8], scene: &Scene, extent: Extent, watcher: &Watcher<'_>) -> Result<Campaign> {
         let mut rig = Rig::new(bootloader)?;
         let (visits, outcome) = rig.survey(scene)?;
         let expected = if scene.has_good { Outcome::Good } else { Outcome::Stays };
@@ -71,7 +79,9 @@ impl Campaign {
         let shares = chosen.chunks(chosen.len().div_ceil(extent.boards.max(1)).max(1));
         let parts: Vec<Result<Campaign>> = thread::scope(|scope| {
             let boards: Vec<_> = shares
-                .map(|share| scope.spawn(|| part(bootloader, scene, share, extent.flips, &undisturbed)))
+                .map(|share| {
+                    scope.spawn(|| part(bootloader, scene, share, extent.flips, &undisturbed, watcher))
+                })
                 .collect();
             boards.into_iter().map(|board| board.join().map_err(|_| anyhow!("a board was lost"))?).collect()
         });
@@ -127,6 +137,7 @@ fn part(
     points: &[Point],
     flips: usize,
     undisturbed: &[u8],
+    watcher: &Watcher<'_>,
 ) -> Result<Campaign> {
     let mut campaign = Campaign::default();
     let mut rig = Rig::new(bootloader)?;
@@ -138,6 +149,9 @@ fn part(
         for fault in rig.skips().into_iter().chain(some_flips(point, flips)) {
             let outcome = rig.disturb(fault, scene.has_good)?;
             campaign.note(point, fault, outcome);
+            if outcome == Outcome::Broken {
+                (watcher.broken)(Violation { point, fault });
+            }
             rig.go_back(&moment)?;
         }
     }

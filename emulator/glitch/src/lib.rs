@@ -19,7 +19,7 @@ mod program;
 mod rig;
 mod scene;
 
-pub use campaign::{Campaign, Extent, OFTEN, Violation};
+pub use campaign::{Campaign, Extent, OFTEN, Violation, Watcher};
 pub use places::Places;
 pub use rig::{Fault, Outcome};
 pub use scene::Scene;

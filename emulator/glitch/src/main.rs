@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
-use glitch::{Campaign, Extent, Places, Scene};
+use glitch::{Campaign, Extent, Places, Scene, Violation, Watcher};
 
 /// Skips each instruction of the bootloader's decision, and flips bits of registers before it: nothing that is unsigned or older may
 /// start.
@@ -19,6 +19,9 @@ struct Cli {
     /// Only scenes whose name contains this
     #[arg(long)]
     scene: Option<String>,
+    /// Only functions whose name contains this; may be given more than once
+    #[arg(long)]
+    within: Vec<String>,
     /// Take every so many instructions
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every: u16,
@@ -51,22 +54,23 @@ fn run(cli: &Cli) -> Result<()> {
         flips: cli.flips,
         boards,
     };
+    let broken = |Violation { point, fault }: Violation| {
+        println!("  BROKEN {fault:?}, visit {}: {}", point.visit, places.name(point.address));
+    };
+    let takes = |address| {
+        let name = places.name(address);
+        cli.within.is_empty() || cli.within.iter().any(|part| name.contains(part.as_str()))
+    };
+    let watcher = Watcher { takes: &takes, broken: &broken };
     let mut violations = 0;
     for scene in Scene::all()? {
         if cli.scene.as_ref().is_some_and(|name| !scene.name.contains(name.as_str())) {
             continue;
         }
         let begin = Instant::now();
-        let campaign = Campaign::run(&bootloader, &scene, extent)?;
-        print(&scene, &campaign, begin.elapsed().as_secs_f64());
-        for violation in &campaign.violations {
-            println!(
-                "  BROKEN {:?}, visit {}: {}",
-                violation.fault,
-                violation.point.visit,
-                places.name(violation.point.address)
-            );
-        }
+        println!("{}: {}", scene.name, scene.what);
+        let campaign = Campaign::run(&bootloader, &scene, extent, &watcher)?;
+        print(&campaign, begin.elapsed().as_secs_f64());
         violations += campaign.violations.len();
     }
     ensure!(violations == 0, "{violations} faults made run what may not");
@@ -74,8 +78,7 @@ fn run(cli: &Cli) -> Result<()> {
     Ok(())
 }
 
-fn print(scene: &Scene, campaign: &Campaign, seconds: f64) {
-    println!("{}: {}", scene.name, scene.what);
+fn print(campaign: &Campaign, seconds: f64) {
     let Campaign { instructions, loops, points, .. } = campaign;
     println!("  {instructions} instructions, {loops} of them in loops of hashes, sums and points");
     println!("  {} faults at {points} points, {seconds:.0} s", campaign.faults());

@@ -12,17 +12,20 @@ pub(crate) const GOOD: u32 = 0x600D_600D;
 pub(crate) const BAD: u32 = 0x0BAD_0BAD;
 
 const STACK: u32 = 0x2002_0000;
+/// Entry and exceptions: a fault on the way to the application is no way into it.
+const VECTORS: u32 = 15;
 const NOP: u16 = 0xBF00;
 /// Instructions that do nothing in front of those that do something: a jump to the wrong place is seen too.
 const SLED: usize = 56;
 
 /// The code of an application that leaves this word, with its vector table.
 pub(crate) fn code(word: u32) -> Vec<u8> {
-    let entry = FLASH + LAYOUT.application().start() + HEADER_LEN as u32 + 8;
+    let entry = FLASH + LAYOUT.application().start() + HEADER_LEN as u32 + 4 * (1 + VECTORS);
     // ldr r0, =PLACE; ldr r1, =word; str r1, [r0]; b .
     let says = [0x4801, 0x4902, 0x6001, 0xE7FE];
     let instructions = [NOP; SLED].into_iter().chain(says);
-    let mut code = [STACK, entry | 1].map(u32::to_le_bytes).concat();
+    let vectors = std::iter::once(STACK).chain((0..VECTORS).map(|_| entry | 1));
+    let mut code: Vec<u8> = vectors.flat_map(u32::to_le_bytes).collect();
     code.extend(instructions.flat_map(u16::to_le_bytes));
     code.extend([PLACE, word].map(u32::to_le_bytes).concat());
     code

@@ -8,7 +8,7 @@ use chip::{Board, Stm32f4, Variant};
 use emulator::{Machine, Model, Moment, Point, Stop};
 
 use crate::program::{BAD, GOOD, PLACE};
-use crate::scene::{Scene, Start};
+use crate::scene::{Begin, Scene};
 
 const FLASH: u32 = 512 * 1024;
 /// Where code runs that was copied from flash.
@@ -65,12 +65,12 @@ impl Rig {
     pub(crate) fn start(&mut self, scene: &Scene, stops: Vec<Point>) -> Result<()> {
         self.machine.unwatch()?;
         self.machine.power_off();
-        let first = if scene.start == Start::Reset { &Scene::good()? } else { &scene.flash };
+        let first = if scene.begin == Begin::Reset { &Scene::good()? } else { &scene.flash };
         self.machine.set_flash(first)?;
         self.machine.load_elf(&self.bootloader)?;
         let now = self.machine.now();
         self.machine.power_on(now);
-        if scene.start == Start::Reset {
+        if scene.begin == Begin::Reset {
             self.exchange(&scene.flash)?;
         }
         Ok(self.machine.watch(stops)?)

@@ -2,13 +2,15 @@
 
 use std::sync::LazyLock;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use bsp::sectors;
 use bsp::update_layout::LAYOUT;
 use ed25519_dalek::SigningKey;
 use sign::image::Image;
 use update::mock::MockFlash;
-use update::{Description, HEADER_LEN, Next, Phase, Status, Target, Updater, Version};
+use update::{
+    Decision, Description, Flash, HEADER_LEN, Next, Phase, Start, Status, Target, Updater, Version,
+};
 
 use crate::program::{BAD, GOOD, code};
 
@@ -19,7 +21,7 @@ const OLDER: u32 = 2;
 
 /// How it comes to the decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Start {
+pub(crate) enum Begin {
     /// Power comes.
     Power,
     /// The watchdog resets the chip, after an application has run whose signature was found good. This is the flash from then on.
@@ -34,7 +36,7 @@ pub struct Scene {
     /// What the program is that must not run.
     pub what: &'static str,
     pub(crate) flash: Vec<u8>,
-    pub(crate) start: Start,
+    pub(crate) begin: Begin,
     /// Another program has to run; else the bootloader stays.
     pub(crate) has_good: bool,
 }
@@ -48,16 +50,16 @@ impl Scene {
         let bare = |application: &[u8]| with(erased(), application);
         let unsigned = unsigned()?.to_bytes();
         let headless = [&[0xFF; HEADER_LEN][..], &code(BAD)].concat();
-        let alone = |name, what, flash, start| Scene { name, what, flash, start, has_good: false };
-        let staged = |name, what, flash| Scene { name, what, flash, start: Start::Power, has_good: true };
+        let alone = |name, what, flash, begin| Scene { name, what, flash, begin, has_good: false };
+        let staged = |name, what, flash| Scene { name, what, flash, begin: Begin::Power, has_good: true };
         Ok(vec![
-            alone("unsigned", "an application that nobody has signed", bare(&unsigned), Start::Power),
-            alone("bare", "an application without a header", bare(&headless), Start::Power),
+            alone("unsigned", "an application that nobody has signed", bare(&unsigned), Begin::Power),
+            alone("bare", "an application without a header", bare(&headless), Begin::Power),
             alone(
                 "exchanged",
                 "an application that took the place of a signed one before a reset",
                 bare(&unsigned),
-                Start::Reset,
+                Begin::Reset,
             ),
             staged(
                 "older",
@@ -123,12 +125,15 @@ fn put(flash: &mut [u8], at: u32, bytes: &[u8]) {
     flash[at as usize..at as usize + bytes.len()].copy_from_slice(bytes);
 }
 
-/// A flash in which an image waits to be copied over the good application. The record that says so was made for an image that was
-/// good: whoever can write the flash writes the record too.
+/// A flash in which an image waits to be copied over the good application, which has run. The record that says so was made for an
+/// image that was good: whoever can write the flash writes the record too.
 fn waiting(image: &[u8]) -> Result<Vec<u8>> {
-    let target = Target { layout: LAYOUT, product: product::BOARD, hardware: 0, keys: &*PUBLIC_KEYS };
     let mut flash = MockFlash::new(&sizes(), 1);
-    let mut updater = Updater::new(&mut flash, target, Status::GOOD);
+    let erased = flash.program(LAYOUT.application().start(), &newer()?.to_bytes());
+    ensure!(erased.is_ok(), "the power of a mock is cut when a test says so");
+    let decision = update::boot(&mut flash, &target(), Start::default());
+    ensure!(matches!(decision, Decision::Start(_)), "the application is good: {decision:?}");
+    let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
     updater.clear()?;
     while updater.poll() != Next::Nothing {}
     updater.begin(None)?;
@@ -136,10 +141,11 @@ fn waiting(image: &[u8]) -> Result<Vec<u8>> {
     updater.finish()?;
     while updater.poll() != Next::Nothing {}
     ensure!(updater.phase() == Phase::Committed, "the image is good: {}", updater.status());
-    let mut flash = with(flash.bytes().to_vec(), &newer()?.to_bytes());
-    let staging = LAYOUT.staging().start();
-    put(&mut flash, staging, image);
-    let length = u32::try_from(image.len()).context("an image of some hundred bytes")?;
-    put(&mut flash, staging + length, &[0xFF; 4]);
+    let mut flash = flash.bytes().to_vec();
+    put(&mut flash, LAYOUT.staging().start(), image);
     Ok(flash)
+}
+
+fn target() -> Target {
+    Target { layout: LAYOUT, product: product::BOARD, hardware: 0, keys: &*PUBLIC_KEYS }
 }

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use glitch::{Campaign, Extent, Places, Scene};
+use glitch::{Campaign, Extent, Places, Scene, Watcher};
 
 /// $NODE_IMAGES, or where cargo puts them.
 fn bootloader() -> Vec<u8> {
@@ -24,7 +24,8 @@ fn extent() -> Extent {
 fn holds(name: &str) {
     let bootloader = bootloader();
     let scene = Scene::all().unwrap().into_iter().find(|scene| scene.name == name).unwrap();
-    let campaign = Campaign::run(&bootloader, &scene, extent()).unwrap();
+    let watcher = Watcher { takes: &|_| true, broken: &|_| () };
+    let campaign = Campaign::run(&bootloader, &scene, extent(), &watcher).unwrap();
     println!("{name}: {} faults at {} points: {:?}", campaign.faults(), campaign.points, campaign.outcomes);
     let places = Places::of(&bootloader).unwrap();
     let broken = campaign
