@@ -1,7 +1,7 @@
 //! The web server of `nodectl serve`: it has the files of the page inside itself, takes WebSockets from browsers, and carries
 //! texts between them and a service that knows the bus. What the texts say is in `PROTOCOL.md`; nothing here reads them.
 //!
-//! Whoever may connect is decided by [`access`]; what waits for a page is bounded ([`Hub`]), so that a page that does not
+//! Whoever may connect is decided by the module `access`; what waits for a page is bounded ([`Hub`]), so that a page that does not
 //! read, says nonsense or says nothing at all costs the others nothing.
 #![forbid(unsafe_code)]
 

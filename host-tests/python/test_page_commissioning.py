@@ -1,0 +1,146 @@
+"""What is done once with a node, on the page in a real browser: its zero, its preset, its cams, its node-ID, its lift, and the files it leaves."""
+
+import csv
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+from page import Page, Server, browser
+from selenium.webdriver.common.keys import Keys
+from simulator import Simulator
+
+PRESSURE, ENCODER, LIFT, NEW = 1, 2, 33, 5
+#: A board that has a number on the simulator and no node-ID on the bus.
+WITHOUT_ID = 201
+PROCESS_VALUE = "Pressure process value"
+PANEL = "#view-commissioning section"
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    nodes = [f"{PRESSURE}:pressure", f"{ENCODER}:encoder", f"{LIFT}:lift", f"{WITHOUT_ID}:pressure"]
+    flags = [word for node in nodes for word in ("--node", node)]
+    simulator = Simulator("--bitrate", "500", "--pressure", "const:200000", "--control", "127.0.0.1:0", *flags, speed="real")
+    yield simulator
+    simulator.process.kill()
+
+
+@pytest.fixture(scope="module")
+def driver():
+    driver = browser()
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def page(driver, simulator: Simulator):
+    server = Server(simulator)
+    page = Page(driver, server.url)
+    for node in (PRESSURE, ENCODER, LIFT):
+        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.press("Start all")
+    for node in (PRESSURE, ENCODER, LIFT):
+        page.says(f"tr[data-node='{node}'] td[data-label=State]", "operational")
+    yield page
+    assert page.console() == []
+    server.stop()
+
+
+def commission(page: Page, node: int) -> None:
+    page.view("commissioning")
+    page.choose("Node", str(node))
+
+
+def write(page: Page, label: str, text: str) -> None:
+    page.fill(label, text).send_keys(Keys.ENTER)
+
+
+def shown(page: Page) -> float:
+    """The number that the panel shows large."""
+    text = page.text(f"{PANEL}:not([hidden]) output.big")
+    return float(text.split()[0]) if text[:1] not in ("", "-") or text[1:2].isdigit() else float("nan")
+
+
+def test_the_present_pressure_becomes_zero(page: Page):
+    page.write(PRESSURE, 0x1800, 5, 10)
+    commission(page, PRESSURE)
+    page.until(lambda: abs(shown(page) - 2) < 0.02, "show two bar")
+    page.press("Auto-zero")
+    page.says(PANEL, "the present pressure is zero now")
+    page.until(lambda: abs(shown(page)) < 0.02, "show zero")
+    page.until(lambda: abs(float(page.field("Offset").get_attribute("value")) + 2) < 0.02, "show the offset that the node has found")
+    write(page, "Offset", "0")
+    page.until(lambda: abs(shown(page) - 2) < 0.02, "show two bar again")
+
+
+def test_the_span_is_written_and_what_the_node_makes_of_it_is_shown(page: Page):
+    commission(page, PRESSURE)
+    page.until(lambda: page.field("Span end").get_attribute("value") == "10", "show the span")
+    write(page, "Span end", "4")
+    page.says(PANEL, "written, reads 4")
+    write(page, "Span end", "10")
+    page.says(PANEL, "written, reads 10")
+
+
+def test_the_position_takes_its_preset(page: Page):
+    page.write(ENCODER, 0x1800, 5, 10)
+    commission(page, ENCODER)
+    write(page, "Preset", "1000")
+    page.says(PANEL + ":not([hidden]) .object-field", "written, reads 1000")
+    page.until(lambda: shown(page) == 1000, "show the preset")
+
+
+def test_a_cam_is_on_where_it_was_put_on_the_dial(page: Page):
+    commission(page, ENCODER)
+    page.until(lambda: shown(page) == 1000, "show the position")
+    dial = lambda: page.script("return document.querySelector('.dial').ariaLabel")
+    page.until(lambda: "cams on: none" in dial(), "have no cam on")
+    for name, value in (("low", "900"), ("high", "1100")):
+        box = page.find(f"input[aria-label='Cam 1 {name}']")
+        box.send_keys(Keys.CONTROL, "a")
+        box.send_keys(value)
+    page.find("input[aria-label='Cam 1 on']").click()
+    page.press("Write the cams")
+    page.says(PANEL + ":not([hidden])", "cams written")
+    assert [page.read(ENCODER, index, 1) for index in (0x6310, 0x6320, 0x6301)] == [900, 1100, 1]
+    page.until(lambda: "cams on: 1" in dial() or page.read(ENCODER, 0x6300, 1) == 1, "have the cam on")
+
+
+def test_the_car_of_a_lift_is_shown_and_its_virtual_devices_are_chosen(page: Page):
+    commission(page, LIFT)
+    page.until(lambda: page.script("return document.querySelector('.shaft').ariaLabel"), "draw the car")
+    before = page.read(LIFT, 0x2305)
+    for wanted in (before ^ 8, before):
+        page.field("Output panel").click()
+        page.until(lambda: page.read(LIFT, 0x2305) == wanted, "choose the output panel")
+
+
+def test_a_node_without_a_node_id_is_found_and_gets_one(page: Page):
+    page.view("commissioning")
+    page.press("Find a node without a node-ID")
+    page.says(PANEL + "[aria-labelledby=lss-title]", "found vendor")
+    page.fill("Node-ID", str(NEW))
+    page.press("Give the node-ID")
+    page.says(PANEL + "[aria-labelledby=lss-title]", f"node {NEW} is there")
+    page.view("overview")
+    page.says(f"tr[data-node='{NEW}']", "STM32F4")
+
+
+def test_what_is_plotted_is_saved_as_a_table_and_as_a_drawing(page: Page, driver, tmp_path: Path):
+    driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    page.view("live")
+    page.choose("Node", str(PRESSURE))
+    page.until(lambda: len(page.drawn(PROCESS_VALUE)) > 20, "plot the pressure")
+    page.press("Pause")
+    page.press("CSV")
+    page.press("SVG")
+    names = {f"node{PRESSURE}.csv", f"node{PRESSURE}.svg"}
+    page.until(lambda: names == {file.name for file in tmp_path.iterdir()}, "save both files")
+    head, *rows = csv.reader((tmp_path / f"node{PRESSURE}.csv").open())
+    column = next(at for at, name in enumerate(head) if PROCESS_VALUE in name)
+    assert head[column].endswith("[bar]")
+    times = [float(row[0]) for row in rows]
+    assert times == sorted(times) and len(times) > 20
+    assert all(abs(float(row[column]) - 2) < 0.02 for row in rows[-5:])
+    drawing = ElementTree.parse(tmp_path / f"node{PRESSURE}.svg").getroot()
+    assert drawing.tag.endswith("svg") and any(path.get("d", "").startswith("M") for path in drawing.iter("{http://www.w3.org/2000/svg}path"))
