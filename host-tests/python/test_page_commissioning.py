@@ -55,6 +55,11 @@ def write(page: Page, label: str, text: str) -> None:
     page.fill(label, text).send_keys(Keys.ENTER)
 
 
+def cams_are_read(page: Page) -> None:
+    """The cams are the last that is read of an encoder: what is typed before would be overwritten by what was read."""
+    page.until(lambda: page.find("input[aria-label='Cam 8 low']"), "show the cams")
+
+
 def shown(page: Page) -> float:
     """The number that the panel shows large."""
     text = page.text(f"{PANEL}:not([hidden]) output.big")
@@ -85,6 +90,7 @@ def test_the_span_is_written_and_what_the_node_makes_of_it_is_shown(page: Page):
 def test_the_position_takes_its_preset(page: Page):
     page.write(ENCODER, 0x1800, 5, 10)
     commission(page, ENCODER)
+    cams_are_read(page)
     write(page, "Preset", "1000")
     page.says(PANEL + ":not([hidden]) .object-field", "written, reads 1000")
     page.until(lambda: shown(page) == 1000, "show the preset")
@@ -92,6 +98,7 @@ def test_the_position_takes_its_preset(page: Page):
 
 def test_a_cam_is_on_where_it_was_put_on_the_dial(page: Page):
     commission(page, ENCODER)
+    cams_are_read(page)
     page.until(lambda: shown(page) == 1000, "show the position")
     dial = lambda: page.script("return document.querySelector('.dial').ariaLabel")
     page.until(lambda: "cams on: none" in dial(), "have no cam on")

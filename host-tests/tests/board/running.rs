@@ -176,7 +176,7 @@ fn a_kept_flash_is_not_written_without_being_asked() {
     let mut flash = world(&flags).boards()[0].flash();
     sim::flash::save(&dir, 5, &flash).unwrap();
     assert_eq!(programs(&flags), Programs::Kept);
-    const IN_THE_APPLICATION: usize = 0x1_1000;
+    const IN_THE_APPLICATION: usize = 0x2_1000;
     flash[IN_THE_APPLICATION] ^= 1;
     sim::flash::save(&dir, 5, &flash).unwrap();
     let tampered = world(&flags);

@@ -56,7 +56,9 @@ export class Encoder {
       el("div", { class: "split" }, el("div", {}, this.dial, field("Dial", scale)), el("div", { class: "wide" }, table)), el("div", { class: "bar" }, button("Write the cams", () => this.#write())), this.result.line);
   }
 
+  /** The rows of before are gone meanwhile: what is typed into them would be lost. */
   async #readCams() {
+    this.rows.replaceChildren();
     const limits = Array.from({ length: CAMS }, (_, cam) => [LOW, HIGH, HYSTERESIS].map((first) => [first + cam, 1])).flat();
     const [turn, range, enables, polarities, ...values] = await readAll(this.bus, [[UNITS, 0], [RANGE, 0], [ENABLES, 1], [POLARITIES, 1], ...limits]);
     Object.assign(this, { turn, range });
