@@ -38,7 +38,7 @@ pub(crate) fn decide(loader: &mut Loader) -> Outcome {
         retained::forget_proof();
     }
     let start = Start { stay: note.is_some_and(|note| note.stay), trial, proof: retained::proof() };
-    let mut seal = retained::seal();
+    let mut seal = 0;
     match update::boot_sealed(&mut loader.flash, &TARGET, start, &mut seal) {
         Decision::Start(_) => {
             retained::set_proof(seal);

@@ -80,9 +80,8 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
     boot_sealed(flash, target, start, &mut 0)
 }
 
-/// The same, with the word that an earlier start has left: of the application that was found good then, it is the CRC of its header.
-/// An application that is verified now replaces the word, by other means than the decision. To start the application without this
-/// word is not allowed: see crate bsp.
+/// The same, with a word that is the CRC of the application's header when its signature is or was found good, by other means than
+/// the decision; what the word was before is lost. To start the application without this word is not allowed: see crate bsp.
 pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal: &mut u32) -> Decision {
     let commit = commit(flash, target);
     let crashes = start.trial.crashes();
@@ -151,6 +150,7 @@ fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32
     let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
     loop {
         if let Some(header) = check.step(flash, target)? {
+            *seal = if let Proof::Of(word) = proof { word } else { 0 };
             if !is_proven {
                 *seal = check.seal();
             }

@@ -16,7 +16,7 @@ use sha2::{Digest, Sha512};
 
 use crate::header::{Header, SIGNATURE_LEN};
 use crate::key::KEY_LEN;
-use crate::seal;
+use crate::seal::seal;
 
 /// Context of the signature (RFC 8032, 5.1: the octet string C).
 pub const CONTEXT: &[u8] = b"CANopen node image 1";
@@ -64,8 +64,8 @@ pub(crate) struct Verification {
     sum: EdwardsPoint,
     /// Bytes of the two numbers that were not.
     rest: usize,
-    /// 0 when R is what it must be, which only the last step finds out.
-    difference: u32,
+    /// What R has come to.
+    found: [u8; LEN],
 }
 
 impl Verification {
@@ -85,15 +85,8 @@ impl Verification {
             k.update(part);
         }
         let sum = EdwardsPoint::neutral_element();
-        let new = Verification {
-            r,
-            s,
-            k: k.finalize().into(),
-            minus_key,
-            sum,
-            rest: HASH_LEN,
-            difference: u32::MAX,
-        };
+        let new =
+            Verification { r, s, k: k.finalize().into(), minus_key, sum, rest: HASH_LEN, found: [0; LEN] };
         is_reduced(&s).then_some(new)
     }
 
@@ -104,14 +97,14 @@ impl Verification {
             self.add_byte(at);
             None
         } else {
-            self.difference = seal::difference(&self.sum.compressed().0, &self.r);
-            Some(self.difference == 0)
+            self.found = self.sum.compressed().0;
+            Some(self.found == self.r)
         }
     }
 
-    /// After the last step, the same verdict as a word: see module `seal`.
+    /// After the last step, the same verdict as a word: see [`seal`].
     pub(crate) fn seal(&self, crc: u32) -> u32 {
-        seal::seal(crc, self.difference)
+        seal(crc, &self.found, &self.r)
     }
 
     /// Doubles and adds. S has no bits beyond its 32 bytes.

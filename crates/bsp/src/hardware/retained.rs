@@ -67,7 +67,7 @@ pub fn set_proof(seal: u32) {
 }
 
 /// The word as it is now, whatever it is.
-pub fn seal() -> u32 {
+pub(super) fn seal() -> u32 {
     let [seal, _] = load(&RETAINED.proven);
     seal
 }
