@@ -74,8 +74,8 @@ impl Catalogue {
 
     /// The data sheet.
     #[must_use]
-    pub fn into_sheet(self) -> Eds {
-        self.sheet
+    pub fn sheet(&self) -> &Eds {
+        &self.sheet
     }
 
     /// What is known about an object.

@@ -1,13 +1,13 @@
 //! What the number of an object means: its unit and where its decimal point is.
 
 use canopen::sdo::Multiplexer;
-use eds::Class;
+use eds::{Class, DataType};
 
 use crate::Catalogue;
 use crate::object::at;
 use crate::sdo::{Client, Error};
 use crate::unit::symbol;
-use crate::value::Value;
+use crate::value::{Value, ValueError};
 
 /// The unit of a value, and what its number is multiplied with.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -89,6 +89,18 @@ impl Quantity {
                 Value::Decimal(number.saturating_mul(factor.into()), digits)
             }
             (_, value) => value,
+        }
+    }
+
+    /// The number on the wire of a value that somebody has typed: with a point the value is as it is meant, without one the
+    /// number itself.
+    ///
+    /// # Errors
+    /// The text is no value of this type.
+    pub fn parse(&self, text: &str, data_type: DataType) -> Result<Value, ValueError> {
+        match self.number(text) {
+            Some(number) => Value::parse(&number.to_string(), data_type),
+            None => Value::parse(text, data_type),
         }
     }
 

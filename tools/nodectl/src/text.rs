@@ -31,6 +31,17 @@ pub fn visible_lines(text: &str) -> String {
     lines.join("\n")
 }
 
+/// Bytes as pairs of hexadecimal digits.
+#[must_use]
+pub fn hex_digits(bytes: &[u8], separator: &str) -> String {
+    let mut out = String::with_capacity(bytes.len() * (2 + separator.len()));
+    for (number, byte) in bytes.iter().enumerate() {
+        let separator = if number == 0 { "" } else { separator };
+        let _ = write!(out, "{separator}{byte:02X}");
+    }
+    out
+}
+
 fn is_control(char: char) -> bool {
     let hides = matches!(u32::from(char), 0x200B..=0x200F | 0x2028..=0x202E | 0x2060..=0x206F | 0xFEFF);
     char.is_control() || hides

@@ -6,6 +6,8 @@ use eds::{Class, DataType};
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
+use crate::text::hex_digits;
+
 const UNICODE_STRING: DataType = DataType(0x0B);
 const VISIBLE_STRING: DataType = DataType(0x09);
 
@@ -233,10 +235,7 @@ impl fmt::Display for Value {
             Value::Real64(value) => f.pad(&value.to_string()),
             Value::Decimal(mantissa, digits) => f.pad(&decimal(*mantissa, (*digits).into())),
             Value::Text(text) => f.pad(text),
-            Value::Bytes(bytes) => {
-                let pairs: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-                f.pad(&pairs.join(" "))
-            }
+            Value::Bytes(bytes) => f.pad(&hex_digits(bytes, " ")),
         }
     }
 }

@@ -148,7 +148,7 @@ impl Check {
     /// its device, and another device type: no data sheet is its own then.
     fn sheet(session: &mut Session, node: NodeId) -> Result<Option<Eds>, Failure> {
         let catalogue = session.catalogue(node)?;
-        let sheet = catalogue.is_of_a_device().then(|| catalogue.into_sheet());
+        let sheet = catalogue.is_of_a_device().then(|| catalogue.sheet().clone());
         if session.options.eds.is_some() {
             return Ok(sheet);
         }

@@ -11,6 +11,7 @@ use serde::{Serialize, Serializer};
 
 use super::read::place;
 use super::replacement::Replacement;
+use super::store::{Group, Order, sign};
 use super::{Failure, Session};
 use crate::configuration::{Configuration, Difference, Write, plan};
 use crate::object::{Place, at};
@@ -59,7 +60,7 @@ pub(super) struct Apply {
 }
 
 /// So often what is still different is written again: some parameters change others.
-pub(super) const PASSES: usize = 3;
+const PASSES: usize = 3;
 
 #[derive(Serialize)]
 struct Changed {
@@ -143,60 +144,66 @@ impl Apply {
         let node = session.options.node.one()?;
         let sheet = super::session::sheet(&self.file)?;
         self.check(session, node, &sheet)?;
-        let wanted = Configuration::of_sheet(&sheet, node);
-        let (mut now, mut writes) = (session.configuration(node, &sheet)?, 0);
-        for _ in 0..PASSES {
-            let steps = plan(&sheet, &now, &wanted);
-            if self.dry_run {
-                return steps.into_iter().try_for_each(|step| session.print(&self.step(&sheet, step)));
-            }
-            if steps.is_empty() {
-                return self.finish(session, node, writes);
-            }
-            writes += steps.len();
-            write_all(session, node, &sheet, &steps)?;
-            now = session.configuration(node, &sheet)?;
+        if self.dry_run {
+            let now = session.configuration(node, &sheet)?;
+            let steps = plan(&sheet, &now, &Configuration::of_sheet(&sheet, node));
+            return steps.into_iter().try_for_each(|step| session.print(&self.step(&sheet, step)));
         }
-        let left: Vec<String> =
-            plan(&sheet, &now, &wanted).iter().map(|step| Place(step.at).to_string()).collect();
-        if left.is_empty() {
-            return self.finish(session, node, writes);
+        let written = bring(session, node, &sheet, |session| session.configuration(node, &sheet))?;
+        if self.save {
+            sign(session, node, Order::Save, Group::All)?;
         }
-        Err(Failure::NotApplied(left.join(", ")))
+        session.print(&Done { node: node.get(), writes: written.len(), saved: self.save })
     }
 
-    /// A file for another product would be refused object by object; better nothing is changed.
     fn check(&self, session: &mut Session, node: NodeId, sheet: &Eds) -> Result<(), Failure> {
-        let device = session.word(node, at(0x1018, 2))?.unwrap_or(0);
-        let product = sheet.device.product_number;
-        if device != product && !self.force {
-            let message = format!("it is for product {product:08X}h, and the node is product {device:08X}h");
-            return Err(Failure::file(&self.file, message));
+        match mismatch(session, node, sheet)? {
+            Some(words) if !self.force => Err(Failure::file(&self.file, format!("it is {words}"))),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn step(&self, sheet: &Eds, step: Write) -> Step {
         let name = sheet.get(step.at.index, step.at.sub).map(|entry| sheet.path(entry));
         Step { at: step.at, name, value: step.value }
     }
-
-    fn finish(&self, session: &mut Session, node: NodeId, writes: usize) -> Result<(), Failure> {
-        if self.save {
-            let saved = session.client(node).download(at(0x1010, 1), b"save", |_| ());
-            saved.map_err(|error| session.named(error))?;
-        }
-        session.print(&Done { node: node.get(), writes, saved: self.save })
-    }
 }
 
-/// Writes parameters in their order.
-pub(super) fn write_all(
+/// Why a file is not for a node. One for another product would be refused object by object; better nothing is changed.
+pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Result<Option<String>, Failure> {
+    let device = session.word(node, at(0x1018, 2))?.unwrap_or(0);
+    let product = sheet.device.product_number;
+    let words = || format!("for product {product:08X}h, and the node is product {device:08X}h");
+    Ok((device != product).then(words))
+}
+
+/// Writes what differs from a file until nothing does, as `read` tells. Returns what was written.
+pub(super) fn bring(
     session: &mut Session,
     node: NodeId,
     sheet: &Eds,
-    steps: &[Write],
-) -> Result<(), Failure> {
+    mut read: impl FnMut(&mut Session) -> Result<Configuration, Failure>,
+) -> Result<Vec<Write>, Failure> {
+    let wanted = Configuration::of_sheet(sheet, node);
+    let mut written = Vec::new();
+    let mut steps = plan(sheet, &read(session)?, &wanted);
+    for _ in 0..PASSES {
+        if steps.is_empty() {
+            break;
+        }
+        write_all(session, node, sheet, &steps)?;
+        written.append(&mut steps);
+        steps = plan(sheet, &read(session)?, &wanted);
+    }
+    if steps.is_empty() {
+        return Ok(written);
+    }
+    let left: Vec<String> = steps.iter().map(|step| Place(step.at).to_string()).collect();
+    Err(Failure::NotApplied(left.join(", ")))
+}
+
+/// Writes parameters in their order.
+fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) -> Result<(), Failure> {
     for step in steps {
         let Some(entry) = sheet.get(step.at.index, step.at.sub) else { continue };
         let bytes = step.value.encode(entry.data_type);

@@ -13,7 +13,6 @@ use crate::meaning;
 use crate::object::at;
 use crate::text::visible;
 use crate::update::{Program, Status};
-use crate::value;
 
 /// Longer than one heartbeat takes to come.
 const MARGIN: Duration = Duration::from_millis(200);
@@ -66,9 +65,9 @@ fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
     Ok(Report {
         node: node.get(),
         device_type: number(session, node, 0x1000, 0)?,
-        name: text(session, node, 0x1008)?,
-        hardware_version: text(session, node, 0x1009)?,
-        software_version: text(session, node, 0x100A)?,
+        name: session.text(node, 0x1008)?,
+        hardware_version: session.text(node, 0x1009)?,
+        software_version: session.text(node, 0x100A)?,
         vendor: number(session, node, 0x1018, 1)?,
         product: number(session, node, 0x1018, 2)?,
         revision: number(session, node, 0x1018, 3)?,
@@ -115,10 +114,6 @@ fn program(session: &mut Session, node: NodeId) -> Result<Option<ProgramReport>,
 fn number(session: &mut Session, node: NodeId, index: u16, sub: u8) -> Result<Option<u32>, Failure> {
     let bytes = session.optional(node, at(index, sub))?;
     Ok(bytes.map(|bytes| bytes.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte))))
-}
-
-fn text(session: &mut Session, node: NodeId, index: u16) -> Result<Option<String>, Failure> {
-    Ok(session.optional(node, at(index, 0))?.map(|bytes| value::text(&bytes)))
 }
 
 impl fmt::Display for Report {

@@ -5,7 +5,7 @@ use std::fmt;
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
 use clap::{Args, ValueEnum};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Failure, Session};
 use crate::Catalogue;
@@ -39,7 +39,8 @@ pub(super) struct Unmap {
     number: u16,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub(super) enum Direction {
     /// What the node sends.
     Tpdo,
@@ -166,10 +167,7 @@ impl Map {
         let entries: Result<Vec<u32>, Failure> =
             self.objects.iter().map(|query| self.entry(session, node, query)).collect();
         let entries = entries?;
-        let bits: u32 = entries.iter().map(|entry| entry & 0xFF).sum();
-        if bits > 64 {
-            return Err(Failure::Usage(format!("these objects have {bits} bits; a PDO has 64")));
-        }
+        let bits = fitting_bits(&entries)?;
         let before = pdo.mapped(session)?;
         let cob_id = before.cob_id & !OFF;
         let wanted = Mapped { cob_id, entries, transmission: self.transmission.or(before.transmission) };
@@ -188,7 +186,8 @@ impl Map {
     /// The entry of a mapping: index, sub-index, bits.
     fn entry(&self, session: &mut Session, node: NodeId, query: &str) -> Result<u32, Failure> {
         let object = session.find(node, query)?;
-        let slot = slot(&session.catalogue(node)?, self.direction, object);
+        let catalogue = session.catalogue(node)?;
+        let slot = slot(&catalogue, self.direction, object);
         slot.map_err(|words| Failure::Usage(format!("{query}: {words}")))
     }
 }
@@ -206,6 +205,15 @@ pub(super) fn slot(catalogue: &Catalogue, direction: Direction, object: Multiple
     let bits = catalogue.data_type(object).and_then(bits);
     let bits = bits.ok_or("no data sheet tells how many bits it has, or it is no number")?;
     Ok(u32::from(object.index) << 16 | u32::from(object.sub) << 8 | u32::from(bits))
+}
+
+/// The bits of all entries, if a PDO has room for them.
+pub(super) fn fitting_bits(entries: &[u32]) -> Result<u32, Failure> {
+    let bits = entries.iter().map(|entry| entry & 0xFF).sum();
+    if bits > 64 {
+        return Err(Failure::Usage(format!("these objects have {bits} bits; a PDO has 64")));
+    }
+    Ok(bits)
 }
 
 fn bits(data_type: eds::DataType) -> Option<u8> {

@@ -5,7 +5,7 @@ use std::fmt;
 use canopen::nmt::{self, State};
 use canopen::{Duration, NodeId};
 use clap::{Args, ValueEnum};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::node_set::NodeSet;
 use super::{Failure, Session};
@@ -27,8 +27,9 @@ pub(super) struct Nmt {
     no_wait: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Command {
+#[derive(Clone, Copy, Debug, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Command {
     /// To operational.
     Start,
     /// To stopped.
@@ -38,6 +39,7 @@ enum Command {
     /// Restart the node.
     Reset,
     /// Restart its communication.
+    #[serde(rename = "reset-communication")]
     ResetComm,
 }
 
@@ -97,7 +99,7 @@ fn is_there(session: &mut Session, node: NodeId) -> Result<bool, Failure> {
 
 impl Command {
     /// The command, and the state it leads to; none for a restart.
-    fn meaning(self) -> (nmt::Command, Option<State>) {
+    pub(super) fn meaning(self) -> (nmt::Command, Option<State>) {
         match self {
             Command::Start => (nmt::Command::Start, Some(State::Operational)),
             Command::Stop => (nmt::Command::Stop, Some(State::Stopped)),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 use canopen::nmt::State;
 use canopen::sdo::Multiplexer;
@@ -18,6 +19,7 @@ use crate::configuration::Configuration;
 use crate::object::at;
 use crate::sdo::{self, Client};
 use crate::text::visible_lines;
+use crate::value;
 use crate::{Catalogue, Network};
 
 /// The data sheets of the largest devices have a quarter of this.
@@ -33,7 +35,7 @@ pub struct Session {
     pub(super) output: Output,
     /// The data sheet of the options, once it is read.
     sheet: Option<Eds>,
-    catalogues: BTreeMap<NodeId, Catalogue>,
+    catalogues: BTreeMap<NodeId, Arc<Catalogue>>,
     /// Until when the transfers have to be over that are made for one node.
     deadline: Instant,
 }
@@ -93,9 +95,9 @@ impl Session {
     }
 
     /// What is known about a node: from the file of the options, else by its identity.
-    pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Catalogue, Failure> {
+    pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Arc<Catalogue>, Failure> {
         if let Some(known) = self.catalogues.get(&node) {
-            return Ok(known.clone());
+            return Ok(Arc::clone(known));
         }
         if self.sheet.is_none() {
             self.sheet = self.options.eds.as_deref().map(sheet).transpose()?;
@@ -104,7 +106,7 @@ impl Session {
             Some(sheet) => Catalogue::new(sheet),
             None => self.identify(node)?.unwrap_or_else(Catalogue::unknown),
         };
-        Ok(self.catalogues.entry(node).or_insert(catalogue).clone())
+        Ok(Arc::clone(self.catalogues.entry(node).or_insert(Arc::new(catalogue))))
     }
 
     /// Whether something is known about a node already.
@@ -113,13 +115,13 @@ impl Session {
     }
 
     /// Tells what is known about a node.
-    pub(super) fn know(&mut self, node: NodeId, catalogue: Catalogue) {
+    pub(super) fn know(&mut self, node: NodeId, catalogue: Arc<Catalogue>) {
         self.catalogues.insert(node, catalogue);
     }
 
     /// The data sheet of a node, for what needs one.
     pub(super) fn sheet_of(&mut self, node: NodeId) -> Result<Eds, Failure> {
-        let sheet = self.catalogue(node)?.into_sheet();
+        let sheet = self.catalogue(node)?.sheet().clone();
         if sheet.device.product_name.is_empty() {
             let node = node.get();
             return Err(Failure::Usage(format!(
@@ -131,18 +133,25 @@ impl Session {
 
     /// The values of all parameters of a node.
     pub(super) fn configuration(&mut self, node: NodeId, sheet: &Eds) -> Result<Configuration, Failure> {
+        let bar = ProgressBar::new(0).with_message(format!("reading node {}", node.get()));
+        let values = self.configuration_with(node, sheet, |done, all| {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+        });
+        bar.finish_and_clear();
+        values
+    }
+
+    /// The same; `progress` is told how many of all are read.
+    pub(super) fn configuration_with(
+        &mut self,
+        node: NodeId,
+        sheet: &Eds,
+        progress: impl FnMut(usize, usize),
+    ) -> Result<Configuration, Failure> {
         self.catalogue(node)?;
         self.begin_all();
-        let bar = ProgressBar::new(0).with_message(format!("reading node {}", node.get()));
-        let values = Configuration::of_node(
-            |at| self.client(node).upload(at),
-            sheet,
-            |done, all| {
-                bar.set_length(all as u64);
-                bar.set_position(done as u64);
-            },
-        );
-        bar.finish_and_clear();
+        let values = Configuration::of_node(|at| self.client(node).upload(at), sheet, progress);
         values.map_err(|error| self.named(error))
     }
 
@@ -154,6 +163,11 @@ impl Session {
     /// An UNSIGNED32; `None` where the node has no such object.
     pub(super) fn word(&mut self, node: NodeId, at: Multiplexer) -> Result<Option<u32>, Failure> {
         Ok(self.optional(node, at)?.and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes))
+    }
+
+    /// A VISIBLE_STRING without a sub-index; `None` where the node has no such object.
+    pub(super) fn text(&mut self, node: NodeId, index: u16) -> Result<Option<String>, Failure> {
+        Ok(self.optional(node, at(index, 0))?.map(|bytes| value::text(&bytes)))
     }
 
     /// The bytes of an object; `None` where the node does not have it, or not for us.

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
+use canopen::NodeId;
 use clap::{Args, ValueEnum};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Failure, Session};
 use crate::object::at;
@@ -25,13 +26,24 @@ pub(super) struct Restore {
 }
 
 /// A group of parameters. The discriminant is its sub-index.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 #[repr(u8)]
-enum Group {
+pub(super) enum Group {
+    #[default]
     All = 1,
     Communication = 2,
     Application = 3,
     Manufacturer = 4,
+}
+
+/// What a node does with its parameters.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Order {
+    /// It keeps them (1010h).
+    Save,
+    /// It takes those of the factory from its next reset on (1011h).
+    Restore,
 }
 
 #[derive(Serialize)]
@@ -43,31 +55,33 @@ struct Done {
 
 impl Save {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
-        sign(session, 0x1010, self.group, *b"save", "saved")
+        for_each(session, Order::Save, self.group, "saved")
     }
 }
 
 impl Restore {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
-        sign(session, 0x1011, self.group, *b"load", "restored, in force after the next reset")
+        for_each(session, Order::Restore, self.group, "restored, in force after the next reset")
     }
 }
 
-/// Writes the signature that shows that it is meant.
-fn sign(
-    session: &mut Session,
-    index: u16,
-    group: Group,
-    signature: [u8; 4],
-    what: &'static str,
-) -> Result<(), Failure> {
+fn for_each(session: &mut Session, order: Order, group: Group, what: &'static str) -> Result<(), Failure> {
     for node in session.options.node.list()? {
-        session.catalogue(node)?;
-        let written = session.client(node).download(at(index, group as u8), &signature, |_| ());
-        written.map_err(|error| session.named(error))?;
+        sign(session, node, order, group)?;
         session.print(&Done { node: node.get(), group: format!("{group:?}").to_lowercase(), what })?;
     }
     Ok(())
+}
+
+/// Writes the signature that shows that the order is meant.
+pub(super) fn sign(session: &mut Session, node: NodeId, order: Order, group: Group) -> Result<(), Failure> {
+    session.catalogue(node)?;
+    let (index, signature) = match order {
+        Order::Save => (0x1010, b"save"),
+        Order::Restore => (0x1011, b"load"),
+    };
+    let written = session.client(node).download(at(index, group as u8), signature, |_| ());
+    written.map_err(|error| session.named(error))
 }
 
 impl fmt::Display for Done {

@@ -16,7 +16,7 @@ use super::read::place;
 use super::record::seconds_between;
 use super::{Failure, Session};
 use crate::scan::scan;
-use crate::text::visible;
+use crate::text::{hex_digits, visible};
 use crate::trace::{Decoder, Kind, Knowledge, Line, Shown, parse_candump};
 use crate::value::Value;
 
@@ -233,7 +233,7 @@ fn row(line: Line, start: Instant) -> Row {
         text,
         values: values.into_iter().map(cell).collect(),
         abort,
-        data: data.iter().map(|byte| format!("{byte:02X}")).collect(),
+        data: hex_digits(&data, ""),
     }
 }
 

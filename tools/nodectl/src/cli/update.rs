@@ -70,10 +70,6 @@ impl Update {
         if self.raw {
             return Ok(Image::opaque(bytes));
         }
-        if bytes.starts_with(b"\x7fELF") {
-            let message = "it is an ELF file; nodes take the signed image that `cargo xtask sign` makes of it (firmware.img)";
-            return Err(Failure::file(&self.image, message));
-        }
         Image::parse(bytes).map_err(|error| Failure::file(&self.image, error))
     }
 }

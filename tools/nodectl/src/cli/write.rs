@@ -11,7 +11,6 @@ use super::read::{Reading, parse_type};
 use super::{Failure, Session};
 use crate::object::Place;
 use crate::quantity::Quantity;
-use crate::value::Value;
 
 /// Writes an object, and prints what was written.
 #[derive(Debug, Args)]
@@ -70,9 +69,7 @@ impl Write {
         let data_type = data_type.ok_or_else(|| {
             Failure::Usage(format!("no data sheet tells the type of {}: give it with --type", Place(at)))
         })?;
-        // A number with a point is the value as it is meant; without one it is the number on the wire.
-        let text = quantity.number(text).map_or_else(|| text.to_owned(), |number| number.to_string());
-        match Value::parse(&text, data_type) {
+        match quantity.parse(text, data_type) {
             Ok(value) => Ok(value.encode(data_type)),
             Err(error) => Err(Failure::Usage(format!("{}: {error}", Place(at)))),
         }

@@ -78,7 +78,7 @@ mod tests {
     use crate::Catalogue;
 
     fn sheet() -> Eds {
-        Catalogue::of_file("pressure.eds").expect("a data sheet").into_sheet()
+        Catalogue::of_file("pressure.eds").expect("a data sheet").sheet().clone()
     }
 
     fn configuration(changes: &[(u16, u8, i128)]) -> Configuration {

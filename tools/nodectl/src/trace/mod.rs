@@ -18,6 +18,7 @@ pub use candump::{NotARecord, parse as parse_candump};
 pub use knowledge::Knowledge;
 
 use crate::Catalogue;
+use crate::text::hex_digits;
 use crate::value::Value;
 use pdo::Pdos;
 use sdo::Transfers;
@@ -187,8 +188,7 @@ fn hex(frame: &Frame) -> String {
     if frame.is_remote() {
         return format!("remote frame of {} bytes", frame.len());
     }
-    let pairs: Vec<String> = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
-    pairs.join(" ")
+    hex_digits(frame.data(), " ")
 }
 
 /// The value in these bytes of an object, with what is known about the object.

@@ -7,6 +7,11 @@ use thiserror::Error;
 /// A file that is no image, or no longer a whole one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ImageError {
+    /// It is what the compiler has made: not signed, and of no format that a node takes.
+    #[error(
+        "it is an ELF file; nodes take the signed image that `cargo xtask sign` makes of it (firmware.img)"
+    )]
+    Elf,
     /// It does not begin with the header of an image.
     #[error("it is no image of this project: {0}")]
     Header(::update::Refusal),
@@ -61,6 +66,9 @@ impl Image {
 }
 
 fn info(bytes: &[u8]) -> Result<ImageInfo, ImageError> {
+    if bytes.starts_with(b"\x7fELF") {
+        return Err(ImageError::Elf);
+    }
     let short = ImageError::Length { expected: HEADER_LEN, found: bytes.len() };
     let (head, code) = bytes.split_first_chunk::<HEADER_LEN>().ok_or(short)?;
     let header = Header::parse(head).map_err(ImageError::Header)?;

@@ -8,6 +8,9 @@ use canopen::sdo::Multiplexer;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value as Json;
 
+use crate::cli::map::Direction;
+use crate::cli::nmt::Command;
+use crate::cli::store::Group;
 use crate::object::at;
 use crate::trace::Kind;
 
@@ -39,34 +42,6 @@ pub(super) enum Whom {
 pub(super) enum All {
     #[serde(rename = "all")]
     All,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum Command {
-    Start,
-    Stop,
-    Preop,
-    Reset,
-    ResetCommunication,
-}
-
-/// A group of parameters. The discriminant is its sub-index.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Group {
-    #[default]
-    All = 1,
-    Communication = 2,
-    Application = 3,
-    Manufacturer = 4,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Direction {
-    Tpdo,
-    Rpdo,
 }
 
 /// A new mapping.

@@ -1,12 +1,12 @@
 //! Frames in words, for the pages that want a trace.
 
-use std::fmt::Write as _;
 use std::sync::Arc;
 
 use canopen::{Frame, Instant, NodeId};
 use serde::Serialize;
 
 use crate::Catalogue;
+use crate::text::hex_digits;
 use crate::trace::{Decoder, Kind, Knowledge, Line, Shown};
 use crate::value::Value;
 
@@ -81,18 +81,13 @@ impl Tracer {
 }
 
 fn row(line: &Line, t: f64, sent: bool) -> Row {
-    let mut data = String::with_capacity(16);
-    // Writing to a string cannot fail.
-    for byte in &line.data {
-        let _ = write!(data, "{byte:02X}");
-    }
     let shape = Shape {
         t,
         id: line.id,
         kind: line.kind,
         node: line.node.map(NodeId::get),
         text: &line.text,
-        data,
+        data: hex_digits(&line.data, ""),
         sent,
         values: line.values.iter().map(Cell::of).collect(),
         abort: line.abort,

@@ -6,11 +6,12 @@ use eds::{Commissioning, Eds};
 use serde_json::{Value as Json, json};
 
 use super::{Context, Job};
-use crate::cli::Failure;
-use crate::cli::dump::{PASSES, write_all};
+use crate::cli::dump::{bring, mismatch};
 use crate::cli::serve::request::Apply;
+use crate::cli::store::{Group, Order, sign};
+use crate::cli::{Failure, Session};
 use crate::configuration::{Configuration, plan};
-use crate::object::{Place, at};
+use crate::object::at;
 
 /// The data sheet of a node, and its configuration.
 fn read(context: &mut Context, node: NodeId) -> Result<(Eds, Configuration), Failure> {
@@ -21,11 +22,8 @@ fn read(context: &mut Context, node: NodeId) -> Result<(Eds, Configuration), Fai
 }
 
 fn values(context: &mut Context, node: NodeId, sheet: &Eds) -> Result<Configuration, Failure> {
-    context.session.begin_all();
     let counter = context.counter();
-    let session = &mut context.session;
-    let values = Configuration::of_node(|at| session.client(node).upload(at), sheet, counter);
-    values.map_err(|error| context.session.named(error))
+    context.session.configuration_with(node, sheet, counter)
 }
 
 fn path(sheet: &Eds, at: Multiplexer) -> Option<String> {
@@ -74,44 +72,29 @@ pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String>
         return Err("it is no data sheet: there is no object in it".to_owned());
     }
     Ok(Job::of_node(node, move |context| {
-        check(context, node, &sheet, how.force)?;
-        let wanted = Configuration::of_sheet(&sheet, node);
-        let (mut now, mut done) = (values(context, node, &sheet)?, Vec::new());
-        for _ in 0..PASSES {
-            let steps = plan(&sheet, &now, &wanted);
-            done.extend(steps.iter().map(|step| {
-                let Multiplexer { index, sub } = step.at;
-                json!({ "index": index, "sub": sub, "path": path(&sheet, step.at), "value": step.value })
-            }));
-            if steps.is_empty() || how.dry_run {
-                break;
-            }
-            write_all(&mut context.session, node, &sheet, &steps)?;
-            now = values(context, node, &sheet)?;
+        let mismatch = mismatch(&mut context.session, node, &sheet)?;
+        if let Some(words) = mismatch.filter(|_| !how.force) {
+            return Err(Failure::Usage(format!("the file is {words}")));
         }
-        let left: Vec<String> =
-            plan(&sheet, &now, &wanted).iter().map(|step| Place(step.at).to_string()).collect();
-        if !how.dry_run && !left.is_empty() {
-            return Err(Failure::NotApplied(left.join(", ")));
-        }
+        let steps = if how.dry_run {
+            plan(&sheet, &values(context, node, &sheet)?, &Configuration::of_sheet(&sheet, node))
+        } else {
+            let mut counter = context.counter();
+            let read = |session: &mut Session| session.configuration_with(node, &sheet, &mut counter);
+            bring(&mut context.session, node, &sheet, read)?
+        };
         let saved = how.save && !how.dry_run;
         if saved {
-            let session = &mut context.session;
-            let written = session.client(node).download(at(0x1010, 1), b"save", |_| ());
-            written.map_err(|error| session.named(error))?;
+            sign(&mut context.session, node, Order::Save, Group::All)?;
         }
-        let writes = if how.dry_run { 0 } else { done.len() };
-        Ok(json!({ "steps": done, "writes": writes, "saved": saved }))
+        let writes = if how.dry_run { 0 } else { steps.len() };
+        let rows: Vec<Json> = steps
+            .iter()
+            .map(|step| {
+                let Multiplexer { index, sub } = step.at;
+                json!({ "index": index, "sub": sub, "path": path(&sheet, step.at), "value": step.value })
+            })
+            .collect();
+        Ok(json!({ "steps": rows, "writes": writes, "saved": saved }))
     }))
-}
-
-/// A file for another product would be refused object by object; better nothing is changed.
-fn check(context: &mut Context, node: NodeId, sheet: &Eds, force: bool) -> Result<(), Failure> {
-    let device = context.session.word(node, at(0x1018, 2))?.unwrap_or(0);
-    let product = sheet.device.product_number;
-    if device == product || force {
-        return Ok(());
-    }
-    let words = format!("the file is for product {product:08X}h, and the node is product {device:08X}h");
-    Err(Failure::Usage(words))
 }

@@ -23,10 +23,11 @@ pub(super) use pdo::{poll, survey};
 use super::live::Survey;
 use super::nodes::Identity;
 use super::port::{self, Interest};
-use super::pump::{Order, Refusal};
+use super::pump::{self, Refusal};
 use super::request::{What, Whom};
 use super::schedule::Lane;
 use super::stimuli;
+use crate::cli::store::Order;
 use crate::cli::{Failure, Options, Output, Session};
 use crate::trace::Knowledge;
 use crate::{Catalogue, Network};
@@ -71,19 +72,19 @@ pub(super) enum Learned {
 /// What a job works with.
 pub(super) struct Context {
     pub(super) session: Session,
-    orders: Sender<Order>,
+    orders: Sender<pump::Order>,
     number: u64,
 }
 
 impl Context {
     pub(super) fn progress(&self, progress: Json) {
-        let _ = self.orders.send(Order::Progress(self.number, progress));
+        let _ = self.orders.send(pump::Order::Progress(self.number, progress));
     }
 
     /// Tells all pages.
     fn teller(&self) -> impl Fn(Json) + use<> {
         let orders = self.orders.clone();
-        move |event| drop(orders.send(Order::Tell(event)))
+        move |event| drop(orders.send(pump::Order::Tell(event)))
     }
 
     /// Tells how many questions of all have been asked.
@@ -93,21 +94,21 @@ impl Context {
         move |done| {
             if told != Some(done) {
                 told = Some(done);
-                let _ = orders.send(Order::Progress(number, json!({ "done": done, "all": all })));
+                let _ = orders.send(pump::Order::Progress(number, json!({ "done": done, "all": all })));
             }
         }
     }
 
     pub(super) fn learned(&self, node: NodeId, learned: Learned) {
-        let _ = self.orders.send(Order::Learned(node, learned));
+        let _ = self.orders.send(pump::Order::Learned(node, learned));
     }
 
     /// What is known about a node; for all, once it is.
-    pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Catalogue, Failure> {
+    pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Arc<Catalogue>, Failure> {
         let is_new = !self.session.knows(node);
         let catalogue = self.session.catalogue(node)?;
         if is_new {
-            self.learned(node, Learned::Catalogue(Arc::new(catalogue.clone())));
+            self.learned(node, Learned::Catalogue(Arc::clone(&catalogue)));
         }
         Ok(catalogue)
     }
@@ -120,7 +121,7 @@ impl Context {
             // Twenty steps of a bar are enough.
             if all > 0 && (done * 20 / all != told || done == 0) {
                 told = done * 20 / all;
-                let _ = orders.send(Order::Progress(number, json!({ "done": done, "all": all })));
+                let _ = orders.send(pump::Order::Progress(number, json!({ "done": done, "all": all })));
             }
         }
     }
@@ -145,7 +146,7 @@ pub(super) fn begin(
     number: u64,
     known: Option<(NodeId, Arc<Catalogue>)>,
     options: &Options,
-    orders: &Sender<Order>,
+    orders: &Sender<pump::Order>,
 ) {
     let (options, orders) = (options.clone(), orders.clone());
     let told = orders.clone();
@@ -155,11 +156,13 @@ pub(super) fn begin(
         }));
         let result = result
             .unwrap_or_else(|_| Err(Refusal::new("an error of this program: the request was given up")));
-        let _ = orders.send(Order::Done(number, result));
+        let _ = orders.send(pump::Order::Done(number, result));
     };
     if thread::Builder::new().name("job".to_owned()).spawn(run).is_err() {
-        let _ =
-            told.send(Order::Done(number, Err(Refusal::new("this machine has no room for another thread"))));
+        let _ = told.send(pump::Order::Done(
+            number,
+            Err(Refusal::new("this machine has no room for another thread")),
+        ));
     }
 }
 
@@ -168,14 +171,14 @@ fn work(
     number: u64,
     known: Option<(NodeId, Arc<Catalogue>)>,
     options: &Options,
-    orders: &Sender<Order>,
+    orders: &Sender<pump::Order>,
 ) -> Result<Json, Refusal> {
     let (interest, for_port) = (job.interest, orders.clone());
     let network = Network::open(move || Ok(port::open(&for_port, interest)));
     let network = network.map_err(|error| Refusal::new(error.to_string()))?;
     let mut session = Session::with(network, options, Output::new(io::sink(), true));
     if let Some((node, catalogue)) = known {
-        session.know(node, (*catalogue).clone());
+        session.know(node, catalogue);
     }
     let mut context = Context { session, orders: orders.clone(), number };
     (job.work)(&mut context).map_err(refusal)
@@ -202,8 +205,8 @@ pub(super) fn task(what: What, means: Means) -> Result<Task, String> {
             let node = if let Whom::Node(node) = node { Some(node.0) } else { None };
             with(Lane::Nothing, overview::nmt(node, command))
         }
-        What::Save { node, group } => of(node, overview::store(node.0, 0x1010, group as u8, *b"save")),
-        What::Restore { node, group } => of(node, overview::store(node.0, 0x1011, group as u8, *b"load")),
+        What::Save { node, group } => of(node, overview::store(node.0, Order::Save, group)),
+        What::Restore { node, group } => of(node, overview::store(node.0, Order::Restore, group)),
         What::Signals { node } => of(node, survey(node.0)),
         What::Dictionary { node } => of(node, objects::dictionary(node.0)),
         What::Read { node, objects } => {

@@ -10,6 +10,7 @@ use crate::cli::Failure;
 use crate::configuration::is_parameter;
 use crate::object::Place;
 use crate::quantity::Quantity;
+use crate::text::hex_digits;
 use crate::value::{Value, guess};
 use crate::{Catalogue, meaning};
 
@@ -127,10 +128,9 @@ fn value(catalogue: &Catalogue, at: Multiplexer, bytes: &[u8], quantity: &Quanti
     let raw = Value::decode(bytes, catalogue.data_type(at).unwrap_or_else(|| guess(bytes)));
     let meaning = meaning::of(catalogue, at, &raw);
     let value = quantity.apply(raw);
-    let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
     json!({
         "index": at.index, "sub": at.sub, "value": value, "text": value.to_string(), "unit": quantity.unit,
-        "meaning": meaning, "raw": digits,
+        "meaning": meaning, "raw": hex_digits(bytes, ""),
     })
 }
 
@@ -168,9 +168,7 @@ fn encode(
     let data_type = catalogue
         .data_type(at)
         .ok_or_else(|| refuse("no data sheet tells the type of this object".to_owned()))?;
-    // A number with a point is the value as it is meant; without one it is the number on the wire.
-    let text = quantity.number(text).map_or_else(|| text.to_owned(), |number| number.to_string());
-    let value = Value::parse(&text, data_type).map_err(|error| refuse(error.to_string()))?;
+    let value = quantity.parse(text, data_type).map_err(|error| refuse(error.to_string()))?;
     if !catalogue.allows(at, node, &value) {
         let range = catalogue.range(at, node).unwrap_or_default();
         return Err(refuse(format!("{value} is out of range; it takes {range}")));

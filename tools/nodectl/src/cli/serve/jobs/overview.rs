@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use canopen::nmt::Command as Specifier;
 use canopen::{Duration, NodeId};
 use serde_json::{Value as Json, json};
 
 use super::{Context, Job, Learned};
 use crate::cli::Failure;
+use crate::cli::nmt::Command;
 use crate::cli::serve::nodes::Identity;
-use crate::cli::serve::request::Command;
+use crate::cli::store::{Group, Order, sign};
 use crate::object::at;
-use crate::{Catalogue, heartbeat, nmt, value};
+use crate::{Catalogue, heartbeat, nmt};
 
 /// How long answers are listened for after the last question.
 const LISTEN: Duration = Duration::from_millis(200);
@@ -33,30 +33,30 @@ pub(in crate::cli::serve) fn identify(node: NodeId) -> Job {
     Job::of_node(node, move |context| {
         context.session.begin();
         let (identity, catalogue) = identity(context, node)?;
-        context.learned(node, Learned::Identity(identity, Arc::new(catalogue)));
+        context.learned(node, Learned::Identity(identity, catalogue));
         Ok(Json::Null)
     })
 }
 
-fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Catalogue), Failure> {
+fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Arc<Catalogue>), Failure> {
     let session = &mut context.session;
     let device_type = session.word(node, at(0x1000, 0))?;
     let mut words = [None; 4];
     for (word, sub) in words.iter_mut().zip(1..) {
         *word = session.word(node, at(0x1018, sub))?;
     }
-    let mut text =
-        |index| Ok::<_, Failure>(session.optional(node, at(index, 0))?.map(|bytes| value::text(&bytes)));
+    let mut text = |index| session.text(node, index);
     let (name, hardware, version) = (text(0x1008)?, text(0x1009)?, text(0x100A)?);
     let [vendor, product, revision, serial] = words;
     // The node may be another than before: what it says now counts.
     let file = session.options.eds.is_some();
     let known = if file { Some(session.catalogue(node)?) } else { None };
-    let known = known
-        .or_else(|| vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)));
+    let known = known.or_else(|| {
+        vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)).map(Arc::new)
+    });
     let personality =
         vendor.zip(product).and_then(|(vendor, product)| Catalogue::device_name(vendor, product));
-    let catalogue = known.unwrap_or_else(Catalogue::unknown);
+    let catalogue = known.unwrap_or_else(|| Arc::new(Catalogue::unknown()));
     let identity = Identity {
         name,
         personality,
@@ -74,13 +74,7 @@ fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Catalogue)
 
 /// Gives an NMT command, and waits for its effect on one node.
 pub(super) fn nmt(node: Option<NodeId>, command: Command) -> Job {
-    let specifier = match command {
-        Command::Start => Specifier::Start,
-        Command::Stop => Specifier::Stop,
-        Command::Preop => Specifier::EnterPreOperational,
-        Command::Reset => Specifier::ResetNode,
-        Command::ResetCommunication => Specifier::ResetCommunication,
-    };
+    let (specifier, _) = command.meaning();
     let work = move |context: &mut Context| {
         let network = &mut context.session.network;
         let state = match node {
@@ -98,13 +92,10 @@ pub(super) fn nmt(node: Option<NodeId>, command: Command) -> Job {
     }
 }
 
-/// Writes the signature that shows that it is meant (1010h and 1011h).
-pub(super) fn store(node: NodeId, index: u16, group: u8, signature: [u8; 4]) -> Job {
+/// Has the node keep parameters, or take those of the factory.
+pub(super) fn store(node: NodeId, order: Order, group: Group) -> Job {
     Job::of_node(node, move |context| {
-        context.catalogue(node)?;
-        let session = &mut context.session;
-        let written = session.client(node).download(at(index, group), &signature, |_| ());
-        written.map_err(|error| session.named(error))?;
+        sign(&mut context.session, node, order, group)?;
         Ok(json!({}))
     })
 }

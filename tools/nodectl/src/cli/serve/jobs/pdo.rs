@@ -11,9 +11,9 @@ use super::{Context, Job, Learned};
 use crate::Catalogue;
 use crate::acquisition;
 use crate::cli::Failure;
-use crate::cli::map::{self, Mapped, OFF, Pdo};
+use crate::cli::map::{self, Direction, Mapped, OFF, Pdo};
 use crate::cli::serve::live::Survey;
-use crate::cli::serve::request::{Direction, Mapping};
+use crate::cli::serve::request::Mapping;
 use crate::object::at;
 use crate::pdo_parameters::walk;
 use crate::trace::Knowledge;
@@ -24,7 +24,6 @@ pub(in crate::cli::serve) fn survey(node: NodeId) -> Job {
         let catalogue = context.catalogue(node)?;
         context.session.begin_all();
         let session = &mut context.session;
-        let catalogue = Arc::new(catalogue);
         let knowledge = Knowledge::ask(&mut session.client(node), Arc::clone(&catalogue));
         let knowledge = knowledge.map_err(|error| session.named(error))?;
         let found = acquisition::survey(&mut session.client(node), &catalogue, &[]);
@@ -69,15 +68,6 @@ pub(super) fn pdos(node: NodeId) -> Job {
     })
 }
 
-impl From<Direction> for map::Direction {
-    fn from(direction: Direction) -> map::Direction {
-        match direction {
-            Direction::Tpdo => map::Direction::Tpdo,
-            Direction::Rpdo => map::Direction::Rpdo,
-        }
-    }
-}
-
 /// A PDO as pages are told of it; `None` where the node has none of this number.
 fn shape(
     context: &mut Context,
@@ -86,7 +76,7 @@ fn shape(
     direction: Direction,
     number: u16,
 ) -> Result<Option<Json>, Failure> {
-    let pdo = Pdo::new(node, direction.into(), number);
+    let pdo = Pdo::new(node, direction, number);
     let session = &mut context.session;
     if session.word(node, at(pdo.communication, 1))?.is_none() {
         return Ok(None);
@@ -106,10 +96,6 @@ fn shape(
             json!({ "index": object.index, "sub": object.sub, "bits": object.bits, "name": name })
         })
         .collect();
-    let direction = match direction {
-        Direction::Tpdo => "tpdo",
-        Direction::Rpdo => "rpdo",
-    };
     Ok(Some(json!({
         "direction": direction, "number": number, "cob_id": cob_id & 0x7FF, "on": cob_id & OFF == 0,
         "transmission": transmission, "inhibit": inhibit, "event": event, "bits": bits, "objects": objects,
@@ -121,7 +107,7 @@ pub(super) fn map(node: NodeId, mapping: Mapping) -> Job {
     Job::of_node(node, move |context| {
         let catalogue = context.catalogue(node)?;
         context.session.begin_all();
-        let pdo = Pdo::new(node, mapping.direction.into(), mapping.number);
+        let pdo = Pdo::new(node, mapping.direction, mapping.number);
         if mapping.objects.is_empty() {
             pdo.clear(&mut context.session)?;
         } else {
@@ -136,12 +122,9 @@ fn remap(context: &mut Context, pdo: &Pdo, catalogue: &Catalogue, mapping: &Mapp
     // Everything is looked up before anything is changed.
     let objects = mapping.objects.iter().map(|object| Multiplexer::from(*object));
     let entries: Result<Vec<u32>, String> =
-        objects.map(|object| map::slot(catalogue, mapping.direction.into(), object)).collect();
+        objects.map(|object| map::slot(catalogue, mapping.direction, object)).collect();
     let entries = entries.map_err(Failure::Usage)?;
-    let bits: u32 = entries.iter().map(|entry| entry & 0xFF).sum();
-    if bits > 64 {
-        return Err(Failure::Usage(format!("these objects have {bits} bits; a PDO has 64")));
-    }
+    map::fitting_bits(&entries)?;
     let session = &mut context.session;
     let before = pdo.mapped(session)?;
     let cob_id = match mapping.cob_id {

@@ -9,7 +9,6 @@ use super::{Context, Job};
 use crate::cli::Failure;
 use crate::object::at;
 use crate::update::{Image, ImageInfo, Options, Outcome, Program, Step, Version, Watcher, update, version};
-use crate::value;
 
 /// How long a node that is lost may stay away.
 const PATIENCE: Duration = Duration::from_millis(60_000);
@@ -20,11 +19,6 @@ pub(super) fn decode(data: &str) -> Result<Vec<u8>, String> {
 }
 
 fn parse(bytes: Vec<u8>) -> Result<Image, String> {
-    if bytes.starts_with(b"\x7fELF") {
-        return Err(
-            "it is an ELF file; nodes take the signed image that `cargo xtask sign` makes of it".to_owned()
-        );
-    }
     Image::parse(bytes).map_err(|error| error.to_string())
 }
 
@@ -59,7 +53,7 @@ fn device(context: &mut Context, node: NodeId) -> Result<Device, Failure> {
     context.session.begin();
     let options = context.session.options.sdo();
     let product = context.session.word(node, at(0x1018, 2))?;
-    let version = context.session.optional(node, at(0x100A, 0))?.map(|bytes| value::text(&bytes));
+    let version = context.session.text(node, 0x100A)?;
     let identification = Program::new(&mut context.session.network, node, options).identification();
     let identification = identification.map_err(|error| context.session.named(error))?;
     Ok(Device { product, version, identification })
