@@ -25,3 +25,14 @@ def master(simulator):
     boot_up.until(lambda data: data == b"\x00")
     yield master
     master.close()
+
+
+@pytest.fixture(scope="module")
+def driver():
+    """One browser for all tests of a file."""
+    # The tests without a browser need no selenium.
+    from page import browser
+
+    driver = browser()
+    yield driver
+    driver.quit()

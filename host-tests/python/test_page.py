@@ -4,7 +4,7 @@ What is measured is told by time stamps of the bus, which are virtual time: no t
 """
 
 import pytest
-from page import Page, Server, browser, size
+from page import Page, Server, size
 from selenium.webdriver.common.keys import Keys
 from simulator import Simulator
 
@@ -36,13 +36,6 @@ def server(simulator: Simulator):
     server = Server(simulator)
     yield server
     server.stop()
-
-
-@pytest.fixture(scope="module")
-def driver():
-    driver = browser()
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
-from page import Page, Server, browser
+from page import Page, Server
 from selenium.webdriver.common.keys import Keys
 from simulator import Simulator
 
@@ -23,13 +23,6 @@ def simulator():
     simulator = Simulator("--bitrate", "500", "--pressure", "const:200000", "--control", "127.0.0.1:0", *flags, speed="real")
     yield simulator
     simulator.process.kill()
-
-
-@pytest.fixture(scope="module")
-def driver():
-    driver = browser()
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use probe::Board;
 
 use crate::command::{become_program, built, cargo, output};
 use crate::setup;
@@ -28,12 +29,8 @@ pub(crate) struct Flags {
     /// Leave when the program has started
     #[arg(long)]
     no_log: bool,
-    /// The chip, as probe-rs calls it
-    #[arg(long)]
-    chip: Option<String>,
-    /// The probe, when there are several: VID:PID or VID:PID:serial number
-    #[arg(long)]
-    probe: Option<String>,
+    #[command(flatten)]
+    board: Board,
 }
 
 impl Flags {
@@ -57,9 +54,7 @@ impl Flags {
         if let Some(key) = &self.key {
             tool.arg("--key").arg(key);
         }
-        for (flag, value) in [("--chip", &self.chip), ("--probe", &self.probe)] {
-            tool.args(value.iter().flat_map(|value| [flag, value]));
-        }
+        tool.args(self.board.flags());
         tool
     }
 }

@@ -17,7 +17,7 @@ use cortex_m_rt::entry;
 /// The node-ID that the host talks to.
 const ID: u8 = 1;
 const SYNC: u16 = 0x80;
-/// As many as the entries below.
+/// The number of entries that `dictionary` makes: the library finds an entry by looking at all before it.
 const ENTRIES: usize = 139;
 /// Two numbers of 32 bits.
 const MAPPED: u8 = 2;

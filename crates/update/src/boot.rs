@@ -26,8 +26,8 @@ pub enum Proof {
     /// Nothing, as after power-on: it is checked.
     #[default]
     None,
-    /// It was found good since power-on, of the image whose header has this CRC: for that image the CRC of the code is enough. It is
-    /// the word that [`boot_sealed`] has left then.
+    /// The signature of the image whose header has this CRC was found good since power-on: for that image the CRC of the code is
+    /// enough. The number is the word that [`boot_sealed`] left at that start.
     Of(u32),
     /// It does not matter now, as another start will decide.
     Waived,

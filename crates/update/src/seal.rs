@@ -1,4 +1,4 @@
-//! What a start must have besides a decision: a word that comes out of the equation of the signature.
+//! The seal: a word that comes out of the equation of the signature, and without which no application starts.
 //!
 //! A processor that a dip of its supply has made leave out one instruction may take any one branch the wrong way. So the branches are
 //! not all: the verification leaves a word in which the CRC of the header and the result of the equation are mixed. The word is

@@ -1,4 +1,4 @@
-//! What no image may undo: the least security counter, and the revoked keys. They have an area of their own, which is
+//! The least security counter and the revoked keys, which no image may undo. They have an area of their own, which is
 //! programmed and never erased: a bit that is 0 stays 0, so the counter only rises and a key stays revoked.
 //!
 //! | mark | it is set |

@@ -64,7 +64,7 @@ pub(crate) struct Verification {
     sum: EdwardsPoint,
     /// Bytes of the two numbers that were not.
     rest: usize,
-    /// What R has come to.
+    /// \[S\]B - \[k\]A after the last step, compressed: the R that would fit the signature. Zeros before.
     found: [u8; LEN],
 }
 

@@ -73,8 +73,7 @@ impl fmt::Display for Content {
         }
         let about = self.image.header.description();
         writeln!(f, "{:<12}{}, security counter {}", "version", about.version, about.counter)?;
-        let digits: String =
-            self.key.verifying_key().to_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
+        let digits = key::public_digits(&self.key);
         let whose =
             if key::is_development(&self.key) { " (the development key, known to everybody)" } else { "" };
         write!(f, "{:<12}{digits}{whose}", "public key")

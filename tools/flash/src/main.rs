@@ -8,7 +8,8 @@ use bsp::sectors::FLASH;
 use bsp::update_layout::LAYOUT;
 use clap::Parser;
 use flash::Content;
-use flash::probe_rs::{Board, Files, line};
+use flash::probe_rs::{self, Files};
+use probe::{Board, line};
 use sign::key;
 
 /// Writes bootloader and signed application into a board at a debug probe, with probe-rs, and prints the log.
@@ -30,12 +31,8 @@ struct Cli {
     /// Leave when the program has started
     #[arg(long)]
     no_log: bool,
-    /// The chip, as probe-rs calls it
-    #[arg(long, default_value = "STM32F446RETx")]
-    chip: String,
-    /// The probe, when there are several: VID:PID or VID:PID:serial number
-    #[arg(long)]
-    probe: Option<String>,
+    #[command(flatten)]
+    board: Board,
 }
 
 fn main() -> ExitCode {
@@ -55,10 +52,9 @@ fn run(cli: &Cli) -> Result<()> {
     let image = cli.application.with_extension("flash.img");
     std::fs::write(&image, content.image().to_bytes())
         .with_context(|| format!("cannot write {}", image.display()))?;
-    let board = Board { chip: cli.chip.clone(), probe: cli.probe.clone() };
     let address = FLASH + LAYOUT.application().start();
-    let calls = board.write(Files { bootloader: &cli.bootloader, image: &image, address });
-    let log = (!cli.no_log).then(|| board.log(&cli.application));
+    let calls = probe_rs::write(&cli.board, Files { bootloader: &cli.bootloader, image: &image, address });
+    let log = (!cli.no_log).then(|| probe_rs::log(&cli.board, &cli.application));
     calls.into_iter().chain(log).try_for_each(|call| if cli.dry_run { show(&call) } else { make(call) })
 }
 

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Result, ensure};
 use clap::Parser;
+use probe::Board;
 use protect::probe::{DryRun, Probe};
 use protect::{OptionBytes, ReadOut, current, program};
 
@@ -28,12 +29,8 @@ struct Cli {
     /// Do not ask
     #[arg(long)]
     yes: bool,
-    /// The chip, as probe-rs calls it
-    #[arg(long, default_value = "STM32F446RETx")]
-    chip: String,
-    /// The probe, when there are several: VID:PID or VID:PID:serial number
-    #[arg(long)]
-    probe: Option<String>,
+    #[command(flatten)]
+    board: Board,
 }
 
 impl Cli {
@@ -61,7 +58,7 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> Result<()> {
-    let mut probe = Probe::new(cli.chip.clone(), cli.probe.clone());
+    let mut probe = Probe::new(cli.board.clone());
     let has = if cli.dry_run { cli.pretended() } else { current(&mut probe)? };
     println!("now   {has}");
     let wanted = cli.change(has);

@@ -3,6 +3,8 @@
 use std::io;
 use std::process::{Command, ExitStatus, Stdio};
 
+use probe::{Board, line};
+
 use crate::option_bytes::OptionBytes;
 use crate::sequence::{OPTCR, Registers};
 
@@ -21,24 +23,17 @@ pub enum ProbeError {
 }
 
 /// A chip at a debug probe.
-pub struct Probe {
-    chip: String,
-    probe: Option<String>,
-}
+pub struct Probe(Board);
 
 impl Probe {
-    /// The chip by the name that probe-rs has for it; the probe by VID:PID or serial number when there are several.
+    /// The registers of this board.
     #[must_use]
-    pub fn new(chip: String, probe: Option<String>) -> Probe {
-        Probe { chip, probe }
+    pub fn new(board: Board) -> Probe {
+        Probe(board)
     }
 
     fn command(&self, verb: &str, address: u32, last: &str) -> Command {
-        let mut command = Command::new("probe-rs");
-        command.args([verb, "--chip", &self.chip]);
-        if let Some(probe) = &self.probe {
-            command.args(["--probe", probe]);
-        }
+        let mut command = self.0.call(verb);
         command.args(["b32", &format!("{address:#010x}"), last]);
         command
     }
@@ -102,11 +97,6 @@ impl Registers for DryRun {
     }
 }
 
-fn line(command: &Command) -> String {
-    let words = std::iter::once(command.get_program()).chain(command.get_args());
-    words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,7 +111,7 @@ mod tests {
 
     #[test]
     fn the_calls_are_those_of_the_handbook() {
-        let probe = Probe::new("STM32F446RETx".into(), Some("0483:374b".into()));
+        let probe = Probe::new(Board { chip: "STM32F446RETx".into(), probe: Some("0483:374b".into()) });
         let read = line(&probe.command("read", 0x4002_3C14, "1"));
         assert_eq!(read, "probe-rs read --chip STM32F446RETx --probe 0483:374b b32 0x40023c14 1");
     }

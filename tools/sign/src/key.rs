@@ -79,6 +79,11 @@ pub fn write(key: &SigningKey, path: &Path) -> Result<()> {
 /// The public half as the variable that a bootloader is built with: `UPDATE_PUBLIC_KEY` and 64 hexadecimal digits.
 #[must_use]
 pub fn variable(key: &SigningKey) -> String {
-    let digits: Vec<_> = key.verifying_key().to_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
-    format!("UPDATE_PUBLIC_KEY={}", digits.concat())
+    format!("UPDATE_PUBLIC_KEY={}", public_digits(key))
+}
+
+/// The public half as 64 hexadecimal digits.
+#[must_use]
+pub fn public_digits(key: &SigningKey) -> String {
+    hex::encode(key.verifying_key().to_bytes())
 }

@@ -20,7 +20,7 @@ pub fn has_no_header() -> bool {
     bytes.iter().all(|byte| *byte == 0xFF)
 }
 
-/// What stands for the seal of an application without a header.
+/// The seal of an application without a header: erased flash has this word where a header has its CRC.
 pub const SEAL_OF_NO_HEADER: u32 = u32::MAX;
 
 /// Starts the application as a reset would. Nothing of the caller goes on: interrupts are off until the application has

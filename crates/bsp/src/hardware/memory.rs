@@ -52,13 +52,13 @@ pub fn parameter_pages() -> &'static [u8; 2 * PARAMETER_PAGE as usize] {
     unsafe { &*(parameters().start as *const _) }
 }
 
-/// What an update may program: the security counter and the revoked keys, the application with its header, and staging.
+/// The flash that an update may program: the security counter and the revoked keys, the application with its header, and staging.
 pub(super) fn updatable() -> Range<u32> {
     // SAFETY: only the addresses are used.
     unsafe { region(&_updatable_start, &_updatable_end) }
 }
 
-/// What of it an update may erase: the application with its header, and staging.
+/// The part of [`updatable`] that an update may erase: the application with its header, and staging.
 pub(super) fn erasable() -> Range<u32> {
     // SAFETY: only the addresses are used.
     unsafe { region(&_erasable_start, &_updatable_end) }

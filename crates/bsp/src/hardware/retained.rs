@@ -28,7 +28,7 @@ static RETAINED: Retained = Retained {
     bootloader: AtomicU32::new(0),
 };
 
-/// What a bootloader for development leaves: 'DEVL'.
+/// The word by which a bootloader for development says that it is one: 'DEVL'.
 const DEVELOPMENT: u32 = u32::from_be_bytes(*b"DEVL");
 
 /// The note of the other image; `None` when there is none since power-on.

@@ -192,7 +192,7 @@ fn the_security_counter_may_grow_or_stay_and_never_goes_back() {
     assert_starts(&mut flash, &with(6, 9));
 }
 
-/// What one image has reached, no damage of the application takes back.
+/// No damage of the application lowers the security counter that one image has reached.
 #[test]
 fn the_security_counter_outlives_the_application() {
     let with = |version, counter| Image::new(description(version, counter), 100);
@@ -209,7 +209,7 @@ fn the_security_counter_outlives_the_application() {
     assert_starts(&mut flash, &with(3, 5));
 }
 
-/// It is kept before the bootloader takes the next download, also when the application was told to enter the bootloader.
+/// The counter is kept before the bootloader takes the next download, also when the application was told to enter the bootloader.
 #[test]
 fn the_counter_is_kept_before_the_application_can_be_replaced() {
     let with = |version, counter| Image::new(description(version, counter), 100);
