@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from page import Page, Server, browser
+from page import Page, Server
 from simulator import Simulator
 from test_update import identification, image
 
@@ -22,13 +22,13 @@ def runs(page: Page, program: Path) -> bool:
     return page.read(1, 0x1F56, 1) == identification(program)
 
 
-def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path):
+def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path, driver):
     a = Path(os.environ["NODE_IMAGES"]) / "firmware.img"
     b = image(tmp_path / "b.img", "0.2.0")
     cut = tmp_path / "cut.img"
     cut.write_bytes(b.read_bytes()[:-100])
     simulator = Simulator("--bitrate", "1000", "--control", "127.0.0.1:0", speed="real")
-    server, driver = Server(simulator), browser()
+    server = Server(simulator)
     try:
         page = Page(driver, server.url)
         page.says("tr[data-node='1']", "STM32F4")
@@ -47,6 +47,5 @@ def test_an_update_runs_from_the_page_and_is_put_back(tmp_path: Path):
         page.until(lambda: runs(page, a), "read the identification of A in the node")
         assert page.console() == []
     finally:
-        driver.quit()
         server.stop()
         simulator.process.kill()
