@@ -6,6 +6,7 @@ What is measured is told by time stamps of the bus, which are virtual time: no t
 import pytest
 from page import Page, Server, size
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.select import Select
 from simulator import Simulator
 
 PRESSURE, ENCODER = 1, 2
@@ -110,6 +111,53 @@ def test_a_slider_moves_the_plot(page: Page):
     slider = page.field("Pressure, bar")
     page.script("arguments[0].value = 6; arguments[0].dispatchEvent(new Event('input', { bubbles: true }))", slider)
     page.until(lambda: abs(page.drawn(PROCESS_VALUE)[-1]["y"] - 6) < 0.02, "plot what the slider says")
+
+
+def test_a_waveform_moves_the_plot(page: Page):
+    sample_often(page)
+    page.view("stimuli")
+    board = f"[data-board='{PRESSURE}']"
+    choose_waveform(page, board, "Pressure", "ramp")
+    for label, text in (("From", "1"), ("To", "5"), ("Seconds", "2")):
+        page.fill(label, text, board)
+    page.press("Apply", board)
+    page.says(f"#view-stimuli {board}", "ramp:100000,500000,2")
+    choose_node(page, "live", PRESSURE)
+    page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["y"] > 4.9, "plot the end of the ramp")
+    ramp = [point["y"] for point in page.drawn(PROCESS_VALUE) if 1.5 < point["y"] < 4.5]
+    # A sample comes every 10 ms, and the ramp rises by 2 bar a second.
+    assert len(ramp) > 100 and ramp == sorted(ramp)
+
+
+@pytest.mark.parametrize(
+    ("board", "quantity", "forms"),
+    [
+        (PRESSURE, "Pressure", ["sine", "ramp", "step", "noise"]),
+        (PRESSURE, "Temperature of the chip", ["sine", "ramp", "step", "noise"]),
+        (PRESSURE, "Thermistor", ["sine", "ramp", "step", "noise"]),
+        (ENCODER, "Shaft", ["sine", "ramp", "step", "noise", "rpm"]),
+    ],
+)
+def test_the_simulator_takes_each_waveform_as_it_is_offered(page: Page, board: int, quantity: str, forms: list[str]):
+    page.view("stimuli")
+    selector = f"[data-board='{board}']"
+    for form in forms:
+        choose_waveform(page, selector, quantity, form)
+        page.press("Apply", selector)
+        page.until(lambda: f"{form}:" in shown_quantity(page, selector, quantity), f"say that {quantity} is a {form}")
+    choose_waveform(page, selector, quantity, "const")
+    page.until(lambda: "const:" in shown_quantity(page, selector, quantity), "go back to the slider")
+
+
+def choose_waveform(page: Page, board: str, quantity: str, form: str) -> None:
+    label = f"{board} select[aria-label='Waveform of {quantity}']"
+    Select(page.until(lambda: page.find(label), f"offer waveforms of {quantity}")).select_by_value(form)
+
+
+def shown_quantity(page: Page, board: str, quantity: str) -> str:
+    """What the knobs of a quantity say."""
+    code = "return document.querySelector(arguments[0]).closest('.quantity').innerText"
+    return page.script(code, f"#view-stimuli {board} select[aria-label='Waveform of {quantity}']")
 
 
 def test_a_fault_is_marked_on_the_time_axis(page: Page):

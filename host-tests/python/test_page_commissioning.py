@@ -4,15 +4,17 @@ import csv
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
+import canopen
 import pytest
 from page import Page, Server
 from selenium.webdriver.common.keys import Keys
-from simulator import Simulator
+from simulator import PATIENCE, Simulator
 
 PRESSURE, ENCODER, LIFT, NEW = 1, 2, 33, 5
 #: A board that has a number on the simulator and no node-ID on the bus.
 WITHOUT_ID = 201
 PROCESS_VALUE = "Pressure process value"
+EDS = Path(__file__).parents[2] / "eds"
 PANEL = "#view-commissioning section"
 
 
@@ -115,6 +117,19 @@ def test_the_car_of_a_lift_is_shown_and_its_virtual_devices_are_chosen(page: Pag
         page.until(lambda: page.read(LIFT, 0x2305) == wanted, "choose the output panel")
 
 
+#: Each index of a data sheet for which the page has no words.
+WITHOUT_HELP = """const [indices, personality, done] = arguments;
+    import("./js/dictionary/help.js").then(({ help }) => done(indices.filter((index) => !help({ index }, personality))));"""
+
+
+@pytest.mark.parametrize("personality", ["pressure", "encoder", "combined", "lift"])
+def test_every_object_has_a_sentence_that_says_what_it_is_for(page: Page, personality: str):
+    sheet = canopen.import_od(str(EDS / f"{personality}.eds"))
+    assert len(sheet) > 80
+    without = page.driver.execute_async_script(WITHOUT_HELP, [index for index in sheet if index >= 0x1000], personality)
+    assert [f"{index:04X}h {sheet[index].name}" for index in without] == []
+
+
 def test_a_node_without_a_node_id_is_found_and_gets_one(page: Page):
     page.view("commissioning")
     page.press("Find a node without a node-ID")
@@ -144,3 +159,27 @@ def test_what_is_plotted_is_saved_as_a_table_and_as_a_drawing(page: Page, driver
     assert all(abs(float(row[column]) - 2) < 0.02 for row in rows[-5:])
     drawing = ElementTree.parse(tmp_path / f"node{PRESSURE}.svg").getroot()
     assert drawing.tag.endswith("svg") and any(path.get("d", "").startswith("M") for path in drawing.iter("{http://www.w3.org/2000/svg}path"))
+
+
+def test_the_bit_rate_of_all_nodes_is_changed(driver):
+    """The interface of the page keeps its rate, and so hears the nodes no more; one with the new rate does."""
+    simulator = Simulator("--bitrate", "500", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
+    server = Server(simulator)
+    page = Page(driver, server.url)
+    for node in (1, 2):
+        page.says(f"tr[data-node='{node}']", "STM32F4")
+    page.view("commissioning")
+    page.choose("Bit rate of all nodes", "250")
+    page.press("Change the bit rate")
+    alert = driver.switch_to.alert
+    assert "250 kbit/s" in alert.text
+    alert.accept()
+    page.says(PANEL + "[aria-labelledby=lss-title]", "250 kbit/s: stored")
+    server.stop()
+    with simulator.slcan_bus(bitrate=250_000) as bus:
+        silent = {0x701, 0x702}
+        while silent:
+            message = bus.recv(PATIENCE)
+            assert message is not None, f"{silent} are not heard at the new bit rate"
+            silent.discard(message.arbitration_id)
+    simulator.quit()

@@ -34,6 +34,18 @@ def test_the_page_is_there_as_long_as_the_simulator_however_that_ends(end):
         time.sleep(0.05)
 
 
+def test_from_elsewhere_nothing_goes_without_the_token():
+    """A server for other machines tells its address with the token, and gives nothing to who does not have it."""
+    simulator = with_page("0.0.0.0:0")
+    url = simulator.greeting["page"]
+    place, token = url.split("?token=")
+    here = place.replace("0.0.0.0", "127.0.0.1")
+    assert not answers(here) and not answers(f"{here}?token={'0' * len(token)}")
+    assert not answers(f"{here}js/main.js")
+    assert answers(f"{here}?token={token}")
+    simulator.quit()
+
+
 def test_a_port_that_is_taken_is_no_error():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -50,7 +50,7 @@ fn shape(catalogue: &Catalogue, entry: &Entry, node: NodeId) -> Json {
         "type": entry.data_type.to_string(), "access": access,
         "low": value(&entry.low), "high": value(&entry.high), "default": value(&entry.default),
         "unit": entry.unit, "tpdo": entry.is_tpdo_mappable(), "rpdo": entry.is_rpdo_mappable(),
-        "parameter": is_parameter(entry), "help": "",
+        "parameter": is_parameter(entry),
     })
 }
 

@@ -1,0 +1,26 @@
+// The pressure transmitter: CiA 404.
+
+export const PRESSURE = {
+  0x3000: "Status flags: sensors, protocol, system.",
+  0x4000: "Words for the user. They are stored with the parameters.",
+  0x6100: "What the sensor gives before scaling: Pa for pressure, K for temperature.",
+  0x6110: "Kind of the sensor at the input.",
+  0x6124: "Added to the value, in its unit. Auto-zero sets it.",
+  0x6125: "Makes the present value zero: the signature \"zero\" is wanted. Commissioning has a button for it.",
+  0x6126: "The value is multiplied with this before its unit is applied.",
+  0x6127: "Added after the factor.",
+  0x6130: "The measured value in the unit of 6131h.",
+  0x6131: "Unit of the value, by CiA 303-2: prefix in the highest byte, then the unit.",
+  0x6132: "Where integer values have their decimal point.",
+  0x6148: "Below this the status says negative overload.",
+  0x6149: "Above this the status says positive overload.",
+  0x6150: "0 valid, bit 0 not valid, bit 1 positive overload, bit 2 negative overload.",
+  0x61a0: "Kind of the filter.",
+  0x61a1: "How strong the filter is.",
+  0x7130: "The measured value as INTEGER16, with the decimal digits of 6132h.",
+  0x7148: "6148h as INTEGER16, with the decimal digits of 6132h.",
+  0x7149: "6149h as INTEGER16, with the decimal digits of 6132h.",
+  0x9130: "The measured value as INTEGER32, with the decimal digits of 6132h.",
+  0x9148: "6148h as INTEGER32, with the decimal digits of 6132h.",
+  0x9149: "6149h as INTEGER32, with the decimal digits of 6132h.",
+};
