@@ -153,3 +153,9 @@ class Page:
         """What went wrong in the page's programs."""
         lost = "WebSocket connection to"
         return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE" and lost not in entry["message"]]
+
+    def leave(self) -> None:
+        """Ends the page before its server ends: it would ask for the server again and again, and each try is an error in the console."""
+        errors = self.console()
+        self.driver.get("about:blank")
+        assert errors == [], "errors in the page's console"

@@ -46,7 +46,7 @@ def page(driver, server: Server):
     page = Page(driver, server.url)
     start(page)
     yield page
-    assert page.console() == []
+    page.leave()
 
 
 def start(page: Page) -> None:

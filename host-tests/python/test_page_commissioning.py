@@ -37,7 +37,7 @@ def page(driver, simulator: Simulator):
     for node in (PRESSURE, ENCODER, LIFT):
         page.says(f"tr[data-node='{node}'] td[data-label=State]", "operational")
     yield page
-    assert page.console() == []
+    page.leave()
     server.stop()
 
 
@@ -175,6 +175,7 @@ def test_the_bit_rate_of_all_nodes_is_changed(driver):
     assert "250 kbit/s" in alert.text
     alert.accept()
     page.says(PANEL + "[aria-labelledby=lss-title]", "250 kbit/s: stored")
+    page.leave()
     server.stop()
     with simulator.slcan_bus(bitrate=250_000) as bus:
         silent = {0x701, 0x702}

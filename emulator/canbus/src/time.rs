@@ -22,11 +22,13 @@ impl Time {
     pub const PER_SECOND: u64 = Self::PER_MICRO * 1_000_000;
 
     /// The span of `n` microseconds.
+    #[inline]
     pub const fn from_micros(n: u64) -> Time {
         Time(n * Self::PER_MICRO)
     }
 
     /// The span of `n` milliseconds.
+    #[inline]
     pub const fn from_millis(n: u64) -> Time {
         Time(n * Self::PER_MICRO * 1_000)
     }
@@ -35,22 +37,26 @@ impl Time {
     ///
     /// # Panics
     /// When `hertz` is zero.
+    #[inline]
     pub const fn of_cycle(hertz: u64) -> Time {
         Time((Self::PER_SECOND + hertz / 2) / hertz)
     }
 
     /// Whole microseconds.
+    #[inline]
     pub const fn as_micros(self) -> u64 {
         self.0 / Self::PER_MICRO
     }
 
     /// Seconds, for people.
     #[allow(clippy::cast_precision_loss)]
+    #[inline]
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / Self::PER_SECOND as f64
     }
 
     /// The span from `earlier` to `self`, zero when `earlier` is later.
+    #[inline]
     pub const fn since(self, earlier: Time) -> Time {
         Time(self.0.saturating_sub(earlier.0))
     }
@@ -58,12 +64,14 @@ impl Time {
 
 impl Add for Time {
     type Output = Time;
+    #[inline]
     fn add(self, span: Time) -> Time {
         Time(self.0.saturating_add(span.0))
     }
 }
 
 impl AddAssign for Time {
+    #[inline]
     fn add_assign(&mut self, span: Time) {
         *self = *self + span;
     }
@@ -71,6 +79,7 @@ impl AddAssign for Time {
 
 impl Sub for Time {
     type Output = Time;
+    #[inline]
     fn sub(self, other: Time) -> Time {
         self.since(other)
     }
@@ -78,6 +87,7 @@ impl Sub for Time {
 
 impl Mul<u64> for Time {
     type Output = Time;
+    #[inline]
     fn mul(self, times: u64) -> Time {
         Time(self.0.saturating_mul(times))
     }

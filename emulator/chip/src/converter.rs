@@ -130,6 +130,9 @@ impl Stm32f4 {
 
     /// Whether a test wants the request lost.
     fn is_lost(&mut self, controller: usize, request: &[Line]) -> bool {
+        if self.losses.is_empty() {
+            return false;
+        }
         let stream = self.dmas[controller].line(request).map(|line| line.stream);
         stream.is_some_and(|stream| self.losses.take(Loss::DmaRequest { controller: controller + 1, stream }))
     }

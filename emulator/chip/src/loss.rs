@@ -35,6 +35,11 @@ impl Losses {
         self.0.extend(std::iter::repeat_n(loss, times));
     }
 
+    /// Nothing is to be lost: the usual case, which is asked for at each event.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Whether this event, which happens now, is lost.
     pub(crate) fn take(&mut self, loss: Loss) -> bool {
         let place = self.0.iter().position(|next| *next == loss);

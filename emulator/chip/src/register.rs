@@ -21,13 +21,24 @@ impl Plain {
 #[derive(Clone)]
 pub(crate) struct RegisterFile {
     layout: &'static [Plain],
-    values: Vec<u32>,
+    /// By word: registers are looked at more often than anything else here.
+    registers: Vec<Option<Register>>,
+}
+
+#[derive(Clone, Copy)]
+struct Register {
+    value: u32,
+    writable: u32,
 }
 
 impl RegisterFile {
     pub(crate) fn new(layout: &'static [Plain]) -> Self {
-        let values = layout.iter().map(|register| register.reset).collect();
-        Self { layout, values }
+        let words = layout.iter().map(|plain| plain.offset as usize / 4 + 1).max().unwrap_or(0);
+        let mut registers = vec![None; words];
+        for &Plain { offset, reset, writable } in layout {
+            registers[offset as usize / 4] = Some(Register { value: reset, writable });
+        }
+        Self { layout, registers }
     }
 
     /// All values as after a reset.
@@ -35,16 +46,15 @@ impl RegisterFile {
         *self = Self::new(self.layout);
     }
 
-    /// The value at `offset`; `None` when no register of this file is there.
+    /// The value at `offset`, a multiple of 4; `None` when no register of this file is there.
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
-        self.position(offset).map(|index| self.values[index])
+        self.registers.get(offset as usize / 4)?.map(|register| register.value)
     }
 
-    /// Writes the writable bits at `offset`; `None` when no register of this file is there.
+    /// Writes the writable bits at `offset`, a multiple of 4; `None` when no register of this file is there.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
-        let index = self.position(offset)?;
-        let writable = self.layout[index].writable;
-        self.values[index] = self.values[index] & !writable | value & writable;
+        let register = self.registers.get_mut(offset as usize / 4)?.as_mut()?;
+        register.value = register.value & !register.writable | value & register.writable;
         Some(())
     }
 
@@ -54,10 +64,6 @@ impl RegisterFile {
     /// When the layout has no such register, which is a mistake of the model.
     pub(crate) fn get(&self, offset: u32) -> u32 {
         self.read(offset).expect("the layout has the register")
-    }
-
-    fn position(&self, offset: u32) -> Option<usize> {
-        self.layout.iter().position(|register| register.offset == offset)
     }
 }
 

@@ -3,6 +3,7 @@
 use chip::Peripherals;
 use unicorn_engine::RegisterARM;
 
+use crate::clock;
 use crate::cost;
 use crate::engine;
 use crate::exception::Exception;
@@ -169,7 +170,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// The exception that follows without unstacking.
     fn follower(&self) -> Option<Exception> {
         let core = self.cpu.get_data();
-        let next = core.to_take(engine::masks(&self.cpu))?;
+        let next = core.to_take(clock::masks(&self.cpu))?;
         (!core.lacks(Mechanism::TailChain)).then_some(next)
     }
 

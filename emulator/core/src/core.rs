@@ -58,6 +58,9 @@ pub(crate) struct Core<P> {
     pub(crate) until: Time,
     /// When the chip or SysTick wants to be advanced; kept, because it is asked for before every block.
     due: Time,
+    /// Only time can stop the program before its next block, at the earliest at `bound`; kept for the same reason.
+    calm: bool,
+    bound: Time,
     pub(crate) nvic: Nvic,
     pub(crate) scb: Scb,
     pub(crate) systick: SysTick,
@@ -120,6 +123,8 @@ impl<P: Peripherals> Core<P> {
             cycle: Time::of_cycle(16_000_000),
             until: Time::ZERO,
             due: Time::ZERO,
+            calm: false,
+            bound: Time::ZERO,
             nvic: Nvic::default(),
             scb: Scb::default(),
             systick: SysTick::default(),
@@ -215,6 +220,28 @@ impl<P: Peripherals> Core<P> {
         self.now >= self.until.min(self.due) || self.reset_requested || !self.effects.is_empty()
     }
 
+    /// Whether the next block runs without a further look. Where this says no, that block may run all the same.
+    #[inline]
+    pub(crate) fn is_undisturbed(&self) -> bool {
+        self.calm && self.now < self.bound
+    }
+
+    /// After a change of what may stop the program, and before the program goes on.
+    pub(crate) fn look_again(&mut self) {
+        self.bound = self.until.min(self.due);
+        self.calm = self.halt.is_none()
+            && self.effects.is_empty()
+            && !self.reset_requested
+            && !self.flash_closed
+            && !self.nvic.could_preempt();
+    }
+
+    /// Has the run loop take over before the next block.
+    pub(crate) fn stop_for(&mut self, halt: Halt) {
+        self.halt = Some(halt);
+        self.calm = false;
+    }
+
     /// Lets everything due happen, and samples the interrupt lines.
     pub(crate) fn advance(&mut self) {
         if self.chip.deadline() <= self.now {
@@ -238,6 +265,7 @@ impl<P: Peripherals> Core<P> {
         self.nvic.sample(self.chip.lines());
         self.stamp(self.nvic.pending_set() & !before);
         self.due = self.deadline();
+        self.look_again();
     }
 
     /// A rule is broken, here and now.
@@ -250,6 +278,7 @@ impl<P: Peripherals> Core<P> {
             self.pended[usize::from(exception.0)] = self.now;
         }
         self.nvic.pend(exception);
+        self.calm = false;
     }
 
     /// Remembers when these exceptions became pending.
@@ -271,6 +300,7 @@ impl<P: Peripherals> Core<P> {
         self.cycle = Time::of_cycle(hertz.max(1));
         self.systick.change_clock(self.now, self.cycle);
         self.due = self.deadline();
+        self.look_again();
         self.set_cyccnt(self.cyccnt_runs(), count);
     }
 

@@ -6,42 +6,48 @@
 /// Instructions and cycles of a block, when it runs to its end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Cost {
-    pub(crate) instructions: u32,
-    pub(crate) cycles: u32,
-    /// An exclusive access begins in it: LDREX, LDREXB or LDREXH.
-    pub(crate) exclusive: bool,
-    /// It uses the floating-point unit.
-    pub(crate) floats: bool,
+    pub(crate) instructions: u16,
+    pub(crate) cycles: u16,
+    /// What else the block does, from [`EXCLUSIVE`] and [`FLOATS`]: most do nothing of the kind.
+    pub(crate) uses: u16,
 }
+
+/// An exclusive access begins in the block: LDREX, LDREXB or LDREXH.
+pub(crate) const EXCLUSIVE: u16 = 1;
+/// The block uses the floating-point unit.
+pub(crate) const FLOATS: u16 = 2;
 
 /// The costs of blocks that ran before, one place for each address modulo the size of the table.
 #[derive(Clone, Debug)]
-pub(crate) struct Costs(Vec<Known>);
+pub(crate) struct Costs(Box<[Known; PLACES]>);
+
+const PLACES: usize = 1 << 14;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
     address: u32,
-    size: u32,
+    size: u16,
     cost: Cost,
 }
 
 impl Default for Costs {
     fn default() -> Costs {
-        Costs(vec![Known::default(); 1 << 14])
+        Costs(Box::new([Known::default(); PLACES]))
     }
 }
 
 impl Costs {
     /// The cost of a block, when it is known.
-    pub(crate) fn get(&self, address: u32, size: u32) -> Option<Cost> {
-        let known = self.0[place(address)];
-        (known.address == address && known.size == size).then_some(known.cost)
+    #[inline]
+    pub(crate) fn get(&self, address: u32, size: u32) -> Option<&Cost> {
+        let known = &self.0[place(address)];
+        (known.address == address && u32::from(known.size) == size).then_some(&known.cost)
     }
 
     /// Computes the cost of a block and remembers it.
     pub(crate) fn learn(&mut self, address: u32, code: &[u8]) -> Cost {
         let cost = of_block(code);
-        self.0[place(address)] = Known { address, size: code.len() as u32, cost };
+        self.0[place(address)] = Known { address, size: code.len() as u16, cost };
         cost
     }
 
@@ -51,27 +57,30 @@ impl Costs {
     }
 }
 
+#[inline]
 fn place(address: u32) -> usize {
-    (address >> 1) as usize % (1 << 14)
+    (address >> 1) as usize % PLACES
 }
 
 /// Adds up the Thumb instructions in `code`.
 fn of_block(code: &[u8]) -> Cost {
     let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
     let mut cost = Cost::default();
+    let mut cycles = 0;
     while let Some(first) = halves.next() {
         cost.instructions += 1;
-        cost.cycles += match first >> 11 {
+        cycles += match first >> 11 {
             0b11101..=0b11111 => {
                 let second = halves.next().unwrap_or(0);
-                cost.exclusive |= begins_exclusive(first, second);
-                cost.floats |= is_floating(first, second);
+                cost.uses |= if begins_exclusive(first, second) { EXCLUSIVE } else { 0 };
+                cost.uses |= if is_floating(first, second) { FLOATS } else { 0 };
                 wide(first, second)
             }
             _ => narrow(first),
         };
     }
-    cost
+    // A block has some hundred instructions at most.
+    Cost { cycles: cycles as u16, ..cost }
 }
 
 /// An instruction of coprocessors 10 and 11.
@@ -175,7 +184,7 @@ mod tests {
             [op >> 16, op & 0xFFFF].iter().flat_map(|half| (*half as u16).to_le_bytes()).collect();
         let cost = of_block(&code);
         assert_eq!(cost.instructions, 1);
-        cost.cycles
+        u32::from(cost.cycles)
     }
 
     #[test]

@@ -6,23 +6,22 @@ use unicorn_engine::{
     uc_error,
 };
 
+use crate::clock::{self, Library};
 use crate::core::{Core, Halt, Unmapped};
-use crate::cost::Cost;
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
-use crate::nvic::Masks;
-use crate::scb::{DIV_0_TRP, cfsr};
+use crate::scb::DIV_0_TRP;
 use crate::{alignment, ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
 /// A page of our own, outside everything the chip has, for code that the emulator itself runs.
-const HIDDEN: u64 = 0x1F00_0000;
+pub(crate) const HIDDEN: u64 = 0x1F00_0000;
 /// `clrex; wfi`
 const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
 
 /// Whatever lies below is flash.
-const RAM: u32 = 0x2000_0000;
+pub(crate) const RAM: u32 = 0x2000_0000;
 
 /// YIELD and WFE.
 const HINTS: [u16; 2] = [0xBF10, 0xBF20];
@@ -54,7 +53,7 @@ pub(crate) fn new<P: Peripherals + 'static>(model: &Model, core: Core<P>) -> Res
 }
 
 fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Result<(), Error> {
-    cpu.add_block_hook(1, 0, on_block)?;
+    clock::charge_blocks(cpu)?;
     cpu.add_intr_hook(on_interrupt)?;
     cpu.add_insn_invalid_hook(on_invalid)?;
     cpu.ctl_set_tlb_type(TlbType::VIRTUAL)?;
@@ -67,15 +66,6 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
     let flash = model.flash.clone();
     cpu.add_mem_hook(HookType::MEM_WRITE_PROT, flash.start.into(), (flash.end - 1).into(), on_flash_write)?;
     Ok(())
-}
-
-/// The clock: charges a block before it runs, or stops before it when something is due.
-fn on_block<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
-    if address & !0xFFF == HIDDEN {
-        guard_hidden(cpu);
-    } else if cpu.get_data().stepping.is_none() {
-        pass(cpu, address, size);
-    }
 }
 
 /// Has every instruction charged by itself from now on.
@@ -98,8 +88,9 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     let charged = cpu.get_data().memory.read(place, &mut code).map_or(size, |()| stepping::length(&code));
     let traps_division = cpu.get_data().scb.ccr & DIV_0_TRP != 0;
     if let Some(status) = alignment::fault(&code, traps_division, |number| core_register(cpu, number)) {
-        refuse(cpu, status);
-    } else if pass(cpu, address, charged) {
+        let library = Library::of(cpu);
+        clock::refuse(library, cpu.get_data_mut(), status);
+    } else if clock::pass(Library::of(cpu), cpu.get_data_mut(), place, charged) {
         let core = cpu.get_data_mut();
         let wait = core.stepping.as_mut().map_or(0, |stepping| {
             stepping.charged(place, size, charged);
@@ -125,7 +116,7 @@ fn on_watched<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u3
     let mut code = [0; stepping::LONGEST_BLOCK];
     let block = core.memory.read(address as u32, &mut code).map_or(size, |()| stepping::length(&code));
     if core.watch.as_mut().is_some_and(|watch| watch.stops_before(address as u32, size, block)) {
-        core.halt = Some(Halt::Watched);
+        core.stop_for(Halt::Watched);
         let _ = cpu.emu_stop();
     }
 }
@@ -140,34 +131,6 @@ pub(crate) fn core_register<P>(cpu: &Unicorn<Core<P>>, number: u16) -> u32 {
     cpu.reg_read(register).unwrap_or(0) as u32
 }
 
-/// Charges code that is about to run, or stops before it when something is due.
-fn pass<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) -> bool {
-    let core = cpu.get_data();
-    let waits = core.flash_closed && address < u64::from(RAM);
-    if waits || core.halt.is_some() || core.needs_attention() || core.nvic.could_preempt() && preempts(cpu) {
-        cpu.get_data_mut().halt.get_or_insert(Halt::Attention);
-        let _ = cpu.emu_stop();
-        return false;
-    }
-    let cost = core.costs.get(address as u32, size).unwrap_or_else(|| learn(cpu, address, size));
-    let core = cpu.get_data_mut();
-    if cost.floats && !core.scb.allows_floats() {
-        return refuse(cpu, cfsr::NOCP);
-    }
-    core.place = address as u32;
-    core.exclusive |= cost.exclusive;
-    core.profile.visit(address as u32, size);
-    core.spend(cost.instructions, cost.cycles);
-    true
-}
-
-/// Stops before code that faults.
-fn refuse<P>(cpu: &mut Unicorn<Core<P>>, status: u32) -> bool {
-    cpu.get_data_mut().halt = Some(Halt::Usage(status));
-    let _ = cpu.emu_stop();
-    false
-}
-
 /// Lets loads from flash fail while it is busy, or lets them through again.
 pub(crate) fn close_flash<P: Peripherals>(cpu: &mut Cpu<P>, model: &Model, closed: bool) {
     if cpu.get_data().flash_closed != closed {
@@ -179,42 +142,9 @@ pub(crate) fn close_flash<P: Peripherals>(cpu: &mut Cpu<P>, model: &Model, close
     }
 }
 
-/// The page of our own is not there for the program.
-fn guard_hidden<P>(cpu: &mut Unicorn<Core<P>>) {
-    if !cpu.get_data().clearing_monitor {
-        cpu.get_data_mut().halt = Some(Halt::Undefined);
-        let _ = cpu.emu_stop();
-    }
-}
-
-fn learn<P>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) -> Cost {
-    let mut code = vec![0; size as usize];
-    // The block is about to run, so it can be read.
-    let _ = cpu.mem_read(address, &mut code);
-    cpu.get_data_mut().costs.learn(address as u32, &code)
-}
-
-fn preempts<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> bool {
-    cpu.get_data().to_take(masks(cpu)).is_some()
-}
-
-/// The masking registers, less what a test has switched off.
-pub(crate) fn masks<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> Masks {
-    let read = |register| cpu.reg_read(register).unwrap_or(0);
-    Masks {
-        primask: read(RegisterARM::PRIMASK) & 1 != 0,
-        faultmask: read(RegisterARM::FAULTMASK) & 1 != 0,
-        basepri: if cpu.get_data().lacks(Mechanism::Basepri) {
-            0
-        } else {
-            read(RegisterARM::BASEPRI) as u8 & 0xF0
-        },
-    }
-}
-
 fn on_interrupt<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, number: u32) {
     // QEMU's numbers of exceptions, target/arm/cpu.h.
-    cpu.get_data_mut().halt = Some(match number {
+    cpu.get_data_mut().stop_for(match number {
         2 => Halt::SupervisorCall,
         7 => Halt::Breakpoint,
         8 => Halt::ExceptionReturn,
@@ -262,7 +192,7 @@ fn on_flash_write<P: Peripherals>(
 /// After a call into the chip or the system space: effects and interrupts, or a fault when nothing answered.
 fn finish<P: Peripherals>(core: &mut Core<P>, address: u32, answer: Option<()>) {
     if answer.is_none() {
-        core.halt = Some(Halt::DataFault(address));
+        core.stop_for(Halt::DataFault(address));
     }
     core.settle();
 }

@@ -3,7 +3,7 @@
 use chip::Peripherals;
 use unicorn_engine::RegisterARM;
 
-use crate::engine;
+use crate::clock;
 use crate::exception::Exception;
 use crate::incident::Incident;
 use crate::machine::Machine;
@@ -74,7 +74,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     pub(crate) fn take_fault(&mut self, fault: Fault) {
         let fault = Fault { lr: self.register(RegisterARM::LR), ..fault };
         self.record(&fault);
-        let masks = engine::masks(&self.cpu);
+        let masks = clock::masks(&self.cpu);
         let wanted = self.exception_of(&fault);
         match self.escalated(wanted, masks) {
             Some(exception) => self.enter(exception),
@@ -86,7 +86,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// stays pending (ARMv7-M, B1.5.10).
     pub(crate) fn derived(&mut self, fault: Fault, exception: Exception) -> Exception {
         self.record(&fault);
-        let masks = engine::masks(&self.cpu);
+        let masks = clock::masks(&self.cpu);
         let wanted = self.exception_of(&fault);
         self.escalated(wanted, masks).unwrap_or(exception)
     }

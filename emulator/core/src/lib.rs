@@ -32,6 +32,7 @@
 //!   [`Machine::interleave`] only, and not in an IT block; CCR.UNALIGN_TRP is not modelled and reported as a [`chip::Breach`].
 
 mod alignment;
+mod clock;
 mod context;
 mod core;
 mod cost;

@@ -4,6 +4,7 @@ use canbus::Time;
 use chip::{BusFault, Effect, Peripherals};
 use unicorn_engine::{RegisterARM, UcHookId, uc_error};
 
+use crate::clock;
 use crate::core::{Core, Halt};
 use crate::engine::{self, Cpu};
 use crate::exception::Exception;
@@ -310,7 +311,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     /// One step of the core: an exception, sleep, or code.
     fn step(&mut self, until: Time) {
-        let masks = engine::masks(&self.cpu);
+        let masks = clock::masks(&self.cpu);
         if self.loading && self.now() < self.stall {
             return self.wait_for_flash(until);
         }
@@ -365,6 +366,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         engine::forget_code_in_ram(&mut self.cpu, pc);
         let core = self.cpu.get_data_mut();
         core.halt = None;
+        core.look_again();
         core.unmapped = None;
         let result = self.cpu.emu_start(u64::from(self.pc() | 1), 0, 0, 0);
         match (result, self.cpu.get_data_mut().halt.take()) {
@@ -394,7 +396,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     /// A call that cannot be taken at once becomes a HardFault (ARMv7-M, B1.5.2).
     fn supervisor_call(&mut self) {
-        let masks = engine::masks(&self.cpu);
+        let masks = clock::masks(&self.cpu);
         let core = self.cpu.get_data_mut();
         if core.nvic.may_preempt(Exception::SV_CALL, masks) {
             core.pend(Exception::SV_CALL);

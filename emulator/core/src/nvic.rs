@@ -150,6 +150,7 @@ impl Nvic {
     }
 
     /// Whether an exception may preempt if no register masks it: the cheap question before the exact one.
+    #[inline]
     pub(crate) fn could_preempt(&self) -> bool {
         self.pending & self.enabled != 0 && self.to_take(Masks::default()).is_some()
     }

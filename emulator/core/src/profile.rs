@@ -21,10 +21,16 @@ pub struct Visits {
 }
 
 impl Profile {
+    #[inline]
     pub(crate) fn visit(&mut self, address: u32, size: u32) {
         if self.is_on {
-            *self.visits.entry((address, size)).or_default() += 1;
+            self.count(address, size);
         }
+    }
+
+    #[cold]
+    fn count(&mut self, address: u32, size: u32) {
+        *self.visits.entry((address, size)).or_default() += 1;
     }
 
     pub(crate) fn take(&mut self) -> Vec<Visits> {

@@ -55,13 +55,15 @@ pub struct Stats {
     pub cycles: u64,
     /// Time spent in WFI.
     pub asleep: Time,
-    /// By exception number; 0 is Thread mode.
+    /// By exception number. Thread mode has no entry and no end, and so nothing here.
     pub exceptions: [Activity; Exception::COUNT],
     /// Exceptions that followed another without unstacking.
     pub tail_chained: u64,
     /// A hash over every exception entry with its time and return address: equal runs have equal hashes.
     pub trace: u64,
-    running: Vec<Running>,
+    running: Running,
+    /// What goes on when `running` ends; Thread mode first.
+    preempted: Vec<Running>,
 }
 
 /// One activation that has not ended.
@@ -70,6 +72,12 @@ struct Running {
     exception: Exception,
     instructions: u64,
     cycles: u64,
+}
+
+impl Running {
+    fn new(exception: Exception) -> Running {
+        Running { exception, instructions: 0, cycles: 0 }
+    }
 }
 
 impl Default for Stats {
@@ -81,7 +89,8 @@ impl Default for Stats {
             exceptions: [Activity::default(); Exception::COUNT],
             tail_chained: 0,
             trace: 0xCBF2_9CE4_8422_2325,
-            running: Vec::new(),
+            running: Running::new(Exception::THREAD),
+            preempted: Vec::new(),
         }
     }
 }
@@ -100,25 +109,19 @@ impl Stats {
         }
     }
 
+    #[inline]
     pub(crate) fn ran(&mut self, instructions: u32, cycles: u32) {
         self.instructions += u64::from(instructions);
         self.cycles += u64::from(cycles);
-        match self.running.last_mut() {
-            Some(running) => {
-                running.instructions += u64::from(instructions);
-                running.cycles += u64::from(cycles);
-            }
-            None => {
-                self.exceptions[0].instructions += u64::from(instructions);
-                self.exceptions[0].cycles += u64::from(cycles);
-            }
-        }
+        self.running.instructions += u64::from(instructions);
+        self.running.cycles += u64::from(cycles);
     }
 
     pub(crate) fn entered(&mut self, exception: Exception, latency: Time, at: Time, pc: u32) {
         let activity = &mut self.exceptions[usize::from(exception.0)];
         activity.note_entry(latency, at);
-        self.running.push(Running { exception, instructions: 0, cycles: 0 });
+        let preempted = std::mem::replace(&mut self.running, Running::new(exception));
+        self.preempted.push(preempted);
         for word in [u64::from(exception.0), at.0, u64::from(pc)] {
             // FNV-1a over words.
             self.trace = (self.trace ^ word).wrapping_mul(0x0000_0100_0000_01B3);
@@ -126,7 +129,8 @@ impl Stats {
     }
 
     pub(crate) fn left(&mut self) {
-        let Some(Running { exception, instructions, cycles }) = self.running.pop() else { return };
+        let Some(preempted) = self.preempted.pop() else { return };
+        let Running { exception, instructions, cycles } = std::mem::replace(&mut self.running, preempted);
         let activity = &mut self.exceptions[usize::from(exception.0)];
         activity.instructions += instructions;
         activity.cycles += cycles;
@@ -136,7 +140,7 @@ impl Stats {
 
     /// A reset ends every activation.
     pub(crate) fn unwound(&mut self) {
-        while !self.running.is_empty() {
+        while !self.preempted.is_empty() {
             self.left();
         }
     }

@@ -1,0 +1,153 @@
+//! The clock of virtual time: code is charged before it runs, or stopped before when something is due.
+//!
+//! This is what the emulator does most: the CPU library calls it directly, without the look at reference counts that its Rust
+//! binding has in every call.
+
+use std::ffi::c_void;
+
+use chip::Peripherals;
+use unicorn_engine::hook::sys::{uc_emu_stop, uc_hook_add, uc_reg_read};
+use unicorn_engine::hook::uc_engine;
+use unicorn_engine::{HookType, RegisterARM, Unicorn, uc_error};
+
+use crate::core::{Core, Halt};
+use crate::cost::{Cost, EXCLUSIVE, FLOATS};
+use crate::engine::{Cpu, HIDDEN, RAM};
+use crate::mechanism::Mechanism;
+use crate::nvic::Masks;
+use crate::scb::cfsr;
+
+/// The CPU library, for what its hooks may do with it.
+#[derive(Clone, Copy)]
+pub(crate) struct Library(*mut uc_engine);
+
+impl Library {
+    pub(crate) fn of<P>(cpu: &Unicorn<Core<P>>) -> Library {
+        Library(cpu.get_handle())
+    }
+
+    /// Has the code stop here.
+    pub(crate) fn stop(self) {
+        // SAFETY: the handle is that of the CPU whose hook runs.
+        unsafe { uc_emu_stop(self.0) };
+    }
+
+    /// A register; 0 where the library refuses.
+    fn register(self, register: RegisterARM) -> u64 {
+        let mut value = 0_u64;
+        // SAFETY: as in `stop`; no register of the core is longer than the value.
+        unsafe { uc_reg_read(self.0, register as i32, (&raw mut value).cast()) };
+        value
+    }
+}
+
+/// Has every block of code charged.
+pub(crate) fn charge_blocks<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), uc_error> {
+    let core: *mut Core<P> = cpu.get_data_mut();
+    let mut hook = 0;
+    let (first, last) = (1_u64, 0_u64);
+    // SAFETY: the core lives in the CPU, at a place that does not change, as long as the hook does; the signature is that of a
+    // hook for blocks. From the first address after the last one is everywhere.
+    unsafe {
+        let on_block: unsafe extern "C" fn(*mut uc_engine, u64, u32, *mut Core<P>) = on_block::<P>;
+        uc_hook_add(
+            cpu.get_handle(),
+            &raw mut hook,
+            HookType::BLOCK.0 as i32,
+            on_block as *mut c_void,
+            core.cast(),
+            first,
+            last,
+        )
+    }
+    .and(Ok(()))
+}
+
+/// # Safety
+/// The library calls this as `charge_blocks` has asked for it, and nobody else in Rust uses the core meanwhile.
+unsafe extern "C" fn on_block<P: Peripherals>(
+    uc: *mut uc_engine,
+    address: u64,
+    size: u32,
+    core: *mut Core<P>,
+) {
+    // SAFETY: see above.
+    let core = unsafe { &mut *core };
+    if address & !0xFFF == HIDDEN {
+        guard_hidden(Library(uc), core);
+    } else if core.stepping.is_none() {
+        pass(Library(uc), core, address as u32, size);
+    }
+}
+
+/// The page of our own is not there for the program.
+fn guard_hidden<P: Peripherals>(library: Library, core: &mut Core<P>) {
+    if !core.clearing_monitor {
+        core.stop_for(Halt::Undefined);
+        library.stop();
+    }
+}
+
+/// Charges code that is about to run, or stops before it when something is due.
+#[inline]
+pub(crate) fn pass<P: Peripherals>(library: Library, core: &mut Core<P>, address: u32, size: u32) -> bool {
+    if !core.is_undisturbed() && is_stopped(library, core, address) {
+        core.stop_for(core.halt.unwrap_or(Halt::Attention));
+        library.stop();
+        return false;
+    }
+    let cost = match core.costs.get(address, size) {
+        Some(cost) => *cost,
+        None => learn(core, address, size),
+    };
+    if cost.uses != 0 && !allows(core, cost.uses) {
+        return refuse(library, core, cfsr::NOCP);
+    }
+    core.place = address;
+    core.profile.visit(address, size);
+    core.spend(cost.instructions.into(), cost.cycles.into());
+    true
+}
+
+/// Whether the program may run a block with these uses. That an exclusive access begins is kept.
+fn allows<P>(core: &mut Core<P>, uses: u16) -> bool {
+    core.exclusive |= uses & EXCLUSIVE != 0;
+    uses & FLOATS == 0 || core.scb.allows_floats()
+}
+
+/// The exact question.
+#[cold]
+fn is_stopped<P: Peripherals>(library: Library, core: &Core<P>, address: u32) -> bool {
+    let waits = core.flash_closed && address < RAM;
+    let preempts = || core.nvic.could_preempt() && core.to_take(masks_of(library, core)).is_some();
+    waits || core.halt.is_some() || core.needs_attention() || preempts()
+}
+
+/// Stops before code that faults.
+pub(crate) fn refuse<P: Peripherals>(library: Library, core: &mut Core<P>, status: u32) -> bool {
+    core.stop_for(Halt::Usage(status));
+    library.stop();
+    false
+}
+
+#[cold]
+fn learn<P>(core: &mut Core<P>, address: u32, size: u32) -> Cost {
+    let mut code = vec![0; size as usize];
+    // The block is about to run, so it can be read.
+    let _ = core.memory.read(address, &mut code);
+    core.costs.learn(address, &code)
+}
+
+/// The masking registers, less what a test has switched off.
+pub(crate) fn masks<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> Masks {
+    masks_of(Library::of(cpu), cpu.get_data())
+}
+
+fn masks_of<P: Peripherals>(library: Library, core: &Core<P>) -> Masks {
+    let without_basepri = core.lacks(Mechanism::Basepri);
+    Masks {
+        primask: library.register(RegisterARM::PRIMASK) & 1 != 0,
+        faultmask: library.register(RegisterARM::FAULTMASK) & 1 != 0,
+        basepri: if without_basepri { 0 } else { library.register(RegisterARM::BASEPRI) as u8 & 0xF0 },
+    }
+}
