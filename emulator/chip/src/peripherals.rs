@@ -20,6 +20,14 @@ impl IrqLines {
     pub fn set(&mut self, irq: u8, level: bool) {
         self.irqs = self.irqs & !(1 << irq) | u128::from(level) << irq;
     }
+
+    /// Adds one line to those that are up. Most are down most of the time.
+    #[inline]
+    pub(crate) fn raise(&mut self, irq: u8, level: bool) {
+        if level {
+            self.irqs |= 1 << irq;
+        }
+    }
 }
 
 /// The bus answered an access with an error: the core raises a BusFault.

@@ -55,7 +55,7 @@ impl Peripherals for Stm32f4 {
         // The bus moves the CAN controllers without a call here.
         let mut lines = self.lines;
         for (irqs, Lines { tx, rx0, rx1, sce }) in CAN_IRQS.iter().zip(self.can.lines()) {
-            irqs.iter().zip([tx, rx0, rx1, sce]).for_each(|(&irq, level)| lines.set(irq, level));
+            irqs.iter().zip([tx, rx0, rx1, sce]).for_each(|(&irq, level)| lines.raise(irq, level));
         }
         lines
     }
@@ -185,7 +185,7 @@ impl Stm32f4 {
 
     fn levels(&self) -> IrqLines {
         let mut lines = IrqLines { nmi: self.rcc.clock_has_failed(), ..IrqLines::default() };
-        let mut raise = |irq: u8, level: bool| lines.irqs |= u128::from(level) << irq;
+        let mut raise = |irq: u8, level: bool| lines.raise(irq, level);
         self.timers.iter().zip(&TIMERS).for_each(|(timer, place)| raise(place.irq, timer.interrupt()));
         self.spis.iter().zip(&SPIS).for_each(|(spi, place)| raise(place.irq, spi.interrupt()));
         for (dma, irqs) in self.dmas.iter().zip(DMA_IRQS) {
