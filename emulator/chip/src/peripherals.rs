@@ -90,6 +90,12 @@ pub trait Peripherals {
     /// The interrupt lines now.
     fn lines(&self) -> IrqLines;
 
+    /// Whether there may be another deadline, level of a line, broken rule or effect than when this was last asked. What the
+    /// bus does to the CAN controllers meanwhile does not count.
+    fn take_change(&mut self) -> bool {
+        true
+    }
+
     /// Takes the next rule that was found broken, each once.
     fn breach(&mut self) -> Option<Breach> {
         None

@@ -98,6 +98,11 @@ impl Rules {
         }
     }
 
+    /// Whether there is one that nobody has been told of.
+    pub(crate) fn any_broken(&self) -> bool {
+        !self.fresh.is_empty()
+    }
+
     /// The next breach that nobody has been told of.
     pub(crate) fn take(&mut self) -> Option<Breach> {
         self.fresh.pop_front()

@@ -60,6 +60,10 @@ impl Peripherals for Stm32f4 {
         lines
     }
 
+    fn take_change(&mut self) -> bool {
+        std::mem::take(&mut self.has_settled) || !self.effects.is_empty() || self.rules.any_broken()
+    }
+
     fn breach(&mut self) -> Option<Breach> {
         self.rules.take()
     }
@@ -158,6 +162,7 @@ impl Stm32f4 {
     pub(crate) fn settle(&mut self, now: Time) {
         self.deadline = self.next_event(now);
         self.lines = self.levels();
+        self.has_settled = true;
         if self.can.take_poke() {
             self.effects.push_back(Effect::Poke);
         }

@@ -66,6 +66,8 @@ pub struct Stm32f4 {
     /// The reset that the chip itself has asked for.
     pub(crate) asked: Option<Cause>,
     pub(crate) lines: IrqLines,
+    /// Deadline and lines were made up anew since the core asked.
+    pub(crate) has_settled: bool,
     pub(crate) deadline: Time,
 }
 
@@ -101,6 +103,7 @@ impl Stm32f4 {
             losses: Losses::default(),
             asked: None,
             lines: IrqLines::default(),
+            has_settled: true,
             deadline: Time::NEVER,
             board,
         };

@@ -17,11 +17,18 @@ pub(crate) const EXCLUSIVE: u16 = 1;
 /// The block uses the floating-point unit.
 pub(crate) const FLOATS: u16 = 2;
 
-/// The costs of blocks that ran before, one place for each address modulo the size of the table.
+/// The costs of blocks that ran before.
 #[derive(Clone, Debug)]
-pub(crate) struct Costs(Box<[Known; PLACES]>);
+pub(crate) struct Costs {
+    /// One place for each address modulo the size of the table.
+    known: Box<[Known; PLACES]>,
+    /// Pages in which a block begins that is known.
+    pages: Vec<u32>,
+}
 
 const PLACES: usize = 1 << 14;
+/// In bytes. No block goes on beyond its page, but for its last instruction.
+const PAGE: u32 = 1 << 12;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
@@ -32,7 +39,7 @@ struct Known {
 
 impl Default for Costs {
     fn default() -> Costs {
-        Costs(Box::new([Known::default(); PLACES]))
+        Costs { known: Box::new([Known::default(); PLACES]), pages: Vec::new() }
     }
 }
 
@@ -40,20 +47,34 @@ impl Costs {
     /// The cost of a block, when it is known.
     #[inline]
     pub(crate) fn get(&self, address: u32, size: u32) -> Option<&Cost> {
-        let known = &self.0[place(address)];
+        let known = &self.known[place(address)];
         (known.address == address && u32::from(known.size) == size).then_some(&known.cost)
     }
 
     /// Computes the cost of a block and remembers it.
     pub(crate) fn learn(&mut self, address: u32, code: &[u8]) -> Cost {
         let cost = of_block(code);
-        self.0[place(address)] = Known { address, size: code.len() as u16, cost };
+        self.known[place(address)] = Known { address, size: code.len() as u16, cost };
+        let page = address / PAGE;
+        if !self.pages.contains(&page) {
+            self.pages.push(page);
+        }
         cost
     }
 
-    /// Code has changed.
-    pub(crate) fn forget(&mut self) {
-        self.0.fill(Known::default());
+    /// Code has changed, up to `end`. Flash is written much more often than code that ran is.
+    pub(crate) fn forget(&mut self, start: u32, end: u32) {
+        const LONGEST_INSTRUCTION: u32 = 4;
+        let changed = start.saturating_sub(LONGEST_INSTRUCTION) / PAGE..end.div_ceil(PAGE);
+        for page in changed {
+            if let Some(index) = self.pages.iter().position(|known| *known == page) {
+                self.pages.swap_remove(index);
+                let first = page * PAGE;
+                (first..first + PAGE)
+                    .step_by(2)
+                    .for_each(|address| self.known[place(address)] = Known::default());
+            }
+        }
     }
 }
 

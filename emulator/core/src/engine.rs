@@ -197,12 +197,22 @@ fn finish<P: Peripherals>(core: &mut Core<P>, address: u32, answer: Option<()>) 
     core.settle();
 }
 
+/// After a load from the chip, which seldom changes anything.
+fn finish_load<P: Peripherals>(core: &mut Core<P>, address: u32, answered: bool) {
+    if !answered {
+        core.stop_for(Halt::DataFault(address));
+    }
+    if core.chip.take_change() {
+        core.settle();
+    }
+}
+
 fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: u32) -> Result<(), Error> {
     let read = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize| {
         let core = cpu.get_data_mut();
         let address = base + offset as u32;
         let value = core.chip.read(address, size as u8, core.now);
-        finish(core, address, value.ok().map(|_| ()));
+        finish_load(core, address, value.is_ok());
         u64::from(value.unwrap_or(0))
     };
     let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize, value: u64| {
@@ -222,7 +232,7 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
         let (address, bit) = target(offset);
         let core = cpu.get_data_mut();
         let value = core.chip.read(address, 4, core.now);
-        finish(core, address, value.ok().map(|_| ()));
+        finish_load(core, address, value.is_ok());
         u64::from(value.unwrap_or(0) >> bit & 1)
     };
     let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, _: usize, value: u64| {
@@ -325,7 +335,7 @@ pub(crate) fn forget_code_in_ram<P: Peripherals>(cpu: &mut Cpu<P>, pc: u32) {
         // To look for it is to fetch, for the library.
         cpu.get_data_mut().memory.code_in_ram.clear();
         let _ = cpu.ctl_flush_tlb();
-        cpu.get_data_mut().costs.forget();
+        cpu.get_data_mut().costs.forget(ram.start, ram.end);
     }
 }
 
@@ -350,7 +360,7 @@ pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]
     let has_code = address < RAM || !core.memory.code_in_ram.is_empty();
     if has_code && !core.lacks(Mechanism::Retranslation) {
         if address < RAM {
-            core.costs.forget();
+            core.costs.forget(address, address + bytes.len() as u32);
         }
         let end = u64::from(address) + bytes.len() as u64;
         cpu.ctl_remove_cache(address.into(), end)?;
