@@ -1,8 +1,8 @@
 //! `cargo xtask test`: every check of the project.
 //!
-//! Two lanes at a time compile, one for this machine and one for the Cortex-M4. Then the tests run, as many at a time as there are
-//! cores, each in a process of its own, and the two lanes go on beside them with lints and documentation. A step or a
-//! test that fails has its output printed; the output of all is in target/test-logs.
+//! Two lanes at a time compile, one for this machine and one for the Cortex-M4. Then the tests run, each in a process of its own: as
+//! many at a time as there are cores, and as many again of those that mostly wait. The two lanes go on beside them with lints and
+//! documentation. A step or a test that fails has its output printed; the output of all is in target/test-logs.
 
 mod checks;
 mod host;

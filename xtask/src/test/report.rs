@@ -21,12 +21,19 @@ const PERIOD: Duration = Duration::from_secs(20);
 /// Something to do, which succeeds or fails.
 pub(super) struct Step {
     name: String,
+    /// Most of its time passes with waiting, as at the speed of a real board.
+    waits: bool,
     action: Box<dyn FnOnce() -> Result<()> + Send>,
 }
 
 impl Step {
     pub(super) fn new(name: impl Into<String>, action: impl FnOnce() -> Result<()> + Send + 'static) -> Step {
-        Step { name: name.into(), action: Box::new(action) }
+        Step { name: name.into(), waits: false, action: Box::new(action) }
+    }
+
+    /// The same, which leaves the processor to others most of the time.
+    pub(super) fn that_waits(self) -> Step {
+        Step { waits: true, ..self }
     }
 
     pub(super) fn name(&self) -> &str {
@@ -37,6 +44,7 @@ impl Step {
 /// Tests that wait for a worker. A test that fails keeps no other from running.
 struct Pool {
     all: usize,
+    busy: Mutex<VecDeque<Step>>,
     waiting: Mutex<VecDeque<Step>>,
     finished: AtomicUsize,
     told: Mutex<Instant>,
@@ -48,14 +56,15 @@ impl Pool {
         if all > 0 {
             eprintln!("== {all} tests");
         }
-        let waiting = Mutex::new(VecDeque::from(tests));
-        Pool { all, waiting, finished: AtomicUsize::new(0), told: Mutex::new(Instant::now()) }
+        let (waiting, busy): (VecDeque<Step>, VecDeque<Step>) = tests.into_iter().partition(|test| test.waits);
+        let (busy, waiting) = (Mutex::new(busy), Mutex::new(waiting));
+        Pool { all, busy, waiting, finished: AtomicUsize::new(0), told: Mutex::new(Instant::now()) }
     }
 
-    /// Takes tests until there are none. Now and then the number of those that have run is told.
-    fn work(&self, run: impl Fn(Step) -> bool) {
+    /// Takes tests from a queue until there are none. Now and then the number of those that have run is told.
+    fn work(&self, queue: &Mutex<VecDeque<Step>>, run: impl Fn(Step) -> bool) {
         // The queue is free again before the test runs.
-        let next = || lock(&self.waiting).pop_front();
+        let next = || lock(queue).pop_front();
         while let Some(test) = next() {
             run(test);
             let finished = self.finished.fetch_add(1, Ordering::Relaxed) + 1;
@@ -97,7 +106,8 @@ impl<'a> Report<'a> {
         self.only
     }
 
-    /// Runs lanes of steps, each in its order, and beside them the tests in any order, as many at a time as there are cores.
+    /// Runs lanes of steps, each in its order, and beside them the tests in any order: as many at a time as there are cores, and as many
+    /// again of those that wait.
     pub(super) fn run(&self, lanes: [Vec<Step>; 2], tests: Vec<Step>) -> Result<()> {
         let workers = thread::available_parallelism().map_or(2, usize::from);
         let pool = Pool::new(tests);
@@ -106,7 +116,9 @@ impl<'a> Report<'a> {
                 scope.spawn(|| self.lane(lane));
             }
             for _ in 0..workers {
-                scope.spawn(|| pool.work(|test| self.step(test, true)));
+                for queue in [&pool.busy, &pool.waiting] {
+                    scope.spawn(|| pool.work(queue, |test| self.step(test, true)));
+                }
             }
         });
         self.ensure_none_failed()

@@ -65,7 +65,7 @@ fn of_python(thorough: bool) -> Result<Vec<Step>> {
     files.retain(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("test_")));
     let step = |file: std::path::PathBuf| {
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Step::new(format!("python: {name}"), move || python(&file, thorough))
+        Step::new(format!("python: {name}"), move || python(&file, thorough)).that_waits()
     };
     Ok(files.into_iter().map(step).collect())
 }
