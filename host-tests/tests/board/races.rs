@@ -81,7 +81,8 @@ fn a_sample_is_whole_and_in_time() {
     }
 }
 
-/// The battery keeps the position through a power cut at any instant of the millisecond in which it is written.
+/// The battery keeps the position through a power cut at any instant of the millisecond in which it is written: at three of eight
+/// instants without `--thorough`.
 #[test]
 fn what_a_battery_keeps_is_valid_after_a_cut_at_any_instant() {
     const POSITION: (u16, u8) = (0x6004, 0);
@@ -91,7 +92,7 @@ fn what_a_battery_keeps_is_valid_after_a_cut_at_any_instant() {
         let master = Master::join(&mut world);
         world.apply(&Stimulus::parse("shaft", "ramp:0,37.25,0.5").unwrap()).unwrap();
         world.run_until(world.now() + Time::from_millis(600));
-        for cut in 0..8 {
+        for cut in (0..8).step_by(either(3, 1)) {
             world.run_until(world.now() + Time::from_micros(20_000 + 131 * cut));
             let now = world.now();
             world.machine(0).power_off();

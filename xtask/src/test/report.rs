@@ -56,7 +56,8 @@ impl Pool {
         if all > 0 {
             eprintln!("== {all} tests");
         }
-        let (waiting, busy): (VecDeque<Step>, VecDeque<Step>) = tests.into_iter().partition(|test| test.waits);
+        let (waiting, busy): (VecDeque<Step>, VecDeque<Step>) =
+            tests.into_iter().partition(|test| test.waits);
         let (busy, waiting) = (Mutex::new(busy), Mutex::new(waiting));
         Pool { all, busy, waiting, finished: AtomicUsize::new(0), told: Mutex::new(Instant::now()) }
     }

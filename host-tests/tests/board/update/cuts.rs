@@ -120,9 +120,9 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
 }
 
 /// Every one of so many operations is cut where not all are.
-const SAMPLE: u64 = 6;
+const SAMPLE: u64 = 10;
 
-/// Cuts at every operation whose number has this rest by two, so that two processes share the work; at a sixth of them
+/// Cuts at every operation whose number has this rest by two, so that two processes share the work; at a tenth of them
 /// without `--thorough`.
 fn cut_everywhere(rest: u64) {
     let mut victim = Victim::new();

@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use canbus::Time;
 use clap::Parser;
+use host_tests::thorough::either;
 use nodectl::cli::Cli;
 use serde_json::{Value, json};
 use sign::image::Image;
@@ -102,12 +103,15 @@ fn nodectl_updates_to_b_and_back() {
     assert_eq!(update(&world, "1", &a, None), [updated(1, [&b, &a])]);
 }
 
-/// The one gets its turn after the others, and is gone on with.
+/// The one gets its turn after the others, and is gone on with. Four nodes in a thorough run, else two.
 #[test]
-fn four_nodes_of_which_one_is_switched_off_halfway_and_gone_on_with() {
-    let world = boards(4);
+fn a_node_of_several_is_switched_off_halfway_and_gone_on_with() {
+    let (nodes, off) = either((2, 1), (4, 2));
+    let world = boards(nodes);
     let (a, b) = (version_a(), version_b(0));
-    let outage = Outage::halfway(&world, 1, &b);
-    let reports = update(&world, "1-4", &b, Some(outage));
-    assert_eq!(reports, [1, 3, 4, 2].map(|node| updated(node, [&a, &b])));
+    let outage = Outage::halfway(&world, usize::from(off) - 1, &b);
+    let reports = update(&world, &format!("1-{nodes}"), &b, Some(outage));
+    let others = (1..=nodes).filter(|&node| node != off);
+    let in_turn: Vec<Value> = others.chain([off]).map(|node| updated(node, [&a, &b])).collect();
+    assert_eq!(reports, in_turn);
 }

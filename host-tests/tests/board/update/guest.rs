@@ -21,7 +21,7 @@ const NOBODY: u8 = 126;
 
 /// How long the neighbour is watched.
 fn span() -> Time {
-    either(SECOND * 4, SECOND * 60)
+    either(SECOND * 2, SECOND * 60)
 }
 
 /// What is damaged.
