@@ -96,6 +96,8 @@ impl Stm32f4 {
                 self.rules.conversions_checked = false;
                 self.check_clocks();
             }
+            Unit::Dma(controller) => self.check_flags(controller),
+            Unit::Spi(spi) => self.check_ssi(spi),
             Unit::Adc | Unit::AdcCommon | Unit::Gpio(_) => self.rules.conversions_checked = false,
             _ => {}
         }

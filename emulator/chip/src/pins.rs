@@ -57,9 +57,11 @@ impl Stm32f4 {
         }
     }
 
-    /// Whether the absolute encoder is on an SPI: on SPI2 only, and while both of its pins are switched to it.
+    /// Whether the absolute encoder is on an SPI: on SPI2 only, while both of its pins are switched to it and in the mode that SSI
+    /// wants.
     pub(crate) fn ssi_is_wired(&self, spi: usize) -> bool {
         spi == SPI2
+            && self.spis[spi].fits_ssi()
             && [SSI_CLOCK, SSI_DATA].iter().all(|&pin| self.ports[PORT_B].alternate(pin, SPI_FUNCTION))
     }
 

@@ -62,6 +62,14 @@ pub enum Breach {
         /// The sample point.
         permille: u32,
     },
+    /// A DMA stream is enabled before the flags of its last transfer were cleared (RM0390 section 9.5.5, EN).
+    #[error("stream {stream} of DMA{controller} begins with flags of its last transfer")]
+    DmaFlags {
+        /// 1 or 2.
+        controller: usize,
+        /// 0 to 7.
+        stream: usize,
+    },
     /// A peripheral is accessed whose clock is off or whose reset is held.
     #[error("{name} is accessed without its clock")]
     ClockOff {
@@ -117,6 +125,8 @@ const PLL_INPUT: RangeInclusive<u64> = 950_000..=2_100_000;
 const PLL_VCO: RangeInclusive<u64> = 100 * MEGA..=432 * MEGA;
 /// The ADC clock at 2.4 to 3.6 V.
 const ADC_CLOCK: RangeInclusive<u64> = 600_000..=36 * MEGA;
+/// What absolute encoders with SSI take.
+const SSI_CLOCK: RangeInclusive<u64> = 0..=MEGA;
 /// What the temperature sensor and the internal reference need.
 const INTERNAL_SOURCE: Time = Time::from_micros(10);
 /// The range of sample points in CiA 301, table 1, in permille.
@@ -183,6 +193,20 @@ impl Stm32f4 {
         let (before, after) = (field(timing, 16, 4) + 2, field(timing, 20, 3) + 1);
         let permille = 1000 * before / (before + after);
         self.rules.check(SAMPLE_POINT.contains(&permille), Breach::SamplePoint { permille });
+    }
+
+    /// After a store to a DMA controller: 0 is DMA1.
+    pub(crate) fn check_flags(&mut self, controller: usize) {
+        if let Some(stream) = self.dmas[controller].take_begun_with_flags() {
+            self.rules.check(false, Breach::DmaFlags { controller: controller + 1, stream });
+        }
+    }
+
+    /// After a store to an SPI: the absolute encoder takes no faster clock.
+    pub(crate) fn check_ssi(&mut self, spi: usize) {
+        if let Some(clock) = self.spis[spi].clock().filter(|_| self.ssi_is_wired(spi)) {
+            self.check_clock("the SSI clock", Time::PER_SECOND / clock.0, &SSI_CLOCK);
+        }
     }
 
     /// Before a conversion, once for each setting.

@@ -32,7 +32,7 @@ const BASIC: u32 = 8;
 const EXTENDED: u32 = 26;
 
 /// xPSR: Thumb state, the frame was aligned to eight bytes, the IT state.
-const THUMB: u32 = 1 << 24;
+pub(crate) const THUMB: u32 = 1 << 24;
 const ALIGNED: u32 = 1 << 9;
 const IT: u32 = 0x0600_FC00;
 

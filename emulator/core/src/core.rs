@@ -14,6 +14,7 @@ use crate::model::Model;
 use crate::nvic::{Masks, Nvic};
 use crate::profile::Profile;
 use crate::scb::Scb;
+use crate::seed::Bugs;
 use crate::stats::Stats;
 use crate::stepping::Stepping;
 use crate::systick::SysTick;
@@ -68,6 +69,8 @@ pub(crate) struct Core<P> {
     pub(crate) profile: Profile,
     /// Interrupts come between any two instructions.
     pub(crate) stepping: Option<Stepping>,
+    /// What the program does wrong for a test.
+    pub(crate) bugs: Bugs,
     /// Points before which the program stops.
     pub(crate) watch: Option<Watch>,
     pub(crate) halt: Option<Halt>,
@@ -131,6 +134,7 @@ impl<P: Peripherals> Core<P> {
             stats: Stats::default(),
             profile: Profile::default(),
             stepping: None,
+            bugs: Bugs::default(),
             watch: None,
             halt: None,
             unmapped: None,

@@ -17,6 +17,8 @@ pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
 /// A page of our own, outside everything the chip has, for code that the emulator itself runs.
 pub(crate) const HIDDEN: u64 = 0x1F00_0000;
+/// Where the library ends a run by itself: no program gets there.
+pub(crate) const NOWHERE: u64 = 1 << 32;
 /// `clrex; wfi`
 const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
 
@@ -218,7 +220,8 @@ fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: 
     let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize, value: u64| {
         let core = cpu.get_data_mut();
         let address = base + offset as u32;
-        let result = core.chip.write(address, size as u8, value as u32, core.now);
+        let Some(value) = core.bugs.stored(address, size, value as u32) else { return };
+        let result = core.chip.write(address, size as u8, value, core.now);
         finish(core, address, result.ok());
     };
     cpu.mmio_map(base.into(), size.into(), Some(read), Some(write))?;
@@ -240,6 +243,7 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
         let core = cpu.get_data_mut();
         let old = core.chip.read(address, 4, core.now);
         let new = old.map(|old| old & !(1 << bit) | (value as u32 & 1) << bit);
+        let Some(new) = new.map(|new| core.bugs.stored(address, 4, new)).transpose() else { return };
         let result = new.and_then(|new| core.chip.write(address, 4, new, core.now));
         finish(core, address, result.ok());
     };
@@ -269,7 +273,8 @@ fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
         if refused {
             return finish(core, address, None);
         }
-        let word = if size == 4 { Some(value as u32) } else { merged(core, address, size, value as u32) };
+        let Some(value) = core.bugs.stored(address, size, value as u32) else { return };
+        let word = if size == 4 { Some(value) } else { merged(core, address, size, value) };
         let result = word.and_then(|word| core.ppb_write(address & !3, word));
         finish(core, address, result);
     };
@@ -345,7 +350,7 @@ pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Erro
     let begun = std::mem::take(&mut cpu.get_data_mut().exclusive);
     if begun && !cpu.get_data().lacks(Mechanism::ExclusiveMonitor) {
         cpu.get_data_mut().clearing_monitor = true;
-        let result = cpu.emu_start(HIDDEN | 1, 0, 0, 0);
+        let result = cpu.emu_start(HIDDEN | 1, NOWHERE, 0, 0);
         cpu.get_data_mut().clearing_monitor = false;
         result?;
     }

@@ -5,8 +5,9 @@ use chip::{BusFault, Effect, Peripherals};
 use unicorn_engine::{RegisterARM, UcHookId, uc_error};
 
 use crate::clock;
+use crate::context::THUMB;
 use crate::core::{Core, Halt};
-use crate::engine::{self, Cpu};
+use crate::engine::{self, Cpu, NOWHERE};
 use crate::exception::Exception;
 use crate::fault::Fault;
 use crate::incident::Incident;
@@ -14,6 +15,7 @@ use crate::loader::{self, Image};
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
 use crate::profile::Visits;
+use crate::scb::cfsr;
 use crate::stats::Stats;
 use crate::stepping::Stepping;
 
@@ -368,7 +370,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         core.halt = None;
         core.look_again();
         core.unmapped = None;
-        let result = self.cpu.emu_start(u64::from(self.pc() | 1), 0, 0, 0);
+        let result = self.cpu.emu_start(u64::from(self.pc() | 1), NOWHERE, 0, 0);
         match (result, self.cpu.get_data_mut().halt.take()) {
             (_, Some(Halt::Attention)) => {}
             (_, Some(Halt::Watched)) => self.at_point = true,
@@ -390,6 +392,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             Some(access) if access.fetch => Fault::fetch(pc),
             Some(access) => Fault::data(pc, access.address),
             None if matches!(error, uc_error::FETCH_PROT | uc_error::FETCH_UNMAPPED) => Fault::fetch(pc),
+            None if self.register(RegisterARM::XPSR) & THUMB == 0 => Fault::usage(pc, cfsr::INVSTATE),
             None => Fault::undefined(pc),
         }
     }

@@ -10,6 +10,7 @@ pub(crate) mod cfsr {
     pub(crate) const STKERR: u32 = 1 << 12;
     pub(crate) const BFARVALID: u32 = 1 << 15;
     pub(crate) const UNDEFINSTR: u32 = 1 << 16;
+    pub(crate) const INVSTATE: u32 = 1 << 17;
     pub(crate) const INVPC: u32 = 1 << 18;
     pub(crate) const NOCP: u32 = 1 << 19;
     pub(crate) const UNALIGNED: u32 = 1 << 24;

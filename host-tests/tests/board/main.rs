@@ -22,6 +22,7 @@ mod races;
 mod rules;
 mod running;
 mod saves;
+mod seeded;
 mod sensor_faults;
 mod stack;
 mod start_up;

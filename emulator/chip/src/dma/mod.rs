@@ -76,6 +76,11 @@ impl Dma {
         request.iter().copied().find(|line| self.streams[line.stream].listens_to(line.channel))
     }
 
+    /// The stream that was enabled with the flags of its last transfer up.
+    pub(crate) fn take_begun_with_flags(&mut self) -> Option<usize> {
+        self.streams.iter_mut().position(Stream::take_begun_with_flags)
+    }
+
     /// Levels of the interrupt lines of the streams.
     pub(crate) fn interrupts(&self) -> impl Iterator<Item = bool> {
         self.streams.iter().map(Stream::interrupt)

@@ -54,11 +54,13 @@ pub(crate) struct Stream {
     memory: [u32; 2],
     fcr: u32,
     flags: u32,
+    /// A transfer has begun while flags of the one before were up.
+    begun_with_flags: bool,
 }
 
 impl Default for Stream {
     fn default() -> Self {
-        Self { cr: 0, left: 0, all: 0, par: 0, memory: [0; 2], fcr: 0x21, flags: 0 }
+        Self { cr: 0, left: 0, all: 0, par: 0, memory: [0; 2], fcr: 0x21, flags: 0, begun_with_flags: false }
     }
 }
 
@@ -102,6 +104,7 @@ impl Stream {
             return Some(());
         }
         self.cr = value & 0x0FEF_FFFF;
+        self.begun_with_flags |= enable && self.flags != 0;
         self.all = self.left;
         let memory_to_memory = field(value, 6, 2) >= 2;
         (value & CR_NOT_MODELLED == 0 && !memory_to_memory).then_some(())
@@ -113,6 +116,11 @@ impl Stream {
         if !self.enabled() || bit(self.cr, DBM) && !in_use {
             self.memory[index] = value;
         }
+    }
+
+    /// Whether a transfer has begun since the last call before the flags of the one before were cleared (RM0390 section 9.5.5, EN).
+    pub(super) fn take_begun_with_flags(&mut self) -> bool {
+        std::mem::take(&mut self.begun_with_flags)
     }
 
     fn enabled(&self) -> bool {

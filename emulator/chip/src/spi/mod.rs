@@ -162,6 +162,16 @@ impl Spi {
         if bit(self.cr1, CR1_DFF) { 16 } else { 8 }
     }
 
+    /// Whether the clock is high at rest and bits are sampled at its second edge, as SSI wants it: CPHA and CPOL.
+    pub(crate) fn fits_ssi(&self) -> bool {
+        field(self.cr1, 0, 2) == 0b11
+    }
+
+    /// A cycle of the clock, while the SPI is on.
+    pub(crate) fn clock(&self) -> Option<Time> {
+        self.is_on().then(|| self.bit_time())
+    }
+
     /// The length of a bit: PCLK divided by 2 to 256.
     fn bit_time(&self) -> Time {
         times(self.pclk, 2 << field(self.cr1, 3, 3))

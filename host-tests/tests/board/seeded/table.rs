@@ -1,0 +1,240 @@
+//! The bugs.
+
+use emulator::{Bug, Store};
+use object::{Object, ObjectSymbol};
+use sim::world::World;
+
+use super::scenario::Node;
+use crate::support::firmware;
+
+/// A bug and a part of what the board says of it.
+pub(super) struct Row {
+    pub(super) name: &'static str,
+    pub(super) node: Node,
+    does: Does,
+    pub(super) says: &'static str,
+}
+
+/// What is wrong in the program.
+enum Does {
+    /// What it stores in a register.
+    Store(Bug),
+    /// What an interrupt handler begins with: halfwords of Thumb code.
+    Code(&'static str, &'static [u16]),
+}
+
+impl Row {
+    /// Before the program starts.
+    pub(super) fn seed(&self, world: &mut World) {
+        if let Does::Store(bug) = self.does {
+            world.machine(0).seed(bug);
+        }
+    }
+
+    /// While the program runs.
+    pub(super) fn patch(&self, world: &mut World) {
+        if let Does::Code(handler, code) = self.does {
+            let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+            world.machine(0).write(address_of(handler), &bytes).unwrap();
+        }
+    }
+}
+
+/// Where a function of the application begins.
+fn address_of(function: &str) -> u32 {
+    let elf = firmware();
+    let file = object::File::parse(&*elf).unwrap();
+    let symbol = file.symbols().find(|symbol| symbol.name() == Ok(function)).expect(function);
+    u32::try_from(symbol.address()).unwrap() & !1
+}
+
+const fn row(name: &'static str, register: u32, store: Store, says: &'static str) -> Row {
+    Row { name, node: Node::Pressure, does: Does::Store(Bug { register, store }), says }
+}
+
+const fn missing(name: &'static str, register: u32, says: &'static str) -> Row {
+    row(name, register, Store::Missing, says)
+}
+
+const fn wrong(name: &'static str, register: u32, bits: u32, value: u32, says: &'static str) -> Row {
+    row(name, register, Store::Wrong { bits, value }, says)
+}
+
+const fn code(name: &'static str, handler: &'static str, code: &'static [u16], says: &'static str) -> Row {
+    Row { name, node: Node::Pressure, does: Does::Code(handler, code), says }
+}
+
+impl Row {
+    const fn with(self, node: Node) -> Row {
+        Row { node, ..self }
+    }
+}
+
+// RM0390, sections 3.8, 4.8, 5.4, 6.3, 7.4, 9.5, 13.13, 16.4, 17.4, 20.4, 26.7, 30.9.
+const PWR_CR: u32 = 0x4000_7000;
+const RCC: u32 = 0x4002_3800;
+const PLLCFGR: u32 = RCC + 0x04;
+const CFGR: u32 = RCC + 0x08;
+const AHB1ENR: u32 = RCC + 0x30;
+const APB1ENR: u32 = RCC + 0x40;
+const APB2ENR: u32 = RCC + 0x44;
+const FLASH_ACR: u32 = 0x4002_3C00;
+const FLASH_KEYR: u32 = 0x4002_3C04;
+const FLASH_CR: u32 = 0x4002_3C10;
+const GPIOA: u32 = 0x4002_0000;
+const GPIOB: u32 = 0x4002_0400;
+const AFRL: u32 = 0x20;
+const AFRH: u32 = 0x24;
+const CAN1: u32 = 0x4000_6400;
+const DMA1: u32 = 0x4002_6000;
+const DMA2: u32 = 0x4002_6400;
+const ADC1: u32 = 0x4001_2000;
+const ADC_CCR: u32 = 0x4001_2304;
+const TIM2: u32 = 0x4000_0000;
+const TIM3: u32 = 0x4000_0400;
+const TIM4: u32 = 0x4000_0800;
+const SPI2: u32 = 0x4000_3800;
+const IWDG: u32 = 0x4000_3000;
+/// Interrupts 0 to 31, 32 to 63; ARMv7-M, B3.4.
+const ISER0: u32 = 0xE000_E100;
+const ISER1: u32 = 0xE000_E104;
+const CPACR: u32 = 0xE000_ED88;
+const VTOR: u32 = 0xE000_ED08;
+
+pub(super) const STORES: &[Row] = &[
+    // Clocks and supply.
+    wrong("no wait states", FLASH_ACR, 0xF, 0, "0 wait states of the flash"),
+    wrong("three wait states", FLASH_ACR, 0xF, 3, "3 wait states of the flash at 144000000 Hz; it needs 4"),
+    wrong("PLL multiplies by 216", PLLCFGR, 0x7FC0, 216 << 6, "HCLK at 216000000 Hz"),
+    wrong("VCO of the PLL too fast", PLLCFGR, 0x7FC0, 432 << 6, "the VCO of the PLL at 864000000 Hz"),
+    wrong("input of the PLL too fast", PLLCFGR, 0x3F, 2, "the input of the PLL at 4000000 Hz"),
+    wrong("APB1 not divided", CFGR, 0b111 << 10, 0, "PCLK1 at 144000000 Hz"),
+    wrong("APB2 not divided", CFGR, 0b111 << 13, 0, "PCLK2 at 144000000 Hz"),
+    wrong("regulator at scale 3", PWR_CR, 0b11 << 14, 0b01 << 14, "HCLK at 144000000 Hz"),
+    // Clocks of peripherals.
+    wrong("GPIOB without clock", AHB1ENR, 1 << 1, 0, "GPIOB is accessed without its clock"),
+    wrong("CAN1 without clock", APB1ENR, 1 << 25, 0, "CAN1 is accessed without its clock"),
+    wrong("TIM2 without clock", APB1ENR, 1 << 0, 0, "TIM2 is accessed without its clock"),
+    wrong("TIM3 without clock", APB1ENR, 1 << 1, 0, "TIM3 is accessed without its clock"),
+    wrong("ADC1 without clock", APB2ENR, 1 << 8, 0, "ADC1 is accessed without its clock"),
+    wrong("DMA2 without clock", AHB1ENR, 1 << 22, 0, "DMA2 is accessed without its clock"),
+    wrong("backup SRAM without clock", AHB1ENR, 1 << 18, 0, "BKPSRAM is accessed without its clock"),
+    wrong("TIM4 without clock", APB1ENR, 1 << 2, 0, "TIM4 is accessed without its clock").with(Node::Encoder),
+    wrong("SPI2 without clock", APB1ENR, 1 << 14, 0, "SPI2 is accessed without its clock")
+        .with(Node::Absolute),
+    wrong("backup domain protected", PWR_CR, 1 << 8, 0, "written while the backup domain is protected")
+        .with(Node::Encoder),
+    // Pins.
+    wrong("CAN on AF8", GPIOB + AFRH, 0xFF, 0x88, "PB8 is not switched to CAN1_RX"),
+    wrong("CAN_TX an input", GPIOB, 0b11 << 18, 0, "PB9 is not switched to CAN1_TX"),
+    wrong("pressure input not analogue", GPIOA, 0b11, 0, "PA0 is not switched to analogue"),
+    wrong("encoder on AF1", GPIOB + AFRL, 0xFF << 24, 0x11 << 24, "the position is").with(Node::Encoder),
+    wrong("SPI2 on AF6", GPIOB + AFRH, 0xFF << 20, 0x66 << 20, "the position is").with(Node::Absolute),
+    // CAN.
+    wrong("one quantum less before the sample point", CAN1 + 0x1C, 0xF << 16, 13 << 16, "errors on the bus"),
+    wrong("half the bit rate", CAN1 + 0x1C, 0x3FF, 3, "errors on the bus"),
+    wrong("the last segment at its longest", CAN1 + 0x1C, 0x7F << 16, 7 << 20 | 8 << 16, "CAN samples at"),
+    wrong("CAN silent", CAN1 + 0x1C, 1 << 31, 1 << 31, "0 boot-up messages instead of one"),
+    wrong("CAN loops back", CAN1 + 0x1C, 1 << 30, 1 << 30, "no answer to SDO"),
+    wrong("no interrupt for FIFO 1", CAN1 + 0x14, 1 << 4, 0, "no answer to SDO"),
+    missing("FIFO 1 is not released", CAN1 + 0x10, "no answer to SDO"),
+    missing("FIFO 0 is not released", CAN1 + 0x0C, "reset by the chip (watchdog)"),
+    missing("sent mailboxes are not acknowledged", CAN1 + 0x08, "reset by the chip (watchdog)"),
+    wrong("no filter is active", CAN1 + 0x21C, u32::MAX, 0, "no answer to SDO"),
+    wrong("time-triggered mode", CAN1, 1 << 7, 1 << 7, "CAN1"),
+    // ADC and DMA.
+    wrong("temperature sampled for 3 cycles", ADC1 + 0x0C, 0b111 << 24, 0, "ADC channel 18 is sampled for"),
+    wrong(
+        "reference sampled for 15 cycles",
+        ADC1 + 0x0C,
+        0b111 << 21,
+        1 << 21,
+        "ADC channel 17 is sampled for",
+    ),
+    wrong("sensors of the chip off", ADC_CCR, 1 << 23, 0, "EMCY"),
+    wrong("ADC without DMA", ADC1 + 0x08, 1 << 8, 0, "samples a second"),
+    wrong("DMA of the ADC ends with a round", ADC1 + 0x08, 1 << 9, 0, "samples a second"),
+    wrong("ADC not triggered", ADC1 + 0x08, 0b11 << 28, 0, "samples a second"),
+    wrong("ADC converts a single channel", ADC1 + 0x04, 1 << 8, 0, "the pressure is"),
+    wrong("ADC converts a channel less", ADC1 + 0x2C, 0xF << 20, 3 << 20, "the pressure is"),
+    wrong("DMA to one place in memory", DMA2 + 0x10, 1 << 10, 0, "the pressure is"),
+    wrong("DMA not circular", DMA2 + 0x10, 1 << 8, 0, "samples a second"),
+    wrong("DMA without interrupts", DMA2 + 0x10, 0b11 << 3, 0, "samples a second"),
+    wrong("DMA interrupts at the end only", DMA2 + 0x10, 1 << 3, 0, "500 samples a second"),
+    wrong("DMA moves bytes", DMA2 + 0x10, 0b1111 << 11, 0, "the pressure is"),
+    wrong("DMA moves half as much", DMA2 + 0x14, u32::MAX, 80, "samples a second"),
+    missing("flags of the DMA are not cleared", DMA2 + 0x08, "reset by the chip (watchdog)"),
+    // Timers.
+    wrong("scans too fast", TIM3 + 0x2C, u32::MAX, 2249, "samples a second"),
+    wrong("time base at half its rate", TIM2 + 0x28, u32::MAX, 143, "heartbeats instead of 5"),
+    missing("flags of the time base are not cleared", TIM2 + 0x10, "reset by the chip (watchdog)"),
+    wrong("encoder counts one phase", TIM4 + 0x08, 0b111, 1, "the position is").with(Node::Encoder),
+    wrong("encoder counts to 4095", TIM4 + 0x2C, u32::MAX, 0xFFF, "the position is").with(Node::Encoder),
+    wrong("counts are not copied", TIM3 + 0x0C, 1 << 8, 0, "samples a second").with(Node::Encoder),
+    // SPI.
+    wrong("SSI clock idles low", SPI2, 1 << 1, 0, "the position is").with(Node::Absolute),
+    wrong("SSI sampled at the first edge", SPI2, 1 << 0, 0, "the position is").with(Node::Absolute),
+    wrong("SSI clock too fast", SPI2, 0b111 << 3, 0, "the SSI clock at 18000000 Hz").with(Node::Absolute),
+    wrong("SPI without DMA", SPI2 + 0x04, 0b11, 0, "the position is").with(Node::Absolute),
+    missing("flags of DMA1 are not cleared", DMA1 + 0x08, "stream 3 of DMA1 begins with flags")
+        .with(Node::Absolute),
+    // Flash.
+    missing("flash not unlocked", FLASH_KEYR, "a save is refused").with(Node::Saving),
+    wrong("flash not in programming mode", FLASH_CR, 1 << 0, 0, "a save is refused").with(Node::Saving),
+    wrong("flash programmed by bytes", FLASH_CR, 0b11 << 8, 0, "a save is refused").with(Node::Saving),
+    // Core.
+    wrong("sampling not enabled in the NVIC", ISER1, 1 << (56 - 32), 0, "samples a second"),
+    wrong("reception not enabled in the NVIC", ISER0, 0b11 << 20, 0, "no answer to SDO"),
+    missing("floating-point unit off", CPACR, "CFSR 0x80000"),
+    wrong("vector table elsewhere", VTOR, u32::MAX, 0x0804_0000, "fault at 0x"),
+    wrong("watchdog too fast", IWDG + 0x08, 0xFFF, 10, "reset by the chip (watchdog)"),
+];
+
+/// The handler of the sampling task.
+const SAMPLING: &str = "DMA2_STREAM0";
+const RECEPTION: &str = "CAN1_RX1";
+
+pub(super) const CODE: &[Row] = &[
+    // b .
+    code("an endless loop at a high priority", SAMPLING, &[0xE7FE], "reset by the chip (watchdog)"),
+    // cpsid i; wfi; b .-2
+    code(
+        "sleep with interrupts masked",
+        RECEPTION,
+        &[0xB672, 0xBF30, 0xE7FD],
+        "reset by the chip (watchdog)",
+    ),
+    // udf #0
+    code("an undefined instruction", SAMPLING, &[0xDE00], "CFSR 0x10000"),
+    // movs r0, #0; blx r0
+    code("a call of a null pointer", SAMPLING, &[0x2000, 0x4780], "fault at 0x00000000"),
+    // movs r0, #8; lsls r0, #24; blx r0
+    code("a call to an even address", SAMPLING, &[0x2008, 0x0600, 0x4780], "CFSR 0x20000"),
+    // movw r0, #0x0002; movt r0, #0x2000; ldrd r2, r3, [r0]
+    code(
+        "a double word at an odd half",
+        SAMPLING,
+        &[0xF240, 0x0002, 0xF2C2, 0x0000, 0xE9D0, 0x2300],
+        "CFSR 0x1000000",
+    )
+    .with(Node::Interleaved),
+    // movs r0, #0xF0; lsls r0, #24; ldr r0, [r0]
+    code("a load from nowhere", SAMPLING, &[0x20F0, 0x0600, 0x6800], "CFSR 0x200, access to 0xf0000000"),
+    // movs r0, #0xF0; lsls r0, #24; str r0, [r0]
+    code("a store to nowhere", SAMPLING, &[0x20F0, 0x0600, 0x6000], "CFSR 0x200, access to 0xf0000000"),
+    // push {r0-r7}; b .-2
+    code("recursion without an end", SAMPLING, &[0xB4FF, 0xE7FD], "access to 0x1fffff"),
+    // svc #0
+    code("a supervisor call without a handler", SAMPLING, &[0xDF00], "reset by software"),
+    // bkpt #0
+    code("a breakpoint without a debugger", SAMPLING, &[0xBE00], "fault at 0x"),
+    // bx lr
+    code("a handler that clears nothing", RECEPTION, &[0x4770], "reset by the chip (watchdog)"),
+    // movw r0, #0xED88; movt r0, #0xE000; movs r1, #0; str r1, [r0]; dsb; isb; vadd.f32 s0, s0, s0
+    code(
+        "floating point with the unit off",
+        SAMPLING,
+        &[0xF64E, 0x5088, 0xF2CE, 0x0000, 0x2100, 0x6001, 0xF3BF, 0x8F4F, 0xF3BF, 0x8F6F, 0xEE30, 0x0A00],
+        "CFSR 0x80000",
+    ),
+];
