@@ -15,6 +15,7 @@ PRESSURE, ENCODER, LIFT, NEW = 1, 2, 33, 5
 WITHOUT_ID = 201
 PROCESS_VALUE = "Pressure process value"
 EDS = Path(__file__).parents[2] / "eds"
+STATE = "return window.canopen.bus.nodes.get(arguments[0]).state"
 PANEL = "#view-commissioning section"
 
 
@@ -51,7 +52,7 @@ def write(page: Page, label: str, text: str) -> None:
 
 
 def cams_are_read(page: Page) -> None:
-    """The cams are the last that is read of an encoder: what is typed before would be overwritten by what was read."""
+    """The cams are the last that is read of an encoder."""
     page.until(lambda: page.find("input[aria-label='Cam 8 low']"), "show the cams")
 
 
@@ -106,6 +107,26 @@ def test_a_cam_is_on_where_it_was_put_on_the_dial(page: Page):
     page.says(PANEL + ":not([hidden])", "cams written")
     assert [page.read(ENCODER, index, 1) for index in (0x6310, 0x6320, 0x6301)] == [900, 1100, 1]
     page.until(lambda: "cams on: 1" in dial() or page.read(ENCODER, 0x6300, 1) == 1, "have the cam on")
+
+
+def test_what_is_being_edited_stays_when_the_nodes_are_heard_again(page: Page):
+    commission(page, PRESSURE)
+    page.until(lambda: page.field("Offset").get_attribute("value"), "show the offset")
+    commission(page, ENCODER)
+    cams_are_read(page)
+    page.fill("Preset", "4321")
+    low = page.find("input[aria-label='Cam 2 low']")
+    low.send_keys(Keys.CONTROL, "a")
+    low.send_keys("77")
+    for command, state in (("stop", "stopped"), ("start", "operational")):
+        page.request("nmt", node=PRESSURE, command=command)
+        page.until(lambda: page.script(STATE, PRESSURE) == state, f"hear that a node is {state}")
+    # As when the server was away.
+    page.script("window.canopen.bus.dispatchEvent(new CustomEvent('connected'))")
+    for _ in range(3):
+        assert page.read(ENCODER, 0x6310, 2) != 77
+    assert page.field("Preset").get_attribute("value") == "4321"
+    assert page.find("input[aria-label='Cam 2 low']").get_attribute("value") == "77"
 
 
 def test_the_car_of_a_lift_is_shown_and_its_virtual_devices_are_chosen(page: Page):

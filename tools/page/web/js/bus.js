@@ -59,10 +59,10 @@ export class Bus extends EventTarget {
   #takeNodes({ all, nodes }) {
     if (all) this.nodes.clear();
     for (const node of nodes) this.nodes.set(node.node, node);
-    if (!this.nodes.has(this.chosen)) this.chosen = this.list()[0]?.node ?? null;
+    const before = this.chosen;
+    if (!this.nodes.has(before)) this.chosen = this.list()[0]?.node ?? null;
     this.#tell("nodes");
-    if (this.lastChosen !== this.chosen) this.#tell("chosen");
-    this.lastChosen = this.chosen;
+    if (this.chosen !== before) this.#tell("chosen");
   }
 
   #takeState(event) {

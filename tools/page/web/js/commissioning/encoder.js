@@ -3,7 +3,7 @@
 import { button, el, field, select, svg, text } from "../dom.js";
 import { number, signalKey } from "../format.js";
 import { outcome } from "../outcome.js";
-import { objectField, readAll, write } from "../parts/objects.js";
+import { Edits, objectField, readAll, write } from "../parts/objects.js";
 import { arc, point } from "./dial.js";
 
 const CAMS = 8;
@@ -15,6 +15,7 @@ export class Encoder {
     Object.assign(this, { bus, recorder, cams: [], turn: 1, scale: "turn" });
     this.position = el("output", { class: "big" }, "-");
     this.preset = objectField(bus, "Preset", PRESET, 0, "The position now becomes this value.");
+    this.edits = new Edits(bus);
     this.result = outcome();
     this.rows = el("tbody");
     this.needle = svg("line", { x1: 110, y1: 110, class: "needle" });
@@ -56,11 +57,14 @@ export class Encoder {
       el("div", { class: "split" }, el("div", {}, this.dial, field("Dial", scale)), el("div", { class: "wide" }, table)), el("div", { class: "bar" }, button("Write the cams", () => this.#write())), this.result.line);
   }
 
-  /** The rows of before are gone meanwhile: what is typed into them would be lost. */
   async #readCams() {
-    this.rows.replaceChildren();
+    if (this.shown !== this.bus.chosen) this.rows.replaceChildren();
     const limits = Array.from({ length: CAMS }, (_, cam) => [LOW, HIGH, HYSTERESIS].map((first) => [first + cam, 1])).flat();
-    const [turn, range, enables, polarities, ...values] = await readAll(this.bus, [[UNITS, 0], [RANGE, 0], [ENABLES, 1], [POLARITIES, 1], ...limits]);
+    const read = () => readAll(this.bus, [[UNITS, 0], [RANGE, 0], [ENABLES, 1], [POLARITIES, 1], ...limits]);
+    const answer = await this.edits.around(read);
+    if (!answer) return;
+    const [turn, range, enables, polarities, ...values] = answer;
+    this.shown = this.bus.chosen;
     Object.assign(this, { turn, range });
     this.cams = Array.from({ length: CAMS }, (_, cam) => ({ on: (enables >> cam) & 1, inverted: (polarities >> cam) & 1, low: values[3 * cam], high: values[3 * cam + 1], hysteresis: values[3 * cam + 2] }));
     this.#showRows();
@@ -69,10 +73,16 @@ export class Encoder {
 
   #showRows() {
     this.rows.replaceChildren(...this.cams.map((cam, at) => {
-      const box = (name) => cell(el("input", { type: "checkbox", "aria-label": `Cam ${at + 1} ${name}`, prop: { checked: cam[name] === 1 }, on: { change: (event) => ((cam[name] = Number(event.target.checked)), this.draw()) } }));
-      const limit = (name) => cell(el("input", { type: "number", "aria-label": `Cam ${at + 1} ${name}`, prop: { value: cam[name] }, on: { input: (event) => ((cam[name] = Number(event.target.value)), this.draw()) } }));
+      const box = (name) => cell(el("input", { type: "checkbox", "aria-label": `Cam ${at + 1} ${name}`, prop: { checked: cam[name] === 1 }, on: { change: (event) => this.#edit(cam, name, Number(event.target.checked)) } }));
+      const limit = (name) => cell(el("input", { type: "number", "aria-label": `Cam ${at + 1} ${name}`, prop: { value: cam[name] }, on: { input: (event) => this.#edit(cam, name, Number(event.target.value)) } }));
       return el("tr", {}, el("th", { scope: "row" }, String(at + 1)), box("on"), box("inverted"), limit("low"), limit("high"), limit("hysteresis"));
     }));
+  }
+
+  #edit(cam, name, value) {
+    this.edits.begin();
+    cam[name] = value;
+    this.draw();
   }
 
   #write() {
@@ -86,6 +96,7 @@ export class Encoder {
     const mask = (name) => this.cams.reduce((bits, cam, at) => bits | (cam[name] << at), 0);
     await write(this.bus, POLARITIES, 1, mask("inverted"));
     await write(this.bus, ENABLES, 1, mask("on"));
+    this.edits.end();
   }
 
   #angle(position) {

@@ -27,10 +27,16 @@ export class Pressure {
   async show() {
     this.shift = this.bus.node().personality === "combined" ? SECOND_DEVICE : 0;
     this.key = signalKey(this.bus.chosen, 0x6130 + this.shift, 1);
-    const fields = [["Span start", 0x6148], ["Span end", 0x6149], ["Offset", 0x6124]].map(([label, index]) => objectField(this.bus, label, index + this.shift, 1));
-    this.fields.replaceChildren(...fields.map(({ element }) => element));
-    this.offset = fields[2];
-    for (const { show } of fields) await show();
+    if (this.shown !== this.bus.chosen) this.#layFields();
+    for (const { show } of this.all) await show();
+  }
+
+  /** The fields of the node that is chosen: what was typed for another node is gone. */
+  #layFields() {
+    this.shown = this.bus.chosen;
+    this.all = [["Span start", 0x6148], ["Span end", 0x6149], ["Offset", 0x6124]].map(([label, index]) => objectField(this.bus, label, index + this.shift, 1));
+    this.fields.replaceChildren(...this.all.map(({ element }) => element));
+    this.offset = this.all.at(-1);
   }
 
   get keys() {

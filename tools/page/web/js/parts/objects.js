@@ -13,17 +13,47 @@ export function write(bus, index, sub, value) {
   return bus.request("write", { node: bus.chosen, index, sub, value });
 }
 
+/** What the user has typed for a node and not yet written. No value that is read later takes its place; another node's do. */
+export class Edits {
+  constructor(bus) {
+    Object.assign(this, { bus, node: null, asked: null });
+  }
+
+  begin() {
+    this.node = this.bus.chosen;
+  }
+
+  end() {
+    this.node = null;
+  }
+
+  /** Reads from the chosen node; `undefined` where something is being edited, or another node is chosen, when the answer comes. */
+  async around(read) {
+    const node = this.bus.chosen;
+    if (this.asked !== node) this.end();
+    this.asked = node;
+    const answer = await read();
+    return this.node === node || this.bus.chosen !== node ? undefined : answer;
+  }
+}
+
 /** A field for one object. `show` reads the object, "Write" writes it. */
 export function objectField(bus, label, index, sub, hint = "") {
-  const input = el("input", { autocomplete: "off", inputmode: "decimal" });
+  const edits = new Edits(bus);
+  const input = el("input", { autocomplete: "off", inputmode: "decimal", on: { input: () => edits.begin() } });
   const result = outcome();
   const form = el("form", { class: "bar", novalidate: true }, field(label, input, hint), el("button", { type: "submit", "aria-label": `Write ${label}` }, "Write"));
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    result.of("writing", write(bus, index, sub, input.value.trim()), (value) => (value?.text == null ? "written" : `written, reads ${value.text} ${value.unit}`));
+    result.of("writing", write(bus, index, sub, input.value.trim()), (value) => {
+      edits.end();
+      return value?.text == null ? "written" : `written, reads ${value.text} ${value.unit}`;
+    });
   });
   const show = async () => {
-    const { values: [value] } = await bus.request("read", { node: bus.chosen, objects: [[index, sub]] });
+    const answer = await edits.around(() => bus.request("read", { node: bus.chosen, objects: [[index, sub]] }));
+    if (!answer) return;
+    const [value] = answer.values;
     if (value.error) result.bad(value.error);
     else input.value = value.text;
   };
