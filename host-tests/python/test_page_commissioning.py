@@ -53,7 +53,7 @@ def write(page: Page, label: str, text: str) -> None:
 
 def cams_are_read(page: Page) -> None:
     """The cams are the last that is read of an encoder."""
-    page.until(lambda: page.find("input[aria-label='Cam 8 low']"), "show the cams")
+    page.until(lambda: page.find("input[aria-label='Cam 8 low']").is_enabled(), "show the cams")
 
 
 def shown(page: Page) -> float:

@@ -17,7 +17,8 @@ export class Encoder {
     this.preset = objectField(bus, "Preset", PRESET, 0, "The position now becomes this value.");
     this.edits = new Edits(bus);
     this.result = outcome();
-    this.rows = el("tbody");
+    this.rows = Array.from({ length: CAMS }, (_, at) => this.#row(at));
+    this.writing = button("Write the cams", () => this.#write());
     this.needle = svg("line", { x1: 110, y1: 110, class: "needle" });
     this.arcs = svg("g");
     this.dial = svg("svg", { viewBox: "0 0 220 220", class: "dial", role: "img" }, svg("circle", { cx: 110, cy: 110, r: 100, class: "rim" }), this.arcs, this.needle);
@@ -51,14 +52,14 @@ export class Encoder {
   #layout() {
     const scale = select([["turn", "one revolution"], ["range", "the whole range"]], "turn", (value) => ((this.scale = value), this.draw()));
     const head = ["Cam", "On", "Inverted", "Low", "High", "Hysteresis"].map((name) => el("th", { scope: "col" }, name));
-    const table = el("table", { class: "cams" }, el("caption", { class: "unseen" }, "Cams of channel 1"), el("thead", {}, el("tr", {}, head)), this.rows);
+    const table = el("table", { class: "cams" }, el("caption", { class: "unseen" }, "Cams of channel 1"), el("thead", {}, el("tr", {}, head)), el("tbody", {}, this.rows.map(({ element }) => element)));
     return el("section", { class: "box", "aria-labelledby": "encoder-title" }, el("h3", { id: "encoder-title" }, "Encoder"),
       el("div", { class: "bar" }, this.position), this.preset.element, el("h4", {}, "Cams of channel 1"),
-      el("div", { class: "split" }, el("div", {}, this.dial, field("Dial", scale)), el("div", { class: "wide" }, table)), el("div", { class: "bar" }, button("Write the cams", () => this.#write())), this.result.line);
+      el("div", { class: "split" }, el("div", {}, this.dial, field("Dial", scale)), el("div", { class: "wide" }, table)), el("div", { class: "bar" }, this.writing), this.result.line);
   }
 
   async #readCams() {
-    if (this.shown !== this.bus.chosen) this.rows.replaceChildren();
+    if (this.shown !== this.bus.chosen) this.#enable(false);
     const limits = Array.from({ length: CAMS }, (_, cam) => [LOW, HIGH, HYSTERESIS].map((first) => [first + cam, 1])).flat();
     const read = () => readAll(this.bus, [[UNITS, 0], [RANGE, 0], [ENABLES, 1], [POLARITIES, 1], ...limits]);
     const answer = await this.edits.around(read);
@@ -71,17 +72,32 @@ export class Encoder {
     this.draw();
   }
 
-  #showRows() {
-    this.rows.replaceChildren(...this.cams.map((cam, at) => {
-      const box = (name) => cell(el("input", { type: "checkbox", "aria-label": `Cam ${at + 1} ${name}`, prop: { checked: cam[name] === 1 }, on: { change: (event) => this.#edit(cam, name, Number(event.target.checked)) } }));
-      const limit = (name) => cell(el("input", { type: "number", "aria-label": `Cam ${at + 1} ${name}`, prop: { value: cam[name] }, on: { input: (event) => this.#edit(cam, name, Number(event.target.value)) } }));
-      return el("tr", {}, el("th", { scope: "row" }, String(at + 1)), box("on"), box("inverted"), limit("low"), limit("high"), limit("hysteresis"));
-    }));
+  /** The controls of one cam. They stay the same whatever is read: what has the focus keeps it. */
+  #row(at) {
+    const control = (name, type, edited) => el("input", { type, disabled: true, "aria-label": `Cam ${at + 1} ${name}`, on: { input: ({ target }) => this.#edit(at, name, edited(target)) } });
+    const boxes = ["on", "inverted"].map((name) => [name, control(name, "checkbox", ({ checked }) => Number(checked))]);
+    const limits = ["low", "high", "hysteresis"].map((name) => [name, control(name, "number", ({ value }) => Number(value))]);
+    const cells = [...boxes, ...limits].map(([, input]) => el("td", {}, input));
+    return { element: el("tr", {}, el("th", { scope: "row" }, String(at + 1)), cells), boxes, limits };
   }
 
-  #edit(cam, name, value) {
+  #showRows() {
+    for (const [at, { boxes, limits }] of this.rows.entries()) {
+      for (const [name, box] of boxes) box.checked = this.cams[at][name] === 1;
+      for (const [name, limit] of limits) limit.value = this.cams[at][name];
+    }
+    this.#enable(true);
+  }
+
+  /** Nothing is written to a node whose cams have not been read. */
+  #enable(on) {
+    this.writing.disabled = !on;
+    for (const { boxes, limits } of this.rows) for (const [, input] of [...boxes, ...limits]) input.disabled = !on;
+  }
+
+  #edit(at, name, value) {
     this.edits.begin();
-    cam[name] = value;
+    this.cams[at][name] = value;
     this.draw();
   }
 
@@ -112,8 +128,4 @@ export class Encoder {
   #on(states) {
     return this.cams.map((_, at) => at + 1).filter((cam) => (states >> (cam - 1)) & 1).join(", ");
   }
-}
-
-function cell(content) {
-  return el("td", {}, content);
 }
