@@ -11,7 +11,7 @@ use crate::target::Toolchain;
 
 /// Prints which code of the images can panic; fails when some of it is not known.
 pub(crate) fn panics(tools: Tools) -> Result<()> {
-    images::compile_node(&Toolchain::ensure()?)?;
+    images::compile_node(&Toolchain::ensure()?, images::CHIP)?;
     run(tool(tools)?.arg("panics"))
 }
 
@@ -29,7 +29,7 @@ pub(crate) fn check_panics() -> Result<()> {
 
 /// Prints how deep the stack of each image can get; fails when that is more than is reserved for it.
 pub(crate) fn stack(paths: bool, tools: Tools) -> Result<()> {
-    images::compile_node(&Toolchain::ensure()?)?;
+    images::compile_node(&Toolchain::ensure()?, images::CHIP)?;
     let paths = if paths { &["--paths"][..] } else { &[] };
     run(tool(tools)?.arg("stack").args(paths))
 }

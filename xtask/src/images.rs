@@ -1,6 +1,6 @@
 //! The ELF files for the Cortex-M4.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Result, ensure};
@@ -18,9 +18,33 @@ pub(crate) fn dir() -> PathBuf {
 /// A bootloader that starts what nobody has signed, and trusts the key that everybody knows: for a board on a desk, emulated or not.
 pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development"];
 
-/// Compiles the firmware and the bootloader for development.
-pub(crate) fn compile_node(toolchain: &Toolchain) -> Result<()> {
-    compile(toolchain, "firmware 1/2", &["firmware", "bootloader"])
+/// All chips that the images can be compiled for.
+pub(crate) const CHIPS: [&str; 3] = [CHIP, "stm32f405", "stm32f407"];
+
+/// The chip that the images are compiled for where nothing else is said.
+pub(crate) const CHIP: &str = "stm32f446";
+
+/// Compiles the firmware and the bootloader for development, and says where they are.
+pub(crate) fn compile_node(toolchain: &Toolchain, chip: &str) -> Result<PathBuf> {
+    if chip != CHIP {
+        return compile_for(toolchain, chip);
+    }
+    compile(toolchain, "firmware 1/2", &["firmware", "bootloader"])?;
+    Ok(dir())
+}
+
+/// Compiles the firmware and the bootloader for development and for another chip, and puts them into a folder with the chip's name:
+/// cargo itself has one place for all.
+pub(crate) fn compile_for(toolchain: &Toolchain, chip: &str) -> Result<PathBuf> {
+    let features =
+        ["--release", "-p", "firmware", "-p", "bootloader", "--no-default-features", "--features", chip];
+    progress::build(chip, toolchain.cargo("build", &features).args(DEVELOPMENT))?;
+    let folder = dir().join(chip);
+    std::fs::create_dir_all(&folder)?;
+    for name in ["firmware", "bootloader"] {
+        std::fs::copy(dir().join(name), folder.join(name))?;
+    }
+    Ok(folder)
 }
 
 /// Compiles the application alone, and says where it is.
@@ -100,12 +124,12 @@ fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {
 }
 
 /// Has the tool make the image that a programmer writes and `nodectl update` takes, signed with the development key.
-pub(crate) fn sign(mut tool: Command) -> Result<()> {
-    run(tool.arg("image").arg(dir().join("firmware")))
+pub(crate) fn sign(mut tool: Command, images: &Path) -> Result<()> {
+    run(tool.arg("image").arg(images.join("firmware")))
 }
 
 /// Compiles and signs everything that the tests run on the emulated core.
 pub(crate) fn build(tools: Tools) -> Result<()> {
     compile_all(&Toolchain::ensure()?)?;
-    sign(tools.get("sign")?)
+    sign(tools.get("sign")?, &dir())
 }

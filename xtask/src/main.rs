@@ -8,6 +8,7 @@ mod eds;
 mod fault_injection;
 mod flash;
 mod fuzz;
+mod hal_examples;
 mod images;
 mod mutants;
 mod own_tool;

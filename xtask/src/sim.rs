@@ -1,7 +1,7 @@
 //! `cargo sim`: build both images and the simulator, then become the simulator.
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::thread;
 
@@ -20,13 +20,24 @@ fn build() -> Result<()> {
 }
 
 /// Builds at the same time what the Cortex-M4 and what this machine runs: each of the two leaves a core idle when it links.
-fn build_all() -> Result<()> {
+fn build_all(chip: &str) -> Result<PathBuf> {
     thread::scope(|scope| {
-        let images = scope.spawn(|| images::compile_node(&Toolchain::ensure()?));
-        let programs = build();
-        images.join().map_err(|_| anyhow!("the build of the firmware was interrupted"))??;
-        programs
+        let images = scope.spawn(|| images::compile_node(&Toolchain::ensure()?, chip));
+        build()?;
+        images.join().map_err(|_| anyhow!("the build of the firmware was interrupted"))?
     })
+}
+
+/// The chip that is asked for. The simulator says what is wrong with a name that is none.
+fn chip(flags: &[OsString]) -> &str {
+    let mut flags = flags.iter().filter_map(|flag| flag.to_str());
+    let found = flags.find_map(|flag| match flag.strip_prefix("--chip") {
+        Some("") => Some(None),
+        Some(rest) => rest.strip_prefix('=').map(Some),
+        None => None,
+    });
+    let named = found.and_then(|name| name.or_else(|| flags.next()));
+    named.filter(|name| images::CHIPS.contains(name)).unwrap_or(images::CHIP)
 }
 
 /// Runs the simulator with the user's flags in the place of this process, so that a signal to `cargo sim` reaches the
@@ -34,17 +45,37 @@ fn build_all() -> Result<()> {
 pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     setup::check(setup::SIM)?;
     eprintln!("images for development: the bootloader starts what nobody has signed (docs/update.md)");
-    build_all()?;
-    images::sign(Command::new(built("sign")))?;
-    become_program(with_images(&built("sim")).args(flags))
+    let images = build_all(chip(flags))?;
+    images::sign(Command::new(built("sign")), &images)?;
+    become_program(with_images(&built("sim"), &images).args(flags))
 }
 
 /// The simulator with the two ELF files it loads, and the program that it has serve the page. That is a program of its own: the
 /// simulator's licence is not that of the tools.
-fn with_images(program: &Path) -> Command {
+fn with_images(program: &Path, images: &Path) -> Command {
     let mut command = Command::new(program);
-    command.arg("--bootloader").arg(images::dir().join("bootloader"));
-    command.arg("--firmware").arg(images::dir().join("firmware"));
+    command.arg("--bootloader").arg(images.join("bootloader"));
+    command.arg("--firmware").arg(images.join("firmware"));
     command.arg("--page-program").arg(built("nodectl"));
     command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chip_of_the_flags() {
+        for (flags, expected) in [
+            ("", "stm32f446"),
+            ("--chip stm32f405", "stm32f405"),
+            ("--for 5 --chip=stm32f407 --json", "stm32f407"),
+            ("--chip", "stm32f446"),
+            ("--chip stm32h7", "stm32f446"),
+            ("--chips stm32f405", "stm32f446"),
+        ] {
+            let flags: Vec<OsString> = flags.split_whitespace().map(OsString::from).collect();
+            assert_eq!(chip(&flags), expected, "{flags:?}");
+        }
+    }
 }

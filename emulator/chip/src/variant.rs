@@ -1,6 +1,7 @@
 //! What differs between the chips.
 
 use std::ops::Range;
+use std::str::FromStr;
 
 /// One of the chips that the images are built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,6 +12,20 @@ pub enum Variant {
     F405,
     /// STM32F407xG: as the F405, with Ethernet and a camera interface.
     F407,
+}
+
+impl FromStr for Variant {
+    type Err = String;
+
+    /// The name that the chip has in the features of the images.
+    fn from_str(name: &str) -> Result<Variant, String> {
+        match name {
+            "stm32f446" => Ok(Variant::F446),
+            "stm32f405" => Ok(Variant::F405),
+            "stm32f407" => Ok(Variant::F407),
+            other => Err(format!("{other:?} is no chip; stm32f446, stm32f405 and stm32f407 are")),
+        }
+    }
 }
 
 /// Address of the first byte of flash.

@@ -50,6 +50,7 @@ mod ppb;
 mod profile;
 mod scb;
 mod seed;
+mod semihosting;
 mod stats;
 mod stepping;
 mod systick;

@@ -55,6 +55,8 @@ pub struct Machine<P: Peripherals + 'static> {
     pub(crate) watching: Option<UcHookId>,
     /// The program has stopped at a watched point.
     at_point: bool,
+    /// What the program has printed by semihosting; `None` without a debugger.
+    pub(crate) printed: Option<Vec<u8>>,
 }
 
 impl<P: Peripherals + 'static> Machine<P> {
@@ -76,6 +78,7 @@ impl<P: Peripherals + 'static> Machine<P> {
             incidents: vec![],
             watching: None,
             at_point: false,
+            printed: None,
         })
     }
 
@@ -376,7 +379,11 @@ impl<P: Peripherals + 'static> Machine<P> {
             (_, Some(Halt::Watched)) => self.at_point = true,
             (_, Some(Halt::ExceptionReturn)) => self.leave(),
             (_, Some(Halt::SupervisorCall)) => self.supervisor_call(),
-            (_, Some(Halt::Breakpoint)) => self.take_fault(Fault::breakpoint(self.pc())),
+            (_, Some(Halt::Breakpoint)) => {
+                if !self.answer_call() {
+                    self.take_fault(Fault::breakpoint(self.pc()));
+                }
+            }
             (_, Some(Halt::Undefined)) => self.take_fault(Fault::undefined(self.pc())),
             (_, Some(Halt::Usage(status))) => self.take_fault(Fault::usage(self.pc(), status)),
             (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),

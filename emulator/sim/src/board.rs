@@ -5,15 +5,13 @@ use std::rc::Rc;
 use anyhow::{Context, Result};
 use canbus::{Controller, Time};
 use chip::plant::FaultKind;
-use chip::{Board as Wiring, FLASH_BASE, Stm32f4, Variant};
+use chip::{FLASH_BASE, Stm32f4};
 use emulator::{Incident, Machine, Model, Stop};
 use update::HEADER_LEN;
 
 use crate::figures;
-use crate::flash;
 use crate::image::Image;
 use crate::log::{Line, Log, Ram};
-use crate::oscillator::Oscillator;
 use crate::personality::Personality;
 use crate::status::NodeStatus;
 use crate::stimuli::{BoardStimuli, Knob, Stimulus};
@@ -79,14 +77,12 @@ impl Board {
     pub(crate) fn new(
         id: u8,
         personality: Personality,
-        oscillator: Oscillator,
+        mut chip: Stm32f4,
         contents: Contents,
         images: Rc<Images>,
     ) -> Result<Board> {
-        let wiring = Wiring { hse: oscillator.hertz(), ..wiring(id) };
-        let mut chip = Stm32f4::new(Variant::F446, wiring);
         contents.backup.into_iter().for_each(|backup| chip.set_kept_by_battery(backup));
-        let mut machine = Machine::new(Model::stm32f4(flash::SIZE as u32), chip)?;
+        let mut machine = Machine::new(Model::stm32f4(contents.flash.len() as u32), chip)?;
         machine.set_flash(contents.flash)?;
         let (firmware, bootloader) = images.parsed(&machine)?;
         let programs = if contents.writes_images {
@@ -244,13 +240,6 @@ impl Board {
             unmodelled: figures::unmodelled(&self.machine),
         }
     }
-}
-
-/// Every chip has its own unique identifier, of which the firmware makes its serial number.
-fn wiring(id: u8) -> Wiring {
-    let mut wiring = Wiring::default();
-    wiring.unique_id[0] = id.into();
-    wiring
 }
 
 impl Images {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use canbus::Time;
+use chip::Variant;
 use clap::{Parser, ValueEnum};
 use storage::DeviceRecord;
 
@@ -24,6 +25,10 @@ pub struct Options {
     /// ELF file of the bootloader; without one the firmware starts at once.
     #[arg(long, value_name = "PATH", hide = true)]
     pub bootloader: Option<PathBuf>,
+
+    /// The chip of the boards: stm32f446, stm32f405 or stm32f407. `cargo sim` builds the images for it.
+    #[arg(long, value_name = "CHIP", default_value = "stm32f446")]
+    pub chip: Variant,
 
     /// A board with this node-ID and personality; may be given up to 127 times. 201 to 254 are boards that have no
     /// node-ID and wait for LSS; @auto is a board that finds the bit rate by listening.

@@ -5,9 +5,8 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use chip::Variant;
 
-/// Bytes of the STM32F446RE's flash.
-pub const SIZE: usize = 512 * 1024;
 /// Bytes of its backup SRAM.
 const BACKUP_SIZE: usize = 4 * 1024;
 
@@ -21,8 +20,8 @@ fn backup_file(dir: &Path, node: u8) -> PathBuf {
 }
 
 /// The kept contents of a board's flash; `None` when there are none yet.
-pub fn load(dir: &Path, node: u8) -> Result<Option<Vec<u8>>> {
-    read(&file(dir, node), SIZE)
+pub fn load(dir: &Path, node: u8, chip: Variant) -> Result<Option<Vec<u8>>> {
+    read(&file(dir, node), chip.flash_size() as usize)
 }
 
 /// What a board's battery has kept; `None` when it has kept nothing.
@@ -74,6 +73,9 @@ fn write(dir: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
 mod tests {
     use super::*;
 
+    const CHIP: Variant = Variant::F446;
+    const SIZE: usize = CHIP.flash_size() as usize;
+
     /// A directory of this test's own, empty.
     fn dir(test: &str) -> PathBuf {
         let dir = std::env::temp_dir().join(format!("sim-flash-{test}-{}", std::process::id()));
@@ -84,11 +86,11 @@ mod tests {
     #[test]
     fn what_was_saved_is_loaded_and_nodes_are_apart() {
         let dir = dir("roundtrip");
-        assert_eq!(load(&dir, 5).unwrap(), None);
+        assert_eq!(load(&dir, 5, CHIP).unwrap(), None);
         save(&dir, 5, &vec![0xA5; SIZE]).unwrap();
         save(&dir, 5, &vec![0x5A; SIZE]).unwrap();
-        assert_eq!(load(&dir, 5).unwrap(), Some(vec![0x5A; SIZE]));
-        assert_eq!(load(&dir, 6).unwrap(), None);
+        assert_eq!(load(&dir, 5, CHIP).unwrap(), Some(vec![0x5A; SIZE]));
+        assert_eq!(load(&dir, 6, CHIP).unwrap(), None);
         assert_eq!(fs::read_dir(&dir).unwrap().count(), 1, "no temporary file is left");
         fs::remove_dir_all(dir).unwrap();
     }
@@ -99,7 +101,7 @@ mod tests {
         save_backup(&dir, 5, None).unwrap();
         save_backup(&dir, 5, Some(&[7; BACKUP_SIZE])).unwrap();
         assert_eq!(load_backup(&dir, 5).unwrap(), Some(vec![7; BACKUP_SIZE]));
-        assert_eq!(load(&dir, 5).unwrap(), None, "it is not the flash");
+        assert_eq!(load(&dir, 5, CHIP).unwrap(), None, "it is not the flash");
         save_backup(&dir, 5, None).unwrap();
         assert_eq!(load_backup(&dir, 5).unwrap(), None);
         fs::remove_dir_all(dir).unwrap();
@@ -109,10 +111,10 @@ mod tests {
     fn a_file_that_is_no_flash_is_an_error_of_one_line() {
         let dir = dir("refused");
         save(&dir, 1, &[0; 3]).unwrap();
-        let error = format!("{:#}", load(&dir, 1).unwrap_err());
+        let error = format!("{:#}", load(&dir, 1, CHIP).unwrap_err());
         assert!(error.contains("node-1.flash has 3 bytes") && !error.contains('\n'), "{error}");
         fs::create_dir_all(file(&dir, 2)).unwrap();
-        assert!(format!("{:#}", load(&dir, 2).unwrap_err()).contains("node-2.flash"));
+        assert!(format!("{:#}", load(&dir, 2, CHIP).unwrap_err()).contains("node-2.flash"));
         assert!(save(&file(&dir, 1), 1, &[]).is_err(), "a file is no directory");
         fs::remove_dir_all(dir).unwrap();
     }

@@ -3,6 +3,7 @@
 use std::rc::Rc;
 
 use anyhow::{Context, Result, ensure};
+use chip::{Board as Wiring, Stm32f4};
 use storage::{DeviceRecord, Memory, Pages, View};
 
 use crate::board::{Board, Contents, Images};
@@ -49,13 +50,22 @@ pub fn world(options: &Options) -> Result<World> {
 fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
     let twice = options.nodes.iter().filter(|other| other.id == node.id).count() > 1;
     ensure!(!twice, "node {} is given more than once", node.id);
-    let kept = options.flash.as_deref().map(|dir| flash::load(dir, node.id)).transpose()?.flatten();
+    let kept =
+        options.flash.as_deref().map(|dir| flash::load(dir, node.id, options.chip)).transpose()?.flatten();
     let writes_images = kept.is_none() || options.reflash;
-    let mut contents = kept.unwrap_or_else(|| vec![0xFF; flash::SIZE]);
+    let mut contents = kept.unwrap_or_else(|| vec![0xFF; options.chip.flash_size() as usize]);
     provision(&mut contents, node, options.bitrate)?;
     let backup = options.flash.as_deref().map(|dir| flash::load_backup(dir, node.id)).transpose()?.flatten();
     let contents = Contents { flash: &contents, backup: backup.as_deref(), writes_images };
-    Board::new(node.id, node.personality, oscillator(node, options), contents, Rc::clone(images))
+    let chip = chip(node, options);
+    Board::new(node.id, node.personality, chip, contents, Rc::clone(images))
+}
+
+/// The chip of a board, with its clock and with the identifier that every chip has of its own: the firmware makes the serial number of it.
+fn chip(node: &Node, options: &Options) -> Stm32f4 {
+    let mut wiring = Wiring { hse: oscillator(node, options).hertz(), ..Wiring::default() };
+    wiring.unique_id[0] = node.id.into();
+    Stm32f4::new(options.chip, wiring)
 }
 
 /// The last one that is meant for the board.

@@ -46,10 +46,10 @@ pub(crate) fn world(flags: &str) -> World {
     world_of("bootloader", flags)
 }
 
-/// The same with another bootloader than the one of a development board.
+/// The same with another bootloader than the one of a development board, and with the application beside it.
 pub(crate) fn world_of(bootloader: &str, flags: &str) -> World {
-    let dir = images();
-    let (bootloader, firmware) = (dir.join(bootloader), dir.join("firmware"));
+    let bootloader = images().join(bootloader);
+    let firmware = bootloader.with_file_name("firmware");
     let images =
         ["sim", "--bootloader", bootloader.to_str().unwrap(), "--firmware", firmware.to_str().unwrap()];
     let options = Options::try_parse_from(images.into_iter().chain(flags.split_whitespace())).unwrap();

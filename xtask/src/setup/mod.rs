@@ -33,6 +33,8 @@ pub(crate) enum Need {
     Tshark,
     /// The browser that shows the page of the bus, and the program that drives it.
     Browser,
+    /// Another emulator of the core.
+    Qemu,
 }
 
 /// What `cargo sim` needs.
@@ -47,6 +49,10 @@ pub(crate) const FLASH: &[Need] = &[Need::Target, Need::Probe];
 /// What `cargo xtask test` needs.
 pub(crate) const TEST: &[Need] =
     &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark, Need::Browser];
+
+/// What `cargo xtask test --thorough` needs.
+pub(crate) const THOROUGH: &[Need] =
+    &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark, Need::Browser, Need::Qemu];
 
 /// What `cargo xtask pictures` needs.
 pub(crate) const PICTURES: &[Need] = &[Need::Target, Need::Emulator, Need::Python, Need::Browser];
@@ -68,6 +74,7 @@ fn missing(needs: &[Need]) -> Vec<Package> {
             Need::Probe => package_unless(system::runs("probe-rs"), Package::ProbeRs),
             Need::Tshark => package_unless(system::runs("tshark"), Package::Tshark),
             Need::Browser => browser(),
+            Need::Qemu => package_unless(system::runs("qemu-system-arm"), Package::Qemu),
         };
         for package in of_need {
             if !packages.contains(&package) {

@@ -25,6 +25,8 @@ pub(crate) enum Package {
     Chromium,
     /// The program that drives the browser.
     Chromedriver,
+    /// QEMU for Arm.
+    Qemu,
     /// Debian's compiler for the Cortex-M4.
     DebianRust,
     /// Its source of the core library.
@@ -102,6 +104,7 @@ impl Package {
             Package::Python => ["python3-venv", "python3", "python", "python"],
             Package::Tshark => ["tshark", "wireshark-cli", "wireshark-cli", "wireshark"],
             Package::Chromium => ["chromium"; 4],
+            Package::Qemu => ["qemu-system-arm", "qemu-system-arm", "qemu-system-arm", "qemu"],
             Package::Chromedriver => ["chromium-driver", "chromedriver", "chromium", "chromedriver"],
             // These are asked for where Debian's packages are the way to the target, and nowhere else.
             Package::DebianRust => ["rustc-web"; 4],
@@ -131,6 +134,9 @@ impl Package {
             }
             Package::Python => "cmake, libclang and the tests' CANopen clients come from PyPI",
             Package::Tshark => "the tests have it decode what was said on the bus",
+            Package::Qemu => {
+                "`cargo xtask test --thorough` asks it for a second opinion on the emulated core"
+            }
             Package::Chromium | Package::Chromedriver => "the tests look at the page of the bus with it",
             Package::DebianRust
             | Package::DebianRustSource

@@ -6,9 +6,9 @@ use super::host;
 use super::report::Step;
 use crate::command::{cargo, root, run};
 use crate::own_tool::Tools;
-use crate::setup::{self, python};
+use crate::setup::{self, Need, python};
 use crate::target::Toolchain;
-use crate::{bench, callgraph, images, progress};
+use crate::{bench, callgraph, hal_examples, images, progress};
 
 /// The chips whose images are built beside those of the default one. The second is the first with Ethernet and a camera, which the
 /// images do not use: without `--thorough`, the first stands for both.
@@ -24,11 +24,13 @@ pub(super) fn builds_for_host() -> Vec<Step> {
 }
 
 /// What the tests need, for the Cortex-M4.
-pub(super) fn builds_for_target() -> Vec<Step> {
+pub(super) fn builds_for_target(needs: &'static [Need], thorough: bool) -> Vec<Step> {
     vec![
-        Step::new("system packages", || setup::install(setup::TEST)),
+        Step::new("system packages", move || setup::install(needs)),
+        Step::new("other chips", move || other_chips(thorough)),
         Step::new("bootloader of an owner", || images::check_owners(&Toolchain::ensure()?)),
         Step::new("build images", || images::compile_all(&Toolchain::ensure()?)),
+        Step::new("build HAL examples", || hal_examples::build(&Toolchain::ensure()?)),
         Step::new("build bench images", || bench::build(&bench::Options::default()).map(|_| ())),
     ]
 }
@@ -43,14 +45,13 @@ pub(super) fn checks_for_host() -> Vec<Step> {
 }
 
 /// What no test waits for, for the Cortex-M4. Cargo does one at a time.
-pub(super) fn checks_for_target(thorough: bool) -> Vec<Step> {
+pub(super) fn checks_for_target() -> Vec<Step> {
     vec![
         Step::new("no panic in the images", callgraph::check_panics),
         Step::new("stack", || callgraph::stack(false, Tools::Built)),
         Step::new("performance", bench::check),
         Step::new("no panic", no_panic),
         Step::new("lint images", lint_images),
-        Step::new("other chips", move || other_chips(thorough)),
         Step::new("embassy", embassy),
     ]
 }
@@ -77,16 +78,11 @@ fn lint_images() -> Result<()> {
     progress::build("lint images", doc.arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"))
 }
 
+/// Before those of the default one, which cargo puts into the same place.
 fn other_chips(thorough: bool) -> Result<()> {
     let toolchain = Toolchain::ensure()?;
     let chips = if thorough { OTHER_CHIPS.len() } else { 1 };
-    for chip in &OTHER_CHIPS[..chips] {
-        let packages = ["-p", "firmware", "-p", "bootloader"];
-        let features = ["--release", "--no-default-features", "--features", chip];
-        let mut command = toolchain.cargo("check", &features);
-        progress::build(chip, command.args(images::DEVELOPMENT).args(packages))?;
-    }
-    Ok(())
+    OTHER_CHIPS[..chips].iter().try_for_each(|chip| images::compile_for(&toolchain, chip).map(|_| ()))
 }
 
 /// The library in an async main for the target. It is never run.

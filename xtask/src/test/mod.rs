@@ -29,10 +29,11 @@ pub(crate) struct Flags {
 
 /// Runs everything, or what the flags leave of it.
 pub(crate) fn run(flags: &Flags) -> Result<()> {
-    setup::check(setup::TEST)?;
+    let needs = if flags.thorough { setup::THOROUGH } else { setup::TEST };
+    setup::check(needs)?;
     let report = Report::new(flags.only.as_deref())?;
-    report.run([builds_for_host(), builds_for_target()], Vec::new())?;
+    report.run([builds_for_host(), builds_for_target(needs, flags.thorough)], Vec::new())?;
     let tests = suite::collect(flags.thorough, report.only())?;
-    report.run([checks_for_host(), checks_for_target(flags.thorough)], tests)?;
+    report.run([checks_for_host(), checks_for_target()], tests)?;
     report.finish()
 }

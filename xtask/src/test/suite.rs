@@ -34,25 +34,35 @@ pub(super) fn collect(thorough: bool, only: Option<&str>) -> Result<Vec<Step>> {
     Ok(steps)
 }
 
-/// The tests of a program, each run by itself: a test that changes something for another one, or ends the process, is seen.
+/// The tests of a program, each run by itself: a test that changes something for another one, or ends the process, is seen. What
+/// is marked as ignored needs more than a new machine brings, and runs with `thorough`.
 fn of_program(program: &TestProgram, thorough: bool) -> Result<Vec<Step>> {
-    let list = Command::new(&program.path).args(["--list", "--format", "terse"]).output();
-    let list = list.with_context(|| format!("cannot start {}", program.path.display()))?;
-    ensure!(list.status.success(), "{} does not list its tests", program.path.display());
-    let list = String::from_utf8_lossy(&list.stdout).into_owned();
-    let names = list.lines().filter_map(|line| line.strip_suffix(": test"));
+    let mut names = list(&program.path, &[])?;
+    if !thorough {
+        let ignored = list(&program.path, &["--ignored"])?;
+        names.retain(|name| !ignored.contains(name));
+    }
     let (path, directory) = (Arc::new(program.path.clone()), Arc::new(program.directory.clone()));
-    let step = |name: &str| {
-        let (path, directory, test) = (Arc::clone(&path), Arc::clone(&directory), name.to_owned());
-        Step::new(format!("{}: {name}", program.label), move || one(&path, &directory, &test, thorough))
+    let step = |test: String| {
+        let (path, directory) = (Arc::clone(&path), Arc::clone(&directory));
+        Step::new(format!("{}: {test}", program.label), move || one(&path, &directory, &test, thorough))
     };
-    Ok(names.map(step).collect())
+    Ok(names.into_iter().map(step).collect())
+}
+
+/// The names of the tests of a program.
+fn list(program: &Path, flags: &[&str]) -> Result<Vec<String>> {
+    let list = Command::new(program).args(["--list", "--format", "terse"]).args(flags).output();
+    let list = list.with_context(|| format!("cannot start {}", program.display()))?;
+    ensure!(list.status.success(), "{} does not list its tests", program.display());
+    let list = String::from_utf8_lossy(&list.stdout);
+    Ok(list.lines().filter_map(|line| line.strip_suffix(": test")).map(str::to_owned).collect())
 }
 
 fn one(program: &Path, directory: &Path, test: &str, thorough: bool) -> Result<()> {
     let mut command = Command::new(program);
     command
-        .args(["--exact", test, "--nocapture"])
+        .args(["--exact", test, "--nocapture", "--include-ignored"])
         .current_dir(directory)
         .env("CARGO_MANIFEST_DIR", directory);
     run(with_images(&mut command, thorough))

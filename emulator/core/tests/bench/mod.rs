@@ -73,17 +73,11 @@ pub(crate) struct Bench {
 impl Bench {
     /// Loads a program of `mechanics-images`.
     pub(crate) fn new(program: &str) -> Bench {
-        let path = directory().join(program);
-        let file = std::fs::read(&path).unwrap_or_else(|error| {
-            panic!("{}: {error}; run `cargo xtask images --development` first", path.display())
-        });
-        let elf = object::File::parse(file.as_slice()).unwrap();
-        let verdict =
-            elf.symbols().find(|symbol| symbol.name() == Ok("VERDICT")).expect("a verdict").address();
+        let file = load(program);
         let mut machine = Machine::new(Model::stm32f4(512 * 1024), Bare::default()).unwrap();
         machine.load_elf(&file).unwrap();
         machine.power_on(Time::ZERO);
-        Bench { machine, verdict: u32::try_from(verdict).unwrap() }
+        Bench { machine, verdict: verdict_of(program) }
     }
 
     /// Runs to the verdict, or for a tenth of a second.
@@ -104,10 +98,8 @@ impl Bench {
     /// The address and the size of a function of a program.
     #[allow(dead_code)]
     pub(crate) fn function(program: &str, name: &str) -> (u32, u32) {
-        let file = std::fs::read(directory().join(program)).unwrap();
-        let elf = object::File::parse(file.as_slice()).unwrap();
-        let symbol = elf.symbols().find(|symbol| symbol.name() == Ok(name)).expect("the function");
-        (symbol.address() as u32 & !1, symbol.size() as u32)
+        let (address, size) = symbol(program, name);
+        (address & !1, size)
     }
 
     /// The same in slices, always to the end of the tenth.
@@ -121,11 +113,7 @@ impl Bench {
     }
 
     fn verdict(&self) -> Verdict {
-        match self.word(0) {
-            PASSED => Verdict::Passed,
-            FAILED => Verdict::Failed(self.word(1)),
-            _ => Verdict::Silent,
-        }
+        verdict([self.word(0), self.word(1)])
     }
 
     /// A number that the program noted.
@@ -138,6 +126,40 @@ impl Bench {
         self.machine.read(self.verdict + 4 * index, &mut bytes).unwrap();
         u32::from_le_bytes(bytes)
     }
+}
+
+/// What the first two words of the verdict say.
+pub(crate) fn verdict([said, code]: [u32; 2]) -> Verdict {
+    match said {
+        PASSED => Verdict::Passed,
+        FAILED => Verdict::Failed(code),
+        _ => Verdict::Silent,
+    }
+}
+
+/// The address of the verdict of a program.
+pub(crate) fn verdict_of(program: &str) -> u32 {
+    symbol(program, "VERDICT").0
+}
+
+/// The address and the size of a symbol of a program.
+fn symbol(program: &str, name: &str) -> (u32, u32) {
+    let file = load(program);
+    let elf = object::File::parse(file.as_slice()).unwrap();
+    let symbol = elf.symbols().find(|symbol| symbol.name() == Ok(name)).expect(name);
+    (u32::try_from(symbol.address()).unwrap(), u32::try_from(symbol.size()).unwrap())
+}
+
+fn load(program: &str) -> Vec<u8> {
+    let path = path(program);
+    std::fs::read(&path).unwrap_or_else(|error| {
+        panic!("{}: {error}; run `cargo xtask images --development` first", path.display())
+    })
+}
+
+/// The ELF file of a program.
+pub(crate) fn path(program: &str) -> PathBuf {
+    directory().join(program)
 }
 
 /// Where the ELF files are.

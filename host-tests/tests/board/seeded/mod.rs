@@ -5,10 +5,10 @@
 //! finds the image changed. What the board says is everything by which an
 //! engineer notices on the bench: broken rules, faults and resets, accesses without a model, and what is wrong on the bus.
 
-mod scenario;
 mod table;
 
-use scenario::{Node, observe};
+use crate::scenario::{Node, observe};
+use crate::support::world;
 use table::{CODE, Row, STORES};
 
 /// So that several processes share the work.
@@ -16,7 +16,7 @@ const PARTS: usize = 4;
 
 /// A row whose words the board does not say, and all that the board says instead.
 fn silent(row: &Row) -> Option<String> {
-    let said = observe(row.node, |world| row.seed(world), |world| row.patch(world));
+    let said = observe(world(row.node.flags()), row.node, |world| row.seed(world), |world| row.patch(world));
     println!("{}: {}", row.name, said.join("; "));
     let is_told = said.iter().any(|sign| sign.contains(row.says));
     (!is_told).then(|| format!("{}: expected {:?} in {said:#?}", row.name, row.says))
@@ -53,7 +53,7 @@ fn bugs_show_fourth_part() {
 #[test]
 fn without_a_bug_the_board_says_nothing() {
     for node in [Node::Saving, Node::Encoder, Node::Absolute] {
-        assert_eq!(observe(node, |_| (), |_| ()), [""; 0], "{node:?}");
+        assert_eq!(observe(world(node.flags()), node, |_| (), |_| ()), [""; 0], "{node:?}");
     }
 }
 

@@ -4,7 +4,7 @@ use emulator::{Bug, Store};
 use object::{Object, ObjectSymbol};
 use sim::world::World;
 
-use super::scenario::Node;
+use crate::scenario::Node;
 use crate::support::firmware;
 
 /// A bug and a part of what the board says of it.

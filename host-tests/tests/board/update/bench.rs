@@ -35,7 +35,7 @@ pub(super) const PROMPT: Time = Time::from_millis(20);
 const STEP: Time = Time::from_micros(100);
 
 /// A master, the node it talks to, and the slowest answer it got.
-pub(super) struct Bench {
+pub(crate) struct Bench {
     pub(super) world: World,
     master: Master,
     bit_rate: u32,
@@ -50,7 +50,7 @@ impl Bench {
     }
 
     /// A master on the bus of a world that is there already.
-    pub(super) fn with(mut world: World, bit_rate: u32, node: u8) -> Bench {
+    pub(crate) fn with(mut world: World, bit_rate: u32, node: u8) -> Bench {
         let master = Master::join_at(&mut world, bit_rate);
         Bench { world, master, bit_rate, node, slowest: Time::ZERO, sent: Time::ZERO }
     }
@@ -62,7 +62,7 @@ impl Bench {
         bench
     }
 
-    pub(super) fn run(&mut self, span: Time) {
+    pub(crate) fn run(&mut self, span: Time) {
         self.world.run_until(self.world.now() + span);
     }
 
@@ -179,7 +179,7 @@ impl Bench {
     }
 
     /// The whole sequence of a master.
-    pub(super) fn update(&mut self, image: &Image) {
+    pub(crate) fn update(&mut self, image: &Image) {
         self.stop();
         self.clear();
         self.download(&image.to_bytes()).unwrap();

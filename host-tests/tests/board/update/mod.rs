@@ -18,8 +18,8 @@ use update::{HEADER_LEN, Status};
 
 use crate::stack::assert_bound;
 use crate::support::{SECOND, images};
-pub(crate) use bench::HEADER;
-use bench::{BOOT, Bench, CONTROL, DEVICE_TYPE, IDENTIFICATION, PROMPT, START, signed, version_a, version_b};
+use bench::{BOOT, CONTROL, DEVICE_TYPE, IDENTIFICATION, PROMPT, START, signed, version_a, version_b};
+pub(crate) use bench::{Bench, HEADER};
 
 /// What 1F57h reads where the signature is not good.
 const SIGNATURE: u8 = 67;

@@ -1,14 +1,14 @@
-//! What a node with a bug is put through, and what is noticed.
+//! What a node is put through, and what is noticed: nothing of one that is as it should be.
 
 use canbus::Time;
 use sim::summary::Summary;
 use sim::world::World;
 
-use crate::support::{Master, START_ALL, SYNC, frame, world};
+use crate::support::{Master, START_ALL, SYNC, frame};
 
 /// What the node measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Node {
+pub(crate) enum Node {
     /// 4 bar.
     Pressure,
     /// The same, and saves its parameters.
@@ -39,7 +39,8 @@ const PERIOD: u32 = 100;
 const STARTED: Time = Time::from_millis(400);
 
 impl Node {
-    fn flags(self) -> &'static str {
+    /// The flags of the simulator for it.
+    pub(crate) fn flags(self) -> &'static str {
         match self {
             Node::Pressure | Node::Saving => "--bitrate 1000 --pressure const:400000",
             Node::Interleaved => "--bitrate 1000 --pressure const:400000 --interleave 1",
@@ -49,13 +50,14 @@ impl Node {
     }
 }
 
-/// Starts a node with a bug, or gives one that runs a bug, and speaks with it. All that is not as it should be, a line each.
-pub(super) fn observe(
+/// Starts the only node of a world and speaks with it: with a bug from the start, or with one that it gets while it runs. All that is not
+/// as it should be, a line each.
+pub(crate) fn observe(
+    mut world: World,
     node: Node,
     before: impl FnOnce(&mut World),
     running: impl FnOnce(&mut World),
 ) -> Vec<String> {
-    let mut world = world(node.flags());
     world.enforce_rules(false);
     let master = Master::join(&mut world);
     let mut said = Vec::new();

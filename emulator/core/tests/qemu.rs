@@ -1,0 +1,176 @@
+//! The programs of the mechanics in QEMU: a second opinion on exceptions and system registers, from the project that the CPU
+//! library was made from. Where the two differ, the table says who is right, and by which clause.
+//!
+//! `cargo xtask test --thorough` installs QEMU and runs this.
+
+#[allow(dead_code)]
+mod bench;
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use bench::Verdict;
+
+/// The machine with the chip that is nearest: an STM32F405.
+const MACHINE: &str = "netduinoplus2";
+
+/// How often a program is asked for its verdict, and how long in between: a limit for a program that hangs, not a measurement.
+const LOOKS: usize = 200;
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// QEMU with a program.
+struct Qemu {
+    process: Child,
+    requests: ChildStdin,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Qemu {
+    fn start(program: &str) -> Qemu {
+        let mut command = Command::new("qemu-system-arm");
+        command.args(["-machine", MACHINE, "-display", "none", "-serial", "none", "-monitor", "none"]);
+        // An instruction takes 8 ns of the machine's time, whatever it takes of ours.
+        command.args(["-icount", "shift=3,sleep=off", "-qmp", "stdio", "-kernel"]).arg(bench::path(program));
+        let started = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let mut process = started.expect("qemu-system-arm, which `cargo xtask test --thorough` installs");
+        let requests = process.stdin.take().unwrap();
+        let answers = BufReader::new(process.stdout.take().unwrap());
+        let mut qemu = Qemu { process, requests, answers };
+        qemu.line();
+        qemu.ask(r#"{"execute":"qmp_capabilities"}"#);
+        qemu
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.answers.read_line(&mut line).unwrap();
+        assert!(!line.is_empty(), "QEMU has ended");
+        line
+    }
+
+    /// The answer to a request; events of the machine in between are of no interest.
+    fn ask(&mut self, request: &str) -> String {
+        writeln!(self.requests, "{request}").unwrap();
+        loop {
+            let line = self.line();
+            if line.contains("\"return\"") || line.contains("\"error\"") {
+                return line;
+            }
+        }
+    }
+
+    /// The verdict of a program and what it has noted.
+    fn words(&mut self, address: u32) -> [u32; 8] {
+        let command = format!("xp /8xw {address:#x}");
+        let answer = self.ask(&format!(
+            r#"{{"execute":"human-monitor-command","arguments":{{"command-line":"{command}"}}}}"#
+        ));
+        // Each line begins with its address, without a space before it.
+        let words =
+            answer.split(" 0x").skip(1).filter_map(|word| u32::from_str_radix(word.get(..8)?, 16).ok());
+        words.collect::<Vec<u32>>().try_into().expect("eight words")
+    }
+}
+
+/// The verdict of a program in QEMU, and its notes.
+fn run(program: &str) -> (Verdict, [u32; 6]) {
+    let address = bench::verdict_of(program);
+    let mut qemu = Qemu::start(program);
+    for _ in 0..LOOKS {
+        let [said, code, notes @ ..] = qemu.words(address);
+        match bench::verdict([said, code]) {
+            Verdict::Silent => thread::sleep(PAUSE),
+            verdict => return (verdict, notes),
+        }
+    }
+    (Verdict::Silent, [0; 6])
+}
+
+/// A program that passes on the emulated board, and what QEMU makes of it where that is something else.
+struct Difference {
+    program: &'static str,
+    verdict: Verdict,
+    /// Which checks fail, where the program notes each.
+    notes: &'static [u32],
+    /// Who is right, and by which clause of the ARMv7-M Architecture Reference Manual.
+    because: &'static str,
+}
+
+/// Programs of which QEMU says the same.
+const AGREED: [&str; 14] = [
+    "basepri",
+    "escalation",
+    "exclusive",
+    "float_contexts",
+    "hints",
+    "it_block",
+    "it_miss",
+    "lost_update",
+    "preemption",
+    "restart",
+    "rtic_tasks",
+    "stack_overflow",
+    "tail_chain",
+    "traps",
+];
+
+const DIFFERENCES: [Difference; 2] = [
+    Difference {
+        program: "system_registers",
+        verdict: Verdict::Failed(3),
+        notes: &[3, 12, 0, 0, 0],
+        because: "3: QEMU divides the count of SysTick by eight when the clock source changes; B3.3.1 and B3.3.3 have a register \
+                  that the chosen clock decrements, and no other change of it. 12: see systick",
+    },
+    Difference {
+        program: "systick",
+        verdict: Verdict::Failed(2),
+        notes: &[],
+        because: "QEMU has no DWT: DWT_CYCCNT reads 0 with TRCENA and CYCCNTENA set; C1.8.8 has it count",
+    },
+];
+
+#[test]
+#[ignore = "needs QEMU: `cargo xtask test --thorough` installs it"]
+fn qemu_agrees_or_the_difference_is_known() {
+    let mut wrong = Vec::new();
+    for program in AGREED {
+        let (said, _) = run(program);
+        println!("{program}: {said:?}");
+        if said != Verdict::Passed {
+            wrong.push(format!("{program}: {said:?}"));
+        }
+    }
+    for Difference { program, verdict, notes, because } in DIFFERENCES {
+        let (said, noted) = run(program);
+        println!("{program}: {said:?} {noted:?}: {because}");
+        if said != verdict || !noted.starts_with(notes) {
+            wrong.push(format!("{program}: {said:?} {noted:?} instead of {verdict:?} {notes:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// The two programs that are missing program the flash of the chip: QEMU has none that can be programmed.
+#[test]
+fn every_program_is_asked_about() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../images/src/bin");
+    let mut programs: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|file| file.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned())
+        .collect();
+    programs.sort();
+    let known = DIFFERENCES.iter().map(|difference| difference.program).chain(AGREED);
+    let mut known: Vec<&str> = known.chain(["busy_flash", "self_modified"]).collect();
+    known.sort_unstable();
+    assert_eq!(programs, known);
+}

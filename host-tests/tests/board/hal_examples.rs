@@ -1,0 +1,111 @@
+//! Examples of the stm32f4xx-hal package, from its published source, do on the emulated board what their comments promise.
+//! Nobody has written them for it, nor it for them.
+
+use canbus::Time;
+use chip::{Board, Stm32f4, Variant};
+use emulator::{Machine, Model};
+
+use crate::support::images;
+
+/// How finely outputs are looked at.
+const STEP: Time = Time::from_millis(1);
+
+/// A chip that runs an example, on a board with a crystal of so many hertz.
+fn start(example: &str, hse: Option<u64>) -> Machine<Stm32f4> {
+    let elf = std::fs::read(images().join(format!("hal-{example}"))).unwrap();
+    let chip = Stm32f4::new(Variant::F446, Board { hse, ..Board::default() });
+    let mut machine = Machine::new(Model::stm32f4(Variant::F446.flash_size()), chip).unwrap();
+    machine.load_elf(&elf).unwrap();
+    machine.power_on(Time::ZERO);
+    machine
+}
+
+/// When an output has changed, in milliseconds, and to what, until `end`.
+fn edges(machine: &mut Machine<Stm32f4>, (port, pin): (char, u32), end: Time) -> Vec<(u64, bool)> {
+    let mut edges = Vec::new();
+    let mut level = None;
+    while machine.now() < end {
+        let until = machine.now() + STEP;
+        machine.run_until(until);
+        let now = machine.peripherals().output(port, pin);
+        if now != level {
+            edges.extend(now.map(|level| (machine.now().as_micros() / 1000, level)));
+            level = now;
+        }
+    }
+    edges
+}
+
+/// The times between edges, in milliseconds, with the level that each edge brings.
+fn spans(edges: &[(u64, bool)]) -> Vec<(bool, u64)> {
+    edges.windows(2).map(|pair| (pair[0].1, pair[1].0 - pair[0].0)).collect()
+}
+
+fn holds(spans: &[(bool, u64)], expected: &[(bool, u64)]) {
+    assert!(spans.len() >= expected.len(), "{spans:?}");
+    for ((level, span), (expected_level, expected)) in spans.iter().zip(expected) {
+        assert_eq!(level, expected_level, "{spans:?}");
+        assert!(span.abs_diff(*expected) <= 2, "{spans:?}");
+    }
+}
+
+fn is_clean(machine: &Machine<Stm32f4>) {
+    assert_eq!(machine.incidents(), []);
+    assert_eq!(machine.peripherals().unmodelled(), []);
+}
+
+#[test]
+fn the_led_of_blinky_timer_irq_changes_with_each_second_of_the_timer() {
+    let mut machine = start("blinky-timer-irq", None);
+    let seen = edges(&mut machine, ('A', 5), Time::from_millis(4100));
+    assert_eq!(seen.first().map(|(at, level)| (*at <= 1, *level)), Some((true, true)), "{seen:?}");
+    holds(&spans(&seen), &[(true, 1000), (false, 1000), (true, 1000)]);
+    is_clean(&machine);
+}
+
+#[test]
+fn the_led_of_delay_timer_blinky_is_on_for_one_second_and_off_for_three() {
+    let mut machine = start("delay-timer-blinky", Some(25_000_000));
+    let seen = edges(&mut machine, ('C', 13), Time::from_millis(5200));
+    let from_on: Vec<(u64, bool)> = seen.iter().copied().skip_while(|(_, level)| !level).collect();
+    holds(&spans(&from_on), &[(true, 1000), (false, 3000)]);
+    is_clean(&machine);
+}
+
+#[test]
+fn the_leds_of_dwt_blinky_take_turns_of_a_second_by_the_cycle_counter() {
+    let mut machine = start("dwt-blinky", None);
+    let seen = edges(&mut machine, ('G', 13), Time::from_millis(3200));
+    let from_on: Vec<(u64, bool)> = seen.iter().copied().skip_while(|(_, level)| !level).collect();
+    holds(&spans(&from_on), &[(true, 1000), (false, 1000)]);
+    is_clean(&machine);
+}
+
+#[test]
+fn timer_syst_prints_each_time_that_its_timer_expires_and_never_its_last_line() {
+    let mut machine = start("timer-syst", None);
+    machine.attach_debugger();
+    let mut printed = String::new();
+    let mut when = Vec::new();
+    while machine.now() < Time::from_millis(400) {
+        let until = machine.now() + STEP;
+        machine.run_until(until);
+        let new = machine.take_printed();
+        when.extend(new.lines().map(|_| machine.now().as_micros() / 1000));
+        printed += &new;
+    }
+    let lines: Vec<&str> = printed.lines().collect();
+    assert_eq!(
+        lines,
+        [
+            "hello!",
+            "timer expired 1",
+            "timer expired 2",
+            "timer expired 3",
+            "ehy, you cannot cancel a timer two times!"
+        ]
+    );
+    let spans: Vec<u64> = when.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(spans.iter().zip([42, 42, 42]).all(|(span, expected)| span.abs_diff(expected) <= 1), "{when:?}");
+    is_clean(&machine);
+}
