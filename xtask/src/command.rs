@@ -1,7 +1,6 @@
 //! Running other programs.
 
 use std::cell::RefCell;
-use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -86,12 +85,6 @@ pub(crate) fn become_program(command: &mut Command) -> Result<ExitCode> {
     let status =
         command.status().with_context(|| format!("cannot start {}", command.get_program().display()))?;
     Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from))
-}
-
-/// What a program prints, without the last line end; `None` when it is missing or fails.
-pub(crate) fn output(program: impl AsRef<OsStr>, args: &[&str]) -> Option<String> {
-    let output = Command::new(program).args(args).stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
-    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
 fn line(command: &Command) -> String {

@@ -4,10 +4,11 @@ use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result};
+use start::{Package, is_installed};
 
 use crate::command::{cargo, root, run};
-use crate::setup::system::{self, Package, is_installed};
-use crate::{target, tools};
+use crate::setup::system;
+use crate::tools;
 
 /// The crates that are measured, and those whose tests count as well.
 const PURE: [&str; 5] = ["canopen-device", "profiles", "storage", "update", "node"];
@@ -30,7 +31,7 @@ pub(crate) fn print() -> Result<()> {
         command.args(["-p", package]);
     }
     command.args(["--ignore-filename-regex", IGNORED]).env("PATH", tools::with("cargo-llvm-cov")?);
-    if target::is_closed() {
+    if start::target::is_closed() {
         if !is_installed(Package::DebianLlvm) {
             system::install(&[Package::DebianLlvm])?;
         }

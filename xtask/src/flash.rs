@@ -8,7 +8,9 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use probe::Board;
 
-use crate::command::{become_program, built, cargo, output};
+use start::output;
+
+use crate::command::{become_program, built, cargo};
 use crate::setup;
 use crate::target::Toolchain;
 use crate::{images, progress};

@@ -3,22 +3,20 @@
 //! An installed target comes first. Where rustup must not download (`RUSTUP_AUTO_INSTALL=0`) Debian's packages
 //! build the core library from its source. Everywhere else rustup adds the target.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use start::target::{has_target, is_closed, linker, missing};
 
-use crate::command::{cargo, output, root, run};
-use crate::setup::system::{self, Package, is_installed, runs};
+pub(crate) use start::target::TRIPLE;
 
-/// The target of both images: Cortex-M4 with its FPU.
-pub(crate) const TRIPLE: &str = "thumbv7em-none-eabihf";
+use crate::command::{cargo, root, run};
+use crate::setup::system;
 
 /// Has the compiler note what each function takes of the stack, in a section that is not flashed; `cargo xtask stack` adds it
 /// up. A stable compiler knows the flag with `RUSTC_BOOTSTRAP` only.
 const STACK_SIZES: &str = "target.thumbv7em-none-eabihf.rustflags = ['-Zemit-stack-sizes']";
-
-const DEBIAN: [Package; 3] = [Package::DebianRust, Package::DebianRustSource, Package::DebianCargo];
 
 /// A toolchain that can build for [`TRIPLE`].
 pub(crate) enum Toolchain {
@@ -39,7 +37,10 @@ impl Toolchain {
         }
         if is_closed() {
             system::install(&missing())?;
-            return Ok(Toolchain::Debian { linker: linker()? });
+            let linker = linker().with_context(|| {
+                format!("no linker for {TRIPLE}: neither rustup's rust-lld nor Debian's lld-22 is there")
+            })?;
+            return Ok(Toolchain::Debian { linker });
         }
         eprintln!("adding the Rust target {TRIPLE}");
         run(Command::new("rustup").args(["target", "add", TRIPLE]).current_dir(root())).with_context(
@@ -71,50 +72,6 @@ impl Toolchain {
                 .env_remove("CARGO");
         }
         command
-    }
-}
-
-/// Whether the compiler at hand has a core library for the target.
-fn has_target() -> bool {
-    let Some(libdir) = output("rustc", &["--print", "target-libdir", "--target", TRIPLE]) else {
-        return false;
-    };
-    let Ok(entries) = Path::new(&libdir).read_dir() else { return false };
-    entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore"))
-}
-
-/// What only the package manager can bring for the target.
-pub(crate) fn missing() -> Vec<Package> {
-    if has_target() {
-        return Vec::new();
-    }
-    if is_closed() && runs("apt-get") {
-        let linker = linker().is_err().then_some(Package::DebianLinker);
-        return DEBIAN.into_iter().filter(|package| !is_installed(*package)).chain(linker).collect();
-    }
-    if is_closed() || !runs("rustup") { vec![Package::RustTarget] } else { Vec::new() }
-}
-
-/// The same for clippy, which comes with the compiler unless Debian builds for the target.
-pub(crate) fn missing_lints() -> Vec<Package> {
-    let is_debian = !has_target() && is_closed() && runs("apt-get");
-    if is_debian && !is_installed(Package::DebianClippy) { vec![Package::DebianClippy] } else { Vec::new() }
-}
-
-/// Whether rustup must not download.
-pub(crate) fn is_closed() -> bool {
-    std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0")
-}
-
-/// rustup's own lld, else the one that Debian's package links to.
-fn linker() -> Result<PathBuf> {
-    let sysroot = output("rustc", &["--print", "sysroot"]).unwrap_or_default();
-    let host = env!("XTASK_HOST");
-    let bundled = Path::new(&sysroot).join("lib/rustlib").join(host).join("bin/rust-lld");
-    let debian = PathBuf::from("/usr/lib/llvm-22/bin/ld.lld");
-    match [bundled, debian].into_iter().find(|path| path.exists()) {
-        Some(path) => Ok(path),
-        None => bail!("no linker for {TRIPLE}: neither rustup's rust-lld nor Debian's lld-22 is there"),
     }
 }
 

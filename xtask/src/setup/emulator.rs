@@ -10,8 +10,9 @@ use std::sync::OnceLock;
 
 use anyhow::{Result, anyhow};
 
-use super::system::{self, Package, runs};
-use super::{libclang, python};
+use start::{Need, Package, runs};
+
+use super::{libclang, python, system};
 use crate::command::{cargo, target_dir};
 
 /// A cargo call that can build the emulator.
@@ -31,20 +32,14 @@ pub(crate) fn environment() -> Result<&'static [(OsString, OsString)]> {
     made.as_deref().map_err(|error| anyhow!("{error}"))
 }
 
-/// What only the package manager can bring.
+/// What only the package manager can bring, beyond what is known before this program is compiled.
 pub(super) fn missing() -> Vec<Package> {
-    let mut packages = Vec::new();
-    if !runs("cc") || !runs("make") {
-        packages.push(Package::Compiler);
-    }
-    if find().is_none() && !python::makes_environments() {
-        packages.push(Package::Python);
-    }
-    packages
+    let needs_python = find().is_none() && !start::python::makes_environments();
+    if needs_python { vec![Package::Python] } else { Vec::new() }
 }
 
 fn make() -> Result<Vec<(OsString, OsString)>> {
-    system::install(&missing())?;
+    super::install(&[Need::Emulator])?;
     if let Some(found) = find() {
         return Ok(found);
     }

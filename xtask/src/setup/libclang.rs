@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use clang::diagnostic::Severity;
 use clang::{Clang, Index, Unsaved};
 
-use crate::command::output;
+use start::output;
 
 /// Where bindgen looks for libclang.
 pub(super) const LIBRARY: &str = "LIBCLANG_PATH";

@@ -1,29 +1,19 @@
 //! Python environments below the build directory, made from a list of packages.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use super::system::{self, Package};
+use start::python::missing;
+
+use super::system;
 use crate::command::{root, run, target_dir};
 
 /// The interpreter with the CANopen clients that judge the node.
 pub(crate) fn clients() -> Result<PathBuf> {
     system::install(&missing())?;
     ensure(&target_dir().join("venv"), "host-tests/python/requirements.txt")
-}
-
-/// What only the package manager can bring.
-pub(super) fn missing() -> Vec<Package> {
-    if makes_environments() { Vec::new() } else { vec![Package::Python] }
-}
-
-/// Whether there is a Python that can make environments: Debian has the part that does in a package of its own.
-pub(super) fn makes_environments() -> bool {
-    let mut command = Command::new("python3");
-    command.args(["-c", "import venv, ensurepip"]).stdin(Stdio::null()).stderr(Stdio::null());
-    command.status().is_ok_and(|status| status.success())
 }
 
 /// The interpreter of an environment with the packages of a list; made anew when the list has changed.

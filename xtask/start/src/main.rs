@@ -1,0 +1,73 @@
+//! `cargo xtask` and `cargo sim` begin here: this program compiles in a second. Where something is missing that only the user can
+//! install, it names the one command; everything else it leaves to xtask.
+
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+use start::needs::{self, Need};
+
+fn main() -> ExitCode {
+    let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().filter_map(|argument| argument.to_str()).collect();
+    if let Err(missing) = start::check(&start::missing(needs_of(&words))) {
+        eprintln!("error: {missing}");
+        return ExitCode::from(2);
+    }
+    let mut xtask = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let root =
+        Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the crate lies in the workspace");
+    xtask.args(["run", "--quiet", "--profile", "sim", "--package", "xtask", "--manifest-path"]);
+    xtask.arg(root.join("Cargo.toml")).arg("--").args(arguments);
+    become_xtask(xtask)
+}
+
+/// What is sure to be needed. What depends on flags, or on what xtask alone can find out, xtask asks.
+fn needs_of(words: &[&str]) -> &'static [Need] {
+    let is_help = words.iter().any(|word| matches!(*word, "--help" | "-h" | "help" | "--dry-run"));
+    match words.first() {
+        _ if is_help => &[],
+        Some(&"sim") => needs::SIM,
+        Some(&"test") if words.contains(&"--thorough") => needs::THOROUGH,
+        Some(&"test" | &"setup") => needs::TEST,
+        Some(&"images") => needs::IMAGES,
+        Some(&"pictures") => needs::PICTURES,
+        _ => &[],
+    }
+}
+
+/// A signal to this process then reaches xtask, and what xtask becomes.
+#[cfg(unix)]
+fn become_xtask(mut xtask: Command) -> ExitCode {
+    use std::os::unix::process::CommandExt as _;
+    eprintln!("error: cannot start cargo: {}", xtask.exec());
+    ExitCode::from(2)
+}
+
+#[cfg(not(unix))]
+fn become_xtask(mut xtask: Command) -> ExitCode {
+    match xtask.status() {
+        Ok(status) => {
+            status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from)
+        }
+        Err(error) => {
+            eprintln!("error: cannot start cargo: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_needs_what_it_cannot_do_without() {
+        assert_eq!(needs_of(&["sim", "--for", "5"]), needs::SIM);
+        assert_eq!(needs_of(&["test", "--only", "eds"]), needs::TEST);
+        assert_eq!(needs_of(&["test", "--thorough"]), needs::THOROUGH);
+        assert_eq!(needs_of(&["flash"]), []);
+        assert_eq!(needs_of(&[]), []);
+        assert_eq!(needs_of(&["sim", "--help"]), []);
+        assert_eq!(needs_of(&["setup", "--dry-run"]), []);
+    }
+}
