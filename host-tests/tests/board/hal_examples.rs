@@ -12,7 +12,12 @@ const STEP: Time = Time::from_millis(1);
 
 /// A chip that runs an example, on a board with a crystal of so many hertz.
 fn start(example: &str, hse: Option<u64>) -> Machine<Stm32f4> {
-    let elf = std::fs::read(images().join(format!("hal-{example}"))).unwrap();
+    start_program(&format!("hal-{example}"), hse)
+}
+
+/// A chip that runs a program alone.
+pub(crate) fn start_program(name: &str, hse: Option<u64>) -> Machine<Stm32f4> {
+    let elf = std::fs::read(images().join(name)).unwrap();
     let chip = Stm32f4::new(Variant::F446, Board { hse, ..Board::default() });
     let mut machine = Machine::new(Model::stm32f4(Variant::F446.flash_size()), chip).unwrap();
     machine.load_elf(&elf).unwrap();

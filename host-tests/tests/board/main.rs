@@ -3,6 +3,7 @@
 mod adapter;
 mod budget;
 mod bus_faults;
+mod calibration;
 mod chip_faults;
 mod configuring;
 mod conforming;

@@ -1,0 +1,82 @@
+//! What instructions take, by the cycle counter: to compare the model with a chip. The clocks are those of the firmware (144 MHz,
+//! PCLK1 36 MHz, PCLK2 72 MHz, out of the HSI, so that any board will do), and each line is printed by semihosting.
+#![no_std]
+#![no_main]
+
+use core::arch::asm;
+
+use cortex_m::peripheral::DWT;
+use cortex_m_rt::entry;
+use cortex_m_semihosting::hprintln;
+use mechanics_images::finish;
+use stm32f4xx_hal::pac::Peripherals;
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Config;
+
+/// How often an instruction is repeated.
+const COUNT: u32 = 64;
+/// A register on each bus: CR of PWR, MEMRMP of SYSCFG, IDR of GPIOA.
+const ON_APB1: u32 = 0x4000_7000;
+const ON_APB2: u32 = 0x4001_3800;
+const ON_AHB1: u32 = 0x4002_0010;
+
+/// The cycles of some code and of reading the counter. The first time fills the caches of the flash.
+#[inline(always)]
+fn cycles(code: impl Fn()) -> u32 {
+    let mut took = 0;
+    for _ in 0..2 {
+        unsafe { asm!("dsb", "isb") };
+        let before = DWT::cycle_count();
+        unsafe { asm!("isb") };
+        code();
+        unsafe { asm!("isb") };
+        took = DWT::cycle_count().wrapping_sub(before);
+    }
+    took
+}
+
+/// Repeats an instruction, and prints what that took: the difference between twice as often and once, in which what is around them
+/// cancels out.
+macro_rules! repeat {
+    ($name:literal, $($instruction:literal),+ $(; $($operand:tt)*)?) => {{
+        let once = cycles(|| unsafe { asm!(".rept 64", $($instruction),+, ".endr" $(, $($operand)*)?) });
+        let twice = cycles(|| unsafe { asm!(".rept 128", $($instruction),+, ".endr" $(, $($operand)*)?) });
+        hprintln!("{}: {} took {}", $name, COUNT, twice.wrapping_sub(once))
+    }};
+}
+
+/// 4 KiB of instructions in a row: more than the caches hold.
+#[inline(never)]
+fn straight_line() {
+    unsafe { asm!(".rept 2048", "nop", ".endr") };
+}
+
+#[entry]
+fn main() -> ! {
+    let mut core = cortex_m::Peripherals::take().unwrap();
+    let chip = Peripherals::take().unwrap();
+    let clocks = Config::hsi().sysclk(144.MHz()).pclk1(36.MHz()).pclk2(72.MHz());
+    let mut rcc = chip.RCC.freeze(clocks);
+    let _port = chip.GPIOA.split(&mut rcc);
+    let _syscfg = chip.SYSCFG.constrain(&mut rcc);
+    rcc.apb1enr().modify(|_, w| w.pwren().enabled());
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+    let word = 0_u32;
+    let here = &raw const word;
+    repeat!("ADDS", "adds r0, r0, #1"; out("r0") _);
+    repeat!("LDR, one after the other", "ldr r0, [{0}]"; in(reg) here, out("r0") _);
+    repeat!("STR", "str r0, [{0}]"; in(reg) here, out("r0") _);
+    repeat!("branch not taken", "cmp r0, r0", "bne 2f", "2:"; out("r0") _);
+    repeat!("branch taken", "b 2f", "2:");
+    repeat!("UDIV of 1", "udiv r1, {0}, {0}"; in(reg) 1, out("r1") _);
+    repeat!("UDIV of FFFFFFFFh", "udiv r1, {0}, {1}"; in(reg) u32::MAX, in(reg) 3, out("r1") _);
+    repeat!("VADD, each for itself", "vadd.f32 s0, s1, s2"; out("s0") _);
+    repeat!("VADD of the one before", "vadd.f32 s0, s0, s1"; out("s0") _);
+    repeat!("VDIV", "vdiv.f32 s0, s1, s2"; out("s0") _);
+    repeat!("LDR on APB1", "ldr r0, [{0}]"; in(reg) ON_APB1, out("r0") _);
+    repeat!("LDR on APB2", "ldr r0, [{0}]"; in(reg) ON_APB2, out("r0") _);
+    repeat!("LDR on AHB1", "ldr r0, [{0}]"; in(reg) ON_AHB1, out("r0") _);
+    hprintln!("4 KiB of NOP: 2048 took {}", cycles(straight_line) - cycles(|| ()));
+    finish(Ok(()))
+}
