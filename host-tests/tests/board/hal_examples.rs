@@ -60,6 +60,7 @@ fn is_clean(machine: &Machine<Stm32f4>) {
 }
 
 #[test]
+#[ignore = "the examples are built by `cargo xtask test --thorough`"]
 fn the_led_of_blinky_timer_irq_changes_with_each_second_of_the_timer() {
     let mut machine = start("blinky-timer-irq", None);
     let seen = edges(&mut machine, ('A', 5), Time::from_millis(4100));
@@ -69,6 +70,7 @@ fn the_led_of_blinky_timer_irq_changes_with_each_second_of_the_timer() {
 }
 
 #[test]
+#[ignore = "the examples are built by `cargo xtask test --thorough`"]
 fn the_led_of_delay_timer_blinky_is_on_for_one_second_and_off_for_three() {
     let mut machine = start("delay-timer-blinky", Some(25_000_000));
     let seen = edges(&mut machine, ('C', 13), Time::from_millis(5200));
@@ -78,6 +80,7 @@ fn the_led_of_delay_timer_blinky_is_on_for_one_second_and_off_for_three() {
 }
 
 #[test]
+#[ignore = "the examples are built by `cargo xtask test --thorough`"]
 fn the_leds_of_dwt_blinky_take_turns_of_a_second_by_the_cycle_counter() {
     let mut machine = start("dwt-blinky", None);
     let seen = edges(&mut machine, ('G', 13), Time::from_millis(3200));
@@ -87,6 +90,7 @@ fn the_leds_of_dwt_blinky_take_turns_of_a_second_by_the_cycle_counter() {
 }
 
 #[test]
+#[ignore = "the examples are built by `cargo xtask test --thorough`"]
 fn timer_syst_prints_each_time_that_its_timer_expires_and_never_its_last_line() {
     let mut machine = start("timer-syst", None);
     machine.attach_debugger();
