@@ -73,18 +73,9 @@ fn streams() -> Result<Option<(File, File)>> {
 }
 
 /// Goes on as another program, so that a signal to `cargo xtask` reaches that one.
-#[cfg(unix)]
 pub(crate) fn become_program(command: &mut Command) -> Result<ExitCode> {
-    use std::os::unix::process::CommandExt as _;
-    Err(command.exec()).with_context(|| format!("cannot start {}", command.get_program().display()))
-}
-
-/// Without `exec` the simulator is a child; its exit status becomes ours.
-#[cfg(not(unix))]
-pub(crate) fn become_program(command: &mut Command) -> Result<ExitCode> {
-    let status =
-        command.status().with_context(|| format!("cannot start {}", command.get_program().display()))?;
-    Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from))
+    start::become_program(command)
+        .with_context(|| format!("cannot start {}", command.get_program().display()))
 }
 
 fn line(command: &Command) -> String {

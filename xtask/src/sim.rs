@@ -37,7 +37,7 @@ fn chip(flags: &[OsString]) -> &str {
         None => None,
     });
     let named = found.and_then(|name| name.or_else(|| flags.next()));
-    named.filter(|name| images::CHIPS.contains(name)).unwrap_or(images::CHIP)
+    named.filter(|name| images::OTHER_CHIPS.contains(name)).unwrap_or(images::CHIP)
 }
 
 /// Runs the simulator with the user's flags in the place of this process, so that a signal to `cargo sim` reaches the

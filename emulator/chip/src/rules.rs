@@ -125,7 +125,7 @@ const PLL_INPUT: RangeInclusive<u64> = 950_000..=2_100_000;
 const PLL_VCO: RangeInclusive<u64> = 100 * MEGA..=432 * MEGA;
 /// The ADC clock at 2.4 to 3.6 V.
 const ADC_CLOCK: RangeInclusive<u64> = 600_000..=36 * MEGA;
-/// What absolute encoders with SSI take.
+/// Clock frequencies that absolute encoders with SSI take, in hertz.
 const SSI_CLOCK: RangeInclusive<u64> = 0..=MEGA;
 /// What the temperature sensor and the internal reference need.
 const INTERNAL_SOURCE: Time = Time::from_micros(10);

@@ -68,7 +68,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         Some(())
     }
 
-    /// Of a text that ends with a zero.
+    /// The length of a text that ends with a zero.
     fn length(&self, address: u32) -> Option<u32> {
         let mut byte = [0];
         (0..LONGEST).find(|offset| self.read(address.wrapping_add(*offset), &mut byte).is_ok() && byte == [0])

@@ -2,7 +2,7 @@
 
 use canbus::Time;
 
-use crate::hal_examples::start_program;
+use crate::hal_examples::{run, start_program};
 
 /// What the program repeats; the cycles of each that are published, at least and at most; and whether the model keeps to them.
 ///
@@ -36,10 +36,7 @@ const ENDS: f64 = 0.03;
 fn what_the_model_says_beside_what_is_published() {
     let mut machine = start_program("calibrate", None);
     machine.attach_debugger();
-    while machine.now() < Time::from_millis(100) {
-        let until = machine.now() + Time::from_millis(1);
-        machine.run_until(until);
-    }
+    run(&mut machine, Time::from_millis(100), |_| ());
     assert_eq!(machine.incidents(), []);
     let printed = machine.take_printed();
     let lines: Vec<&str> = printed.lines().collect();

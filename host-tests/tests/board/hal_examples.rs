@@ -25,20 +25,38 @@ pub(crate) fn start_program(name: &str, hse: Option<u64>) -> Machine<Stm32f4> {
     machine
 }
 
+/// Runs until `end` and looks at the chip after each step.
+pub(crate) fn run(machine: &mut Machine<Stm32f4>, end: Time, mut look: impl FnMut(&mut Machine<Stm32f4>)) {
+    while machine.now() < end {
+        let until = machine.now() + STEP;
+        machine.run_until(until);
+        look(machine);
+    }
+}
+
+/// The virtual time in milliseconds.
+fn now(machine: &Machine<Stm32f4>) -> u64 {
+    machine.now().as_micros() / 1000
+}
+
 /// When an output has changed, in milliseconds, and to what, until `end`.
 fn edges(machine: &mut Machine<Stm32f4>, (port, pin): (char, u32), end: Time) -> Vec<(u64, bool)> {
     let mut edges = Vec::new();
     let mut level = None;
-    while machine.now() < end {
-        let until = machine.now() + STEP;
-        machine.run_until(until);
-        let now = machine.peripherals().output(port, pin);
-        if now != level {
-            edges.extend(now.map(|level| (machine.now().as_micros() / 1000, level)));
-            level = now;
+    run(machine, end, |machine| {
+        let found = machine.peripherals().output(port, pin);
+        if found != level {
+            edges.extend(found.map(|level| (now(machine), level)));
+            level = found;
         }
-    }
+    });
     edges
+}
+
+/// The times between edges from the first one on that switches the output on.
+fn spans_from_on(edges: &[(u64, bool)]) -> Vec<(bool, u64)> {
+    let on = edges.iter().position(|(_, level)| *level).unwrap_or(edges.len());
+    spans(&edges[on..])
 }
 
 /// The times between edges, in milliseconds, with the level that each edge brings.
@@ -74,8 +92,7 @@ fn the_led_of_blinky_timer_irq_changes_with_each_second_of_the_timer() {
 fn the_led_of_delay_timer_blinky_is_on_for_one_second_and_off_for_three() {
     let mut machine = start("delay-timer-blinky", Some(25_000_000));
     let seen = edges(&mut machine, ('C', 13), Time::from_millis(5200));
-    let from_on: Vec<(u64, bool)> = seen.iter().copied().skip_while(|(_, level)| !level).collect();
-    holds(&spans(&from_on), &[(true, 1000), (false, 3000)]);
+    holds(&spans_from_on(&seen), &[(true, 1000), (false, 3000)]);
     is_clean(&machine);
 }
 
@@ -84,8 +101,7 @@ fn the_led_of_delay_timer_blinky_is_on_for_one_second_and_off_for_three() {
 fn the_leds_of_dwt_blinky_take_turns_of_a_second_by_the_cycle_counter() {
     let mut machine = start("dwt-blinky", None);
     let seen = edges(&mut machine, ('G', 13), Time::from_millis(3200));
-    let from_on: Vec<(u64, bool)> = seen.iter().copied().skip_while(|(_, level)| !level).collect();
-    holds(&spans(&from_on), &[(true, 1000), (false, 1000)]);
+    holds(&spans_from_on(&seen), &[(true, 1000), (false, 1000)]);
     is_clean(&machine);
 }
 
@@ -96,13 +112,11 @@ fn timer_syst_prints_each_time_that_its_timer_expires_and_never_its_last_line() 
     machine.attach_debugger();
     let mut printed = String::new();
     let mut when = Vec::new();
-    while machine.now() < Time::from_millis(400) {
-        let until = machine.now() + STEP;
-        machine.run_until(until);
+    run(&mut machine, Time::from_millis(400), |machine| {
         let new = machine.take_printed();
-        when.extend(new.lines().map(|_| machine.now().as_micros() / 1000));
+        when.extend(new.lines().map(|_| now(machine)));
         printed += &new;
-    }
+    });
     let lines: Vec<&str> = printed.lines().collect();
     assert_eq!(
         lines,

@@ -10,10 +10,6 @@ use crate::setup::{self, Need, python};
 use crate::target::Toolchain;
 use crate::{bench, callgraph, hal_examples, images, progress};
 
-/// The chips that images can be built for beside the default one. The second is the first with Ethernet and a camera, which the images do
-/// not use: the first stands for both where time is short.
-const OTHER_CHIPS: [&str; 2] = ["stm32f405", "stm32f407"];
-
 /// What the tests need, for this machine.
 pub(super) fn builds_for_host() -> Vec<Step> {
     vec![
@@ -85,15 +81,13 @@ fn lint_images() -> Result<()> {
 
 fn build_other_chips() -> Result<()> {
     let toolchain = Toolchain::ensure()?;
-    OTHER_CHIPS.iter().try_for_each(|chip| images::compile_for(&toolchain, chip).map(|_| ()))
+    images::OTHER_CHIPS.iter().try_for_each(|chip| images::compile_for(&toolchain, chip).map(|_| ()))
 }
 
 /// That the images for another chip compile. `--thorough` links them and runs them.
 fn check_other_chip() -> Result<()> {
-    let [chip, _] = OTHER_CHIPS;
-    let features = ["--release", "--no-default-features", "--features", chip];
-    let mut command = Toolchain::ensure()?.cargo("check", &features);
-    progress::build(chip, command.args(images::DEVELOPMENT).args(["-p", "firmware", "-p", "bootloader"]))
+    let [chip, _] = images::OTHER_CHIPS;
+    images::check_for(&Toolchain::ensure()?, chip)
 }
 
 /// The library in an async main for the target. It is never run.

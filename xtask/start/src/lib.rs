@@ -7,7 +7,8 @@ pub mod python;
 pub mod target;
 
 use std::ffi::OsStr;
-use std::process::{Command, Stdio};
+use std::io;
+use std::process::{Command, ExitCode, Stdio};
 
 pub use needs::{Need, missing};
 pub use packages::{Missing, Package, apt_names, check, describe, is_installed, runs};
@@ -16,4 +17,24 @@ pub use packages::{Missing, Package, apt_names, check, describe, is_installed, r
 pub fn output(program: impl AsRef<OsStr>, args: &[&str]) -> Option<String> {
     let output = Command::new(program).args(args).stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
+}
+
+/// Goes on as another program, so that a signal to this process reaches that one.
+///
+/// # Errors
+/// The program cannot be started.
+#[cfg(unix)]
+pub fn become_program(command: &mut Command) -> io::Result<ExitCode> {
+    use std::os::unix::process::CommandExt as _;
+    Err(command.exec())
+}
+
+/// Without `exec` the program is a child; its exit status becomes ours.
+///
+/// # Errors
+/// The program cannot be started.
+#[cfg(not(unix))]
+pub fn become_program(command: &mut Command) -> io::Result<ExitCode> {
+    let code = command.status()?.code().and_then(|code| u8::try_from(code).ok());
+    Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
 }

@@ -18,7 +18,10 @@ fn main() -> ExitCode {
         Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the crate lies in the workspace");
     xtask.args(["run", "--quiet", "--profile", "sim", "--package", "xtask", "--manifest-path"]);
     xtask.arg(root.join("Cargo.toml")).arg("--").args(arguments);
-    become_xtask(xtask)
+    start::become_program(&mut xtask).unwrap_or_else(|error| {
+        eprintln!("error: cannot start cargo: {error}");
+        ExitCode::from(2)
+    })
 }
 
 /// What is sure to be needed. What depends on flags, or on what xtask alone can find out, xtask asks.
@@ -32,27 +35,6 @@ fn needs_of(words: &[&str]) -> &'static [Need] {
         Some(&"images") => needs::IMAGES,
         Some(&"pictures") => needs::PICTURES,
         _ => &[],
-    }
-}
-
-/// A signal to this process then reaches xtask, and what xtask becomes.
-#[cfg(unix)]
-fn become_xtask(mut xtask: Command) -> ExitCode {
-    use std::os::unix::process::CommandExt as _;
-    eprintln!("error: cannot start cargo: {}", xtask.exec());
-    ExitCode::from(2)
-}
-
-#[cfg(not(unix))]
-fn become_xtask(mut xtask: Command) -> ExitCode {
-    match xtask.status() {
-        Ok(status) => {
-            status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from)
-        }
-        Err(error) => {
-            eprintln!("error: cannot start cargo: {error}");
-            ExitCode::from(2)
-        }
     }
 }
 
