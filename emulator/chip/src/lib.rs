@@ -58,7 +58,7 @@ pub use board::{Board, SsiFormat};
 pub use clocks::Clocks;
 pub use flash::Flash;
 pub use loss::Loss;
-pub use peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
+pub use peripherals::{BusFault, Effect, FlashAccess, IrqLines, Memory, Peripherals};
 pub use rules::Breach;
 pub use stm32f4::Stm32f4;
 pub use unmodelled::{Direction, Reason, Unmodelled};

@@ -34,6 +34,17 @@ impl IrqLines {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusFault;
 
+/// How the core reads the flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlashAccess {
+    /// Cycles that a read takes longer than one.
+    pub wait_states: u32,
+    /// The cache of code is on.
+    pub caches_code: bool,
+    /// The cache of constants is on.
+    pub caches_constants: bool,
+}
+
 /// What the chip wants done outside of itself, in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Effect {
@@ -80,6 +91,16 @@ pub trait Peripherals {
     /// A store by the core into the flash array: programming, when the controller allows it. `old` is what the
     /// array holds at `address`, as many bytes as are written.
     fn program(&mut self, address: u32, old: &[u8], new: &[u8], now: Time) -> Result<(), BusFault>;
+
+    /// HCLK divided by the clock of the APB bus on which this address lies; `None` for one on an AHB bus.
+    fn apb_divider(&self, _address: u32) -> Option<u32> {
+        None
+    }
+
+    /// How the core reads the flash now.
+    fn flash_access(&self) -> FlashAccess {
+        FlashAccess { wait_states: 0, caches_code: true, caches_constants: true }
+    }
 
     /// The next instant at which something happens without the core.
     fn deadline(&self) -> Time;

@@ -6,7 +6,7 @@ use crate::can::Lines;
 use crate::iwdg::Iwdg;
 use crate::loss::Loss;
 use crate::map::{ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS};
-use crate::peripherals::{BusFault, Effect, IrqLines, Memory, Peripherals};
+use crate::peripherals::{BusFault, Effect, FlashAccess, IrqLines, Memory, Peripherals};
 use crate::rcc::Cause;
 use crate::rules::Breach;
 use crate::spi::Far;
@@ -37,6 +37,18 @@ impl Peripherals for Stm32f4 {
         self.flash.program(address, old, new, now, &mut self.effects)?;
         self.settle(now);
         Ok(())
+    }
+
+    fn apb_divider(&self, address: u32) -> Option<u32> {
+        match address >> 16 {
+            0x4000 => Some(self.clocks.apb1_divider),
+            0x4001 => Some(self.clocks.apb2_divider),
+            _ => None,
+        }
+    }
+
+    fn flash_access(&self) -> FlashAccess {
+        self.flash.access()
     }
 
     fn deadline(&self) -> Time {

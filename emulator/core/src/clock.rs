@@ -105,7 +105,8 @@ pub(crate) fn pass<P: Peripherals>(library: Library, core: &mut Core<P>, address
     }
     core.place = address;
     core.profile.visit(address, size);
-    core.spend(cost.instructions.into(), cost.cycles.into());
+    let fetch = core.fetch_cycles(address, size);
+    core.spend(cost.instructions.into(), fetch + u32::from(cost.cycles));
     true
 }
 

@@ -4,7 +4,6 @@ use chip::Peripherals;
 use unicorn_engine::RegisterARM;
 
 use crate::clock;
-use crate::cost;
 use crate::engine;
 use crate::exception::Exception;
 use crate::fault::Fault;
@@ -70,12 +69,13 @@ impl<P: Peripherals + 'static> Machine<P> {
     pub(crate) fn enter(&mut self, exception: Exception) {
         let pc = self.pc();
         let (frame, exc_return) = self.push_frame(pc);
+        let entry = self.cpu.get_data().estimate().entry(exc_return & NO_FLOATS == 0);
         let pended = self.cpu.get_data().pended[usize::from(exception.0)];
         let taken = match frame {
             Ok(()) => exception,
             Err(fault) => self.derived(fault, exception),
         };
-        self.vector(taken, exc_return, cost::ENTRY);
+        self.vector(taken, exc_return, entry);
         let core = self.cpu.get_data_mut();
         let latency = core.now.since(pended);
         core.stats.entered(taken, latency, core.now, pc);
@@ -87,7 +87,9 @@ impl<P: Peripherals + 'static> Machine<P> {
         core.nvic.activate(exception);
         core.spend(0, cycles);
         let base = if core.scb.vtor == 0 { self.model().flash.start } else { self.cpu.get_data().scb.vtor };
-        let handler = self.word(base + 4 * u32::from(exception.0));
+        let vector = base + 4 * u32::from(exception.0);
+        self.cpu.get_data_mut().wait_for_vector(vector);
+        let handler = self.word(vector);
         // Also back to the main stack: Handler mode knows no other.
         self.set_xpsr(u32::from(exception.0) | THUMB);
         let control = self.register(RegisterARM::CONTROL);
@@ -95,6 +97,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.rebuild_flags(0);
         self.clear_monitor();
         self.set(RegisterARM::LR, exc_return);
+        self.cpu.get_data_mut().ahead = handler.unwrap_or(0) & !1;
         match handler {
             Some(handler) => self.set(RegisterARM::PC, handler & !1),
             None => self.lock_up(base),
@@ -153,7 +156,10 @@ impl<P: Peripherals + 'static> Machine<P> {
             return self.chain(next, exc_return);
         }
         self.pop_frame(exc_return);
-        self.cpu.get_data_mut().spend(0, cost::EXIT);
+        let ahead = self.pc();
+        let core = self.cpu.get_data_mut();
+        core.ahead = ahead;
+        core.spend(0, core.estimate().exit(exc_return & NO_FLOATS == 0));
     }
 
     /// The checks of an exception return (ARMv7-M, B1.5.8): the exception is active, the value is one of six, and it leads to
@@ -176,7 +182,8 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     fn chain(&mut self, exception: Exception, exc_return: u32) {
         let pended = self.cpu.get_data().pended[usize::from(exception.0)];
-        self.vector(exception, exc_return, cost::TAIL_CHAIN);
+        let change = self.cpu.get_data().estimate().tail_chain();
+        self.vector(exception, exc_return, change);
         let core = self.cpu.get_data_mut();
         let latency = core.now.since(pended);
         core.stats.tail_chained += 1;

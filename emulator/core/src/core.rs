@@ -6,7 +6,10 @@ use std::collections::VecDeque;
 use canbus::Time;
 use chip::{Breach, Effect, Peripherals};
 
+use crate::accelerator::Accelerator;
 use crate::cost::Costs;
+use crate::estimate::Estimate;
+use crate::engine::RAM;
 use crate::exception::Exception;
 use crate::mechanism::Mechanism;
 use crate::memory::Memory as Bytes;
@@ -83,6 +86,10 @@ pub(crate) struct Core<P> {
     /// When an exception became pending, for its latency.
     pub(crate) pended: [Time; Exception::COUNT],
     pub(crate) costs: Costs,
+    /// The caches of the flash, where their misses are counted.
+    pub(crate) accelerator: Option<Accelerator>,
+    /// Where the program goes on if it does not jump.
+    pub(crate) ahead: u32,
     pub(crate) reset_requested: bool,
     /// The program has begun an exclusive access since the monitor was cleared.
     pub(crate) exclusive: bool,
@@ -108,6 +115,7 @@ pub(crate) struct CoreMoment<P> {
     pended: [Time; Exception::COUNT],
     flags: [bool; 2],
     cyccnt: Option<Cyccnt>,
+    ahead: u32,
 }
 
 /// DWT_CYCCNT: its value at some instant, and it runs from there.
@@ -142,7 +150,9 @@ impl<P: Peripherals> Core<P> {
             place: 0,
             effects: VecDeque::new(),
             pended: [Time::ZERO; Exception::COUNT],
-            costs: Costs::default(),
+            costs: Costs::new(Estimate::Modelled),
+            accelerator: None,
+            ahead: 0,
             reset_requested: false,
             exclusive: false,
             clearing_monitor: false,
@@ -169,6 +179,7 @@ impl<P: Peripherals> Core<P> {
             pended: self.pended,
             flags: [self.reset_requested, self.exclusive],
             cyccnt: self.cyccnt,
+            ahead: self.ahead,
         }
     }
 
@@ -187,6 +198,7 @@ impl<P: Peripherals> Core<P> {
         self.pended = moment.pended;
         [self.reset_requested, self.exclusive] = moment.flags;
         self.cyccnt = moment.cyccnt;
+        self.ahead = moment.ahead;
         self.halt = None;
         self.unmapped = None;
     }
@@ -202,6 +214,17 @@ impl<P: Peripherals> Core<P> {
         self.reset_requested = false;
         self.cyccnt = None;
         self.cycle = Time::of_cycle(16_000_000);
+        self.accelerator.iter_mut().for_each(Accelerator::clear);
+    }
+
+    /// Which end of the published ranges cycles are counted by, from now on.
+    pub(crate) fn set_estimate(&mut self, estimate: Estimate) {
+        self.costs = Costs::new(estimate);
+        self.accelerator = (estimate == Estimate::Worst).then(Accelerator::new);
+    }
+
+    pub(crate) fn estimate(&self) -> Estimate {
+        self.costs.estimate
     }
 
     /// The exception to take now, if one may preempt.
@@ -296,6 +319,41 @@ impl<P: Peripherals> Core<P> {
     pub(crate) fn spend(&mut self, instructions: u32, cycles: u32) {
         self.now += Time(self.cycle.0 * u64::from(cycles));
         self.stats.ran(instructions, cycles);
+    }
+
+    /// Code at these addresses is about to run: what fills the pipeline if the program has jumped there, and waits for the flash.
+    #[inline]
+    pub(crate) fn fetch_cycles(&mut self, address: u32, size: u32) -> u32 {
+        let in_a_row = std::mem::replace(&mut self.ahead, address + size) == address;
+        let refill = if in_a_row { 0 } else { self.estimate().refill() };
+        match &mut self.accelerator {
+            Some(accelerator) if address < RAM => {
+                refill + accelerator.fetch(address, size, in_a_row, self.chip.flash_access())
+            }
+            _ => refill,
+        }
+    }
+
+    /// A constant is read from flash.
+    pub(crate) fn wait_for_constant(&mut self, address: u32) {
+        if let Some(accelerator) = &mut self.accelerator {
+            let cycles = accelerator.load(address, self.chip.flash_access());
+            self.spend(0, cycles);
+        }
+    }
+
+    /// An entry of the vector table is read, as code is.
+    pub(crate) fn wait_for_vector(&mut self, address: u32) {
+        if let Some(accelerator) = self.accelerator.as_mut().filter(|_| address < RAM) {
+            let cycles = accelerator.fetch(address, 4, false, self.chip.flash_access());
+            self.spend(0, cycles);
+        }
+    }
+
+    /// A register of the chip is accessed.
+    pub(crate) fn wait_for_bus(&mut self, address: u32, load: bool) {
+        let cycles = self.estimate().peripheral(self.chip.apb_divider(address), load);
+        self.spend(0, cycles);
     }
 
     /// HCLK is now `hertz`; the cycle counter goes on from where it is.

@@ -102,6 +102,17 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     }
 }
 
+/// Has constants that are read from flash waited for.
+pub(crate) fn watch_constants<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Result<(), Error> {
+    let (first, last) = (model.flash.start.into(), u64::from(model.flash.end) - 1);
+    cpu.add_mem_hook(HookType::MEM_READ, first, last, |cpu, _, address, _, _| {
+        close_it_block(cpu);
+        cpu.get_data_mut().wait_for_constant(address as u32);
+        true
+    })?;
+    Ok(cpu.ctl_flush_tb()?)
+}
+
 /// Has every instruction looked at by the [`crate::watch::Watch`].
 pub(crate) fn watch<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<UcHookId, Error> {
     let hook = cpu.add_code_hook(1, 0, on_watched)?;
@@ -213,6 +224,7 @@ fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: 
     let read = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize| {
         let core = cpu.get_data_mut();
         let address = base + offset as u32;
+        core.wait_for_bus(address, true);
         let value = core.chip.read(address, size as u8, core.now);
         finish_load(core, address, value.is_ok());
         u64::from(value.unwrap_or(0))
@@ -221,6 +233,7 @@ fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: 
         let core = cpu.get_data_mut();
         let address = base + offset as u32;
         let Some(value) = core.bugs.stored(address, size, value as u32) else { return };
+        core.wait_for_bus(address, false);
         let result = core.chip.write(address, size as u8, value, core.now);
         finish(core, address, result.ok());
     };
@@ -234,6 +247,7 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
     let read = move |cpu: &mut Unicorn<Core<P>>, offset: u64, _: usize| {
         let (address, bit) = target(offset);
         let core = cpu.get_data_mut();
+        core.wait_for_bus(address, true);
         let value = core.chip.read(address, 4, core.now);
         finish_load(core, address, value.is_ok());
         u64::from(value.unwrap_or(0) >> bit & 1)
@@ -241,6 +255,7 @@ fn map_bit_band<P: Peripherals + 'static>(cpu: &mut Cpu<P>, alias: u32, base: u3
     let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, _: usize, value: u64| {
         let (address, bit) = target(offset);
         let core = cpu.get_data_mut();
+        core.wait_for_bus(address, true);
         let old = core.chip.read(address, 4, core.now);
         let new = old.map(|old| old & !(1 << bit) | (value as u32 & 1) << bit);
         let Some(new) = new.map(|new| core.bugs.stored(address, 4, new)).transpose() else { return };
@@ -315,7 +330,7 @@ fn on_page<P>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType) -> Option<Tl
     Some(TlbEntry { paddr: page, perms })
 }
 
-/// Before it asks for a page the library puts the IT state of the access into the CPU, where the code that is translated does
+/// Before it asks for a page or calls a hook the library puts the IT state of the access into the CPU, where the code that is translated does
 /// not expect it: the next block would begin with it and skip instructions. What goes on after the access, or faults at it, has
 /// its IT state elsewhere.
 fn close_it_block<P>(cpu: &mut Unicorn<Core<P>>) {

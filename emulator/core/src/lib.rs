@@ -14,7 +14,8 @@
 //! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
 //! | `stepping`, `alignment` | the mode in which interrupts come between any two instructions; what only that mode notices |
 //! | `watch` | stopping before an instruction, skipping it, flipping a bit of a register, going back |
-//! | `cost`, `stats`, `profile` | cycles of a block; what was counted, and where |
+//! | `cost`, `floats`, `estimate`, `accelerator` | cycles: of a block, of the floating-point unit, their range, of the flash |
+//! | `stats`, `profile` | what was counted, and where |
 //! | `loader` | ELF files |
 //!
 //! # Simplifications
@@ -31,14 +32,17 @@
 //! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and a division by zero that is trapped (CCR.DIV_0_TRP), fault after
 //!   [`Machine::interleave`] only, and not in an IT block; CCR.UNALIGN_TRP is not modelled and reported as a [`chip::Breach`].
 
+mod accelerator;
 mod alignment;
 mod clock;
 mod context;
 mod core;
 mod cost;
 mod engine;
+mod estimate;
 mod exception;
 mod fault;
+mod floats;
 mod incident;
 mod loader;
 mod machine;
@@ -56,6 +60,7 @@ mod stepping;
 mod systick;
 mod watch;
 
+pub use estimate::{Estimate, NoEstimate};
 pub use exception::Exception;
 pub use fault::Fault;
 pub use incident::Incident;

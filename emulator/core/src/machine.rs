@@ -8,6 +8,7 @@ use crate::clock;
 use crate::context::THUMB;
 use crate::core::{Core, Halt};
 use crate::engine::{self, Cpu, NOWHERE};
+use crate::estimate::Estimate;
 use crate::exception::Exception;
 use crate::fault::Fault;
 use crate::incident::Incident;
@@ -199,6 +200,19 @@ impl<P: Peripherals + 'static> Machine<P> {
     pub fn interleave(&mut self, seed: Option<u64>) -> Result<(), Error> {
         let fresh = self.cpu.get_data_mut().stepping.replace(Stepping::new(seed)).is_none();
         if fresh { engine::step_instructions(&mut self.cpu) } else { Ok(()) }
+    }
+
+    /// Counts cycles by one end of what is published from now on. [`Estimate::Worst`] also follows the caches of the flash, and is some
+    /// times slower.
+    ///
+    /// # Errors
+    /// When the CPU library refuses.
+    pub fn set_estimate(&mut self, estimate: Estimate) -> Result<(), Error> {
+        let core = self.cpu.get_data_mut();
+        let watches = core.accelerator.is_some();
+        core.set_estimate(estimate);
+        let begins = core.accelerator.is_some() && !watches;
+        if begins { engine::watch_constants(&mut self.cpu, &self.model) } else { Ok(()) }
     }
 
     /// Pends an exception before the next time that the instruction at this address runs. Does nothing unless

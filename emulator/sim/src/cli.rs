@@ -7,6 +7,7 @@ use std::str::FromStr;
 use canbus::Time;
 use chip::Variant;
 use clap::{Parser, ValueEnum};
+use emulator::Estimate;
 use storage::DeviceRecord;
 
 use crate::oscillator::Oscillator;
@@ -72,6 +73,11 @@ pub struct Options {
     /// possible courses. Several times slower.
     #[arg(long, value_name = "SEED")]
     pub interleave: Option<u64>,
+
+    /// Count the cycles of the cores by this end of what is published: best, modelled or worst. At worst the flash is waited for
+    /// whenever its caches do not have what is asked for. Silicon lies between best and worst.
+    #[arg(long, value_name = "ESTIMATE", default_value = "modelled")]
+    pub cycles: Estimate,
 
     /// Write every frame to this file in the format of candump -l.
     #[arg(long, value_name = "FILE")]
@@ -259,7 +265,7 @@ mod tests {
     fn every_flag_of_the_manual() {
         let flags = "--node 1:pressure@auto --node 201:pressure --socketcand localhost:0 --slcan 127.0.0.1:0 --bitrate 1000 \
              --speed max --for 2.5 --flash d --candump f --log debug --pressure const:250000 --temperature 1=const:298.15 --thermistor const:310 \
-             --reflash --interleave 7 --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --load 50 --json --socketcan vcan0 --no-page --control 127.0.0.1:0";
+             --reflash --interleave 7 --cycles worst --shaft 2=rpm:6000 --button 1=2:down --fault open-sensor@2.5 --oscillator 1=-50 --load 50 --json --socketcan vcan0 --no-page --control 127.0.0.1:0";
         let options = read(flags).unwrap();
         assert_eq!(options.nodes.len(), 2);
         assert_eq!(options.duration, Some(Time::from_millis(2500)));

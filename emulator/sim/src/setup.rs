@@ -31,9 +31,12 @@ pub fn world(options: &Options) -> Result<World> {
     let boards = options.nodes.iter().map(|node| board(node, options, &images));
     let boards = boards.collect::<Result<Vec<Board>>>()?;
     let mut world = World::new(boards, options.bitrate, options.load);
+    let boards = 0..options.nodes.len();
+    boards.clone().try_for_each(|board| world.machine(board).set_estimate(options.cycles))?;
     if let Some(seed) = options.interleave {
         // Boards differ, or all of them would meet their interrupts at the same places.
-        (0..options.nodes.len())
+        boards
+            .into_iter()
             .try_for_each(|board| world.machine(board).interleave(Some(seed + board as u64)))?;
     }
     for oscillator in &options.oscillator {

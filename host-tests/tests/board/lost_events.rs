@@ -313,6 +313,14 @@ fn a_flash_that_hangs_refuses_a_save_and_takes_the_next() {
     assert_silent(&mut world);
 }
 
+/// Lets the sampling task begin once more.
+fn to_the_next_sample(world: &mut World) {
+    let before = world.machine(0).stats().of(SAMPLING_TASK).entries;
+    while world.machine(0).stats().of(SAMPLING_TASK).entries == before {
+        world.run_until(world.now() + Time::from_micros(10));
+    }
+}
+
 /// One of the two streams of the absolute encoder stops in the middle of a word; without the one that receives, the SPI has an
 /// overrun.
 #[test]
@@ -320,10 +328,7 @@ fn a_stream_of_the_absolute_encoder_that_stops_is_started_again() {
     let (mut world, master) = turning(true);
     for (number, stream) in (1..).zip([DMA1_S3CR, DMA1_S4CR, DMA1_S3CR, DMA1_S4CR]) {
         // Some way into a word, which lasts 57 us.
-        let before = world.machine(0).stats().of(SAMPLING_TASK).entries;
-        while world.machine(0).stats().of(SAMPLING_TASK).entries == before {
-            world.run_until(world.now() + Time::from_micros(10));
-        }
+        to_the_next_sample(&mut world);
         world.run_until(world.now() + Time::from_micros(20));
         poke(&mut world, stream, 0);
         assert_eq!(counted(&mut world, &master, SSI_WORDS), number);
@@ -338,6 +343,8 @@ fn a_stream_of_the_absolute_encoder_that_stops_is_started_again() {
 fn milliseconds_that_nobody_collects_are_counted() {
     const INTERRUPTS: u32 = 0x18;
     let (mut world, master) = turning(false);
+    to_the_next_sample(&mut world);
+    world.run_until(world.now() + Time::from_micros(500));
     let control = peek(&mut world, DMA2_S0CR);
     poke(&mut world, DMA2_S0CR, control & !INTERRUPTS);
     world.run_until(world.now() + Time::from_micros(1900));

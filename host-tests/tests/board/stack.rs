@@ -1,6 +1,7 @@
 //! How deep the stack got where the images do most, beside the bound that follows from their code.
 
 use callgraph::stack_bound;
+use emulator::Estimate;
 use sim::world::World;
 
 use crate::support::images;
@@ -18,5 +19,5 @@ pub(crate) fn assert_bound(world: &World, ran: &[&str]) {
 
 #[test]
 fn the_tasks_stay_within_the_bound_of_their_stack() {
-    assert_bound(&busy_run(), &["bootloader", "firmware"]);
+    assert_bound(&busy_run(Estimate::Modelled), &["bootloader", "firmware"]);
 }

@@ -17,7 +17,7 @@ use canbus::Time;
 use lock::{CONTROL_KEYS, Lock, OPTION_KEYS};
 use program::Store;
 
-use crate::peripherals::{BusFault, Effect};
+use crate::peripherals::{BusFault, Effect, FlashAccess};
 use crate::register::{bit, field, flag};
 use crate::variant::Variant;
 
@@ -120,6 +120,12 @@ impl Flash {
     /// Keeps BSY up until this instant, though the array can be read: a controller that hangs.
     pub fn hang(&mut self, until: Time) {
         self.stuck_until = until;
+    }
+
+    /// How the core reads the array (RM0390, 3.8.1).
+    pub(crate) fn access(&self) -> FlashAccess {
+        let is_on = |bit: u32| self.acr & 1 << bit != 0;
+        FlashAccess { wait_states: self.wait_states(), caches_code: is_on(9), caches_constants: is_on(10) }
     }
 
     /// FLASH_ACR.LATENCY.

@@ -1,0 +1,113 @@
+//! The caches between flash and core (RM0390, 3.4.2): 64 lines of 128 bits for code and 8 for constants, each of which makes room
+//! for a new line by the one that was not used for the longest time.
+
+use chip::FlashAccess;
+
+/// Bytes of a line.
+const LINE: u32 = 16;
+
+/// Both caches.
+#[derive(Clone, Debug)]
+pub(crate) struct Accelerator {
+    code: Lines,
+    constants: Lines,
+}
+
+/// The numbers of the lines of a cache, the newest last.
+#[derive(Clone, Debug)]
+struct Lines {
+    held: Vec<u32>,
+    room: usize,
+}
+
+impl Accelerator {
+    pub(crate) fn new() -> Accelerator {
+        Accelerator { code: Lines::new(64), constants: Lines::new(8) }
+    }
+
+    /// After a reset.
+    pub(crate) fn clear(&mut self) {
+        *self = Accelerator::new();
+    }
+
+    /// The cycles that code at these addresses is waited for, as if the core did nothing meanwhile. After a jump a line that nobody
+    /// asked for may have to be read to its end first.
+    pub(crate) fn fetch(&mut self, address: u32, size: u32, in_a_row: bool, flash: FlashAccess) -> u32 {
+        let (first, last) = (address / LINE, (address + size.max(1) - 1) / LINE);
+        (first..=last)
+            .filter(|&line| !self.code.touch(line) || !flash.caches_code)
+            .map(|line| if line == first && !in_a_row { after_another(flash) } else { read(flash) })
+            .sum()
+    }
+
+    /// The cycles that a constant is waited for: a line of code may be read to its end first.
+    pub(crate) fn load(&mut self, address: u32, flash: FlashAccess) -> u32 {
+        let hit = self.constants.touch(address / LINE) && flash.caches_constants;
+        if hit { 0 } else { after_another(flash) }
+    }
+}
+
+/// The cycles of reading a line.
+fn read(flash: FlashAccess) -> u32 {
+    flash.wait_states + 1
+}
+
+/// The same after the end of a read that has begun.
+fn after_another(flash: FlashAccess) -> u32 {
+    flash.wait_states + read(flash)
+}
+
+impl Lines {
+    fn new(room: usize) -> Lines {
+        Lines { held: Vec::with_capacity(room), room }
+    }
+
+    /// Whether the line was there; now it is.
+    fn touch(&mut self, line: u32) -> bool {
+        let place = self.held.iter().rposition(|&held| held == line);
+        match place {
+            Some(place) => drop(self.held.remove(place)),
+            None if self.held.len() == self.room => drop(self.held.remove(0)),
+            None => {}
+        }
+        self.held.push(line);
+        place.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLASH: FlashAccess = FlashAccess { wait_states: 4, caches_code: true, caches_constants: true };
+
+    #[test]
+    fn a_loop_that_fits_waits_once_and_one_that_does_not_always() {
+        for (bytes, waits_again) in [(1024, 0), (1040, 65 * 5)] {
+            let mut accelerator = Accelerator::new();
+            let mut run =
+                || (0..bytes / LINE).map(|line| accelerator.fetch(line * LINE, LINE, true, FLASH)).sum::<u32>();
+            assert_eq!(run(), bytes / LINE * 5);
+            assert_eq!(run(), waits_again, "{bytes}");
+        }
+    }
+
+    #[test]
+    fn a_jump_waits_for_what_is_being_read() {
+        let mut accelerator = Accelerator::new();
+        assert_eq!(accelerator.fetch(0x100, 20, false, FLASH), 9 + 5);
+        assert_eq!(accelerator.fetch(0x100, 20, false, FLASH), 0);
+        let off = FlashAccess { caches_code: false, ..FLASH };
+        assert_eq!(accelerator.fetch(0x100, 20, false, off), 9 + 5);
+    }
+
+    #[test]
+    fn constants_have_eight_lines_of_their_own() {
+        let mut accelerator = Accelerator::new();
+        accelerator.fetch(0x100, 4, true, FLASH);
+        assert_eq!(accelerator.load(0x100, FLASH), 9);
+        assert_eq!(accelerator.load(0x10C, FLASH), 0);
+        assert_eq!((1..=8).map(|line| accelerator.load(0x100 + line * LINE, FLASH)).sum::<u32>(), 8 * 9);
+        assert_eq!(accelerator.load(0x100, FLASH), 9);
+    }
+}
