@@ -1,19 +1,71 @@
 //! Instructions that fault on silicon where the CPU library carries them out: multiple and double loads and stores, exclusive
-//! and floating-point ones at an unaligned address, and a division by zero while that is trapped (ARMv7-M, A3.2.1 and B3.2.8).
+//! and floating-point ones at an unaligned address; and, while that is trapped, any access to an unaligned word or halfword, and a
+//! division by zero (ARMv7-M, A3.2.1 and B3.2.8).
 
-use crate::scb::cfsr;
+use crate::scb::{DIV_0_TRP, UNALIGN_TRP, cfsr};
 
 /// The status bits of the fault that an instruction raises, if any. `register` reads a core register by its number.
-pub(crate) fn fault(code: &[u8], traps_division: bool, register: impl Fn(u16) -> u32) -> Option<u32> {
+pub(crate) fn fault(code: &[u8], ccr: u32, register: impl Fn(u16) -> u32) -> Option<u32> {
     let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
     let (first, second) = (halves.next()?, halves.next().unwrap_or(0));
     if first & 0xFFD0 == 0xFB90 {
-        let by_zero = traps_division && register(second & 0xF) == 0;
+        let by_zero = ccr & DIV_0_TRP != 0 && register(second & 0xF) == 0;
         return by_zero.then_some(cfsr::DIVBYZERO);
     }
-    let (base, mask) = aligned_base(first, second)?;
-    // PC as a base is aligned by the architecture.
-    (base != 15 && register(base) & mask != 0).then_some(cfsr::UNALIGNED)
+    let is_unaligned = match aligned_base(first, second) {
+        // PC as a base is aligned by the architecture.
+        Some((base, mask)) => base != 15 && register(base) & mask != 0,
+        None if ccr & UNALIGN_TRP != 0 => {
+            single(first, second, register).is_some_and(|(address, mask)| address & mask != 0)
+        }
+        None => false,
+    };
+    is_unaligned.then_some(cfsr::UNALIGNED)
+}
+
+/// The address of a load or store of one word or halfword, and the bits of the address that are zero where it is aligned.
+fn single(first: u16, second: u16, register: impl Fn(u16) -> u32) -> Option<(u32, u32)> {
+    const WORD: u32 = 3;
+    const HALFWORD: u32 = 1;
+    let from = |base: u16, offset: u32| register(base).wrapping_add(offset);
+    let (base, immediate) = (first >> 3 & 7, u32::from(first >> 6 & 31));
+    match first {
+        0x5000..=0x5FFF => {
+            let mask = match first >> 9 & 7 {
+                0 | 4 => WORD,
+                1 | 5 | 7 => HALFWORD,
+                _ => return None,
+            };
+            Some((from(base, register(first >> 6 & 7)), mask))
+        }
+        0x6000..=0x6FFF => Some((from(base, immediate * 4), WORD)),
+        0x8000..=0x8FFF => Some((from(base, immediate * 2), HALFWORD)),
+        0x9000..=0x9FFF => Some((from(13, u32::from(first & 0xFF) * 4), WORD)),
+        // From PC a literal is loaded, which the assembler aligns.
+        0xF800..=0xF9FF if first & 0xF != 15 => {
+            let mask = match first >> 5 & 3 {
+                1 => HALFWORD,
+                2 => WORD,
+                _ => return None,
+            };
+            Some((from(first & 0xF, offset(first, second, &register)), mask))
+        }
+        _ => None,
+    }
+}
+
+/// The offset of a load or store of 32 bits (ARMv7-M, A5.3.7 to A5.3.10), which may be negative.
+fn offset(first: u16, second: u16, register: &impl Fn(u16) -> u32) -> u32 {
+    let (is_long, is_immediate) = (first & 1 << 7 != 0, second & 1 << 11 != 0);
+    let (before, up) = (second & 1 << 10 != 0, second & 1 << 9 != 0);
+    let byte = u32::from(second & 0xFF);
+    match (is_long, is_immediate) {
+        (true, _) => u32::from(second & 0xFFF),
+        (false, false) => register(second & 0xF) << (second >> 4 & 3),
+        (false, true) if !before => 0,
+        (false, true) if up => byte,
+        (false, true) => byte.wrapping_neg(),
+    }
 }
 
 /// The base register of an access that must be aligned, and the bits of it that must be zero: offsets are multiples of four.
@@ -40,10 +92,39 @@ mod tests {
     use super::*;
 
     /// What an instruction does when every register holds this.
-    fn with(value: u32, op: u32) -> Option<u32> {
+    fn with_traps(ccr: u32, value: u32, op: u32) -> Option<u32> {
         let halves = if op > 0xFFFF { vec![op >> 16, op & 0xFFFF] } else { vec![op] };
         let code: Vec<u8> = halves.iter().flat_map(|&half| (half as u16).to_le_bytes()).collect();
-        fault(&code, true, |_| value)
+        fault(&code, DIV_0_TRP | ccr, |_| value)
+    }
+
+    fn with(value: u32, op: u32) -> Option<u32> {
+        with_traps(0, value, op)
+    }
+
+    #[test]
+    fn any_access_while_that_is_trapped() {
+        for (op, aligned, unaligned, name) in [
+            (0x6801, 4, 6, "ldr r1, [r0]"),
+            (0x6041, 4, 1, "str r1, [r0, #4]"),
+            (0x5888, 2, 3, "ldr r0, [r1, r2]"),
+            (0x8801, 2, 1, "ldrh r1, [r0]"),
+            (0x8041, 6, 3, "strh r1, [r0, #2]"),
+            (0x9801, 4, 2, "ldr r0, [sp, #4]"),
+            (0xF8D0_1002, 2, 4, "ldr.w r1, [r0, #2]"),
+            (0xF850_1C02, 2, 4, "ldr.w r1, [r0, #-2]"),
+            (0xF850_1B02, 4, 2, "ldr.w r1, [r0], #2"),
+            (0xF850_1F02, 2, 4, "ldr.w r1, [r0, #2]!"),
+            (0xF8A0_1001, 1, 2, "strh.w r1, [r0, #1]"),
+            (0xF850_1022, 4, 3, "ldr.w r1, [r0, r2, lsl #2]"),
+        ] {
+            assert_eq!(with_traps(UNALIGN_TRP, aligned, op), None, "{name}");
+            assert_eq!(with_traps(UNALIGN_TRP, unaligned, op), Some(cfsr::UNALIGNED), "{name}");
+            assert_eq!(with(unaligned, op), None, "{name}");
+        }
+        for (op, name) in [(0x7801, "ldrb r1, [r0]"), (0xF890_1001, "ldrb.w r1, [r0, #1]"), (0x1C40, "adds")] {
+            assert_eq!(with_traps(UNALIGN_TRP, 3, op), None, "{name}");
+        }
     }
 
     #[test]

@@ -6,12 +6,12 @@
 use std::ffi::c_void;
 
 use chip::Peripherals;
-use unicorn_engine::hook::sys::{uc_emu_stop, uc_hook_add, uc_reg_read};
+use unicorn_engine::hook::sys::{uc_emu_stop, uc_hook_add, uc_reg_read, uc_reg_write};
 use unicorn_engine::hook::uc_engine;
 use unicorn_engine::{HookType, RegisterARM, Unicorn, uc_error};
 
 use crate::core::{Core, Halt};
-use crate::cost::{Cost, EXCLUSIVE, FLOATS};
+use crate::cost::{BASEPRI, Cost, EXCLUSIVE, FLOATS};
 use crate::engine::{Cpu, HIDDEN, RAM};
 use crate::mechanism::Mechanism;
 use crate::nvic::Masks;
@@ -39,6 +39,21 @@ impl Library {
         unsafe { uc_reg_read(self.0, register as i32, (&raw mut value).cast()) };
         value
     }
+
+    fn set_register(self, register: RegisterARM, value: u64) {
+        // SAFETY: as in `register`.
+        unsafe { uc_reg_write(self.0, register as i32, (&raw const value).cast()) };
+    }
+}
+
+/// The priority bits that the chip has.
+const PRIORITY: u64 = 0xF0;
+
+/// Takes what the program has written out of BASEPRI where the chip has no bits for it; the library keeps all eight.
+#[cold]
+fn trim_basepri<P: Peripherals>(library: Library, core: &mut Core<P>) {
+    library.set_register(RegisterARM::BASEPRI, library.register(RegisterARM::BASEPRI) & PRIORITY);
+    core.wrote_basepri = false;
 }
 
 /// Has every block of code charged.
@@ -91,6 +106,9 @@ fn guard_hidden<P: Peripherals>(library: Library, core: &mut Core<P>) {
 /// Charges code that is about to run, or stops before it when something is due.
 #[inline]
 pub(crate) fn pass<P: Peripherals>(library: Library, core: &mut Core<P>, address: u32, size: u32) -> bool {
+    if core.wrote_basepri {
+        trim_basepri(library, core);
+    }
     if !core.is_undisturbed() && is_stopped(library, core, address) {
         core.stop_for(core.halt.unwrap_or(Halt::Attention));
         library.stop();
@@ -113,6 +131,7 @@ pub(crate) fn pass<P: Peripherals>(library: Library, core: &mut Core<P>, address
 /// Whether the program may run a block with these uses. That an exclusive access begins is kept.
 fn allows<P>(core: &mut Core<P>, uses: u16) -> bool {
     core.exclusive |= uses & EXCLUSIVE != 0;
+    core.wrote_basepri |= uses & BASEPRI != 0;
     uses & FLOATS == 0 || core.scb.allows_floats()
 }
 

@@ -35,7 +35,8 @@ pub(crate) const THUMB: u32 = 1 << 24;
 const ALIGNED: u32 = 1 << 9;
 const IT: u32 = 0x0600_FC00;
 
-/// CONTROL: Thread mode uses the process stack; floating-point registers are in use.
+/// CONTROL: Thread mode has no privileges; it uses the process stack; floating-point registers are in use.
+const NPRIV: u32 = 1 << 0;
 const SPSEL: u32 = 1 << 1;
 const FPCA: u32 = 1 << 2;
 
@@ -90,10 +91,19 @@ impl<P: Peripherals + 'static> Machine<P> {
         let vector = base + 4 * u32::from(exception.0);
         self.cpu.get_data_mut().wait_for_vector(vector);
         let handler = self.word(vector);
-        // Also back to the main stack: Handler mode knows no other.
-        self.set_xpsr(u32::from(exception.0) | THUMB);
-        let control = self.register(RegisterARM::CONTROL);
-        self.set(RegisterARM::CONTROL, control & !FPCA);
+        // Handler mode knows the main stack only.
+        let before = self.register(RegisterARM::CONTROL);
+        let control = before & !(FPCA | SPSEL);
+        let handler_mode = u32::from(exception.0) | THUMB;
+        if before & SPSEL != 0 {
+            // SPSEL can be changed by privileged Thread mode only, and privileges in Handler mode.
+            self.set_xpsr(handler_mode);
+            self.set(RegisterARM::CONTROL, control & !NPRIV);
+            self.set_xpsr(THUMB);
+            self.set(RegisterARM::CONTROL, control & !NPRIV);
+        }
+        self.set_xpsr(handler_mode);
+        self.set(RegisterARM::CONTROL, control);
         self.rebuild_flags(0);
         self.clear_monitor();
         self.set(RegisterARM::LR, exc_return);
@@ -204,8 +214,11 @@ impl<P: Peripherals + 'static> Machine<P> {
         let xpsr = words[7];
         let padding = if xpsr & ALIGNED != 0 { 4 } else { 0 };
         self.set(bank, top.wrapping_add(4 * count) + padding);
+        // Thread mode without privileges cannot write CONTROL.
+        let control = self.register(RegisterARM::CONTROL);
+        self.set(RegisterARM::CONTROL, control & !NPRIV);
         self.set_xpsr(xpsr & !ALIGNED);
-        self.restore_control(exc_return, floats);
+        self.restore_control(control, exc_return, floats);
         for (register, word) in INTEGER.iter().zip(&words) {
             self.set(*register, *word);
         }
@@ -216,8 +229,8 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.set(RegisterARM::PC, words[6] & !1);
     }
 
-    fn restore_control(&mut self, exc_return: u32, floats: bool) {
-        let mut control = self.register(RegisterARM::CONTROL) & !(FPCA | SPSEL);
+    fn restore_control(&mut self, control: u32, exc_return: u32, floats: bool) {
+        let mut control = control & !(FPCA | SPSEL);
         control |= if floats { FPCA } else { 0 };
         control |= if exc_return & TO_PROCESS != 0 { SPSEL } else { 0 };
         self.set(RegisterARM::CONTROL, control);

@@ -49,6 +49,7 @@ pub(crate) enum Halt {
 pub(crate) struct Unmapped {
     pub(crate) address: u32,
     pub(crate) fetch: bool,
+    pub(crate) store: bool,
 }
 
 /// Everything but the registers and the memory.
@@ -78,6 +79,8 @@ pub(crate) struct Core<P> {
     pub(crate) watch: Option<Watch>,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
+    /// A store that was not waited for has found nothing, at this address: the fault is taken before the next block.
+    pub(crate) lost_store: Option<u32>,
     /// Rules that were found broken: when, and where the program was.
     pub(crate) breaches: VecDeque<(Time, u32, Breach)>,
     /// The code that was charged last.
@@ -91,6 +94,8 @@ pub(crate) struct Core<P> {
     /// Where the program goes on if it does not jump.
     pub(crate) ahead: u32,
     pub(crate) reset_requested: bool,
+    /// The program has written BASEPRI.
+    pub(crate) wrote_basepri: bool,
     /// The program has begun an exclusive access since the monitor was cleared.
     pub(crate) exclusive: bool,
     /// The emulator itself runs code, not the program.
@@ -146,6 +151,7 @@ impl<P: Peripherals> Core<P> {
             watch: None,
             halt: None,
             unmapped: None,
+            lost_store: None,
             breaches: VecDeque::new(),
             place: 0,
             effects: VecDeque::new(),
@@ -154,6 +160,7 @@ impl<P: Peripherals> Core<P> {
             accelerator: None,
             ahead: 0,
             reset_requested: false,
+            wrote_basepri: false,
             exclusive: false,
             clearing_monitor: false,
             without: None,
@@ -201,6 +208,7 @@ impl<P: Peripherals> Core<P> {
         self.ahead = moment.ahead;
         self.halt = None;
         self.unmapped = None;
+        self.lost_store = None;
     }
 
     /// Back to the state after a reset; the clock of virtual time and the counters go on.
@@ -211,6 +219,7 @@ impl<P: Peripherals> Core<P> {
         self.stats.unwound();
         self.halt = None;
         self.unmapped = None;
+        self.lost_store = None;
         self.reset_requested = false;
         self.cyccnt = None;
         self.cycle = Time::of_cycle(16_000_000);
@@ -244,7 +253,10 @@ impl<P: Peripherals> Core<P> {
 
     /// Whether the run loop has something to do before the next block runs.
     pub(crate) fn needs_attention(&self) -> bool {
-        self.now >= self.until.min(self.due) || self.reset_requested || !self.effects.is_empty()
+        self.now >= self.until.min(self.due)
+            || self.reset_requested
+            || !self.effects.is_empty()
+            || self.lost_store.is_some()
     }
 
     /// Whether the next block runs without a further look. Where this says no, that block may run all the same.
@@ -257,6 +269,7 @@ impl<P: Peripherals> Core<P> {
     pub(crate) fn look_again(&mut self) {
         self.bound = self.until.min(self.due);
         self.calm = self.halt.is_none()
+            && self.lost_store.is_none()
             && self.effects.is_empty()
             && !self.reset_requested
             && !self.flash_closed

@@ -10,7 +10,7 @@ use crate::floats;
 pub(crate) struct Cost {
     pub(crate) instructions: u16,
     pub(crate) cycles: u16,
-    /// What else the block does, from [`EXCLUSIVE`] and [`FLOATS`]: most do nothing of the kind.
+    /// What else the block does, from [`EXCLUSIVE`], [`FLOATS`] and [`BASEPRI`]: most do nothing of the kind.
     pub(crate) uses: u16,
 }
 
@@ -18,6 +18,8 @@ pub(crate) struct Cost {
 pub(crate) const EXCLUSIVE: u16 = 1;
 /// The block uses the floating-point unit.
 pub(crate) const FLOATS: u16 = 2;
+/// The block writes BASEPRI.
+pub(crate) const BASEPRI: u16 = 4;
 
 /// The costs of blocks that ran before.
 #[derive(Clone, Debug)]
@@ -102,6 +104,7 @@ fn of_block(code: &[u8], estimate: Estimate, in_ram: bool) -> Cost {
             }
             Some(second) => {
                 cost.uses |= if begins_exclusive(first, second) { EXCLUSIVE } else { 0 };
+                cost.uses |= if writes_basepri(first, second) { BASEPRI } else { 0 };
                 result = None;
                 wide(first, second, estimate)
             }
@@ -118,6 +121,11 @@ fn of_block(code: &[u8], estimate: Estimate, in_ram: bool) -> Cost {
 /// LDREX, LDREXB or LDREXH (ARMv7-M, A5.3.6).
 fn begins_exclusive(first: u16, second: u16) -> bool {
     first & 0xFFF0 == 0xE850 || first & 0xFFF0 == 0xE8D0 && matches!(second >> 4 & 0xF, 0b0100 | 0b0101)
+}
+
+/// MSR to BASEPRI or BASEPRI_MAX (ARMv7-M, B5.2.3).
+fn writes_basepri(first: u16, second: u16) -> bool {
+    first & 0xFFE0 == 0xF380 && matches!(second & 0xFF, 0x11 | 0x12)
 }
 
 /// One load can follow another without a pause between them; a store waits for the one before where that is still in the buffer.
@@ -222,6 +230,19 @@ mod tests {
         ] {
             assert_eq!(cycles(&[op]), cycles_of_it, "{name}");
         }
+    }
+
+    #[test]
+    fn what_a_block_does_besides() {
+        let uses = |op: u32| {
+            let code: Vec<u8> = [op >> 16, op].iter().flat_map(|half| (*half as u16).to_le_bytes()).collect();
+            of_block(&code, Estimate::Modelled, false).uses
+        };
+        assert_eq!(uses(0xF380_8811), BASEPRI, "msr basepri, r0");
+        assert_eq!(uses(0xF380_8812), BASEPRI, "msr basepri_max, r0");
+        assert_eq!(uses(0xF380_8814), 0, "msr control, r0");
+        assert_eq!(uses(0xE850_1F00), EXCLUSIVE, "ldrex r1, [r0]");
+        assert_eq!(uses(0xEE30_0A20), FLOATS, "vadd.f32 s0, s0, s1");
     }
 
     #[test]

@@ -10,7 +10,6 @@ use crate::clock::{self, Library};
 use crate::core::{Core, Halt, Unmapped};
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
-use crate::scb::DIV_0_TRP;
 use crate::{alignment, ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
@@ -88,8 +87,8 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     }
     let mut code = [0; stepping::LONGEST_BLOCK];
     let charged = cpu.get_data().memory.read(place, &mut code).map_or(size, |()| stepping::length(&code));
-    let traps_division = cpu.get_data().scb.ccr & DIV_0_TRP != 0;
-    if let Some(status) = alignment::fault(&code, traps_division, |number| core_register(cpu, number)) {
+    let ccr = cpu.get_data().scb.ccr;
+    if let Some(status) = alignment::fault(&code, ccr, |number| core_register(cpu, number)) {
         let library = Library::of(cpu);
         clock::refuse(library, cpu.get_data_mut(), status);
     } else if clock::pass(Library::of(cpu), cpu.get_data_mut(), place, charged) {
@@ -180,7 +179,8 @@ fn on_invalid<P>(cpu: &mut Unicorn<Core<P>>) -> bool {
 
 fn on_unmapped<P>(cpu: &mut Unicorn<Core<P>>, kind: MemType, address: u64, _: usize, _: i64) -> bool {
     let fetch = matches!(kind, MemType::FETCH_UNMAPPED);
-    cpu.get_data_mut().unmapped = Some(Unmapped { address: address as u32, fetch });
+    let store = matches!(kind, MemType::WRITE_UNMAPPED);
+    cpu.get_data_mut().unmapped = Some(Unmapped { address: address as u32, fetch, store });
     false
 }
 
@@ -202,10 +202,12 @@ fn on_flash_write<P: Peripherals>(
     true
 }
 
-/// After a call into the chip or the system space: effects and interrupts, or a fault when nothing answered.
+/// After a store into the chip or the system space: effects and interrupts, or a fault when nothing answered.
 fn finish<P: Peripherals>(core: &mut Core<P>, address: u32, answer: Option<()>) {
-    if answer.is_none() {
-        core.stop_for(Halt::DataFault(address));
+    match answer {
+        None if core.scb.buffers(address) => core.lost_store = Some(address),
+        None => core.stop_for(Halt::DataFault(address)),
+        Some(()) => {}
     }
     core.settle();
 }
@@ -227,7 +229,7 @@ fn map_peripherals<P: Peripherals + 'static>(cpu: &mut Cpu<P>, base: u32, size: 
         core.wait_for_bus(address, true);
         let value = core.chip.read(address, size as u8, core.now);
         finish_load(core, address, value.is_ok());
-        u64::from(value.unwrap_or(0))
+        u64::from(core.bugs.seen(address, value.unwrap_or(0)))
     };
     let write = move |cpu: &mut Unicorn<Core<P>>, offset: u64, size: usize, value: u64| {
         let core = cpu.get_data_mut();

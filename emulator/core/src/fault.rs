@@ -13,11 +13,11 @@ use crate::scb::{Scb, cfsr};
 /// A fault as it was seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The instruction; for an access to a peripheral the start of its block.
+    /// The instruction; for a load from a peripheral the start of its block, and for a store one behind it.
     pub pc: u32,
     /// The link register.
     pub lr: u32,
-    /// The address of a data access.
+    /// The address of a data access; the program does not learn that of a store.
     pub address: Option<u32>,
     /// Its bits in CFSR.
     pub status: u32,
@@ -32,6 +32,11 @@ impl Fault {
 
     pub(crate) fn data(pc: u32, address: u32) -> Fault {
         Fault { address: Some(address), ..Fault::new(pc, cfsr::PRECISERR) }
+    }
+
+    /// A store that nothing has answered, seen some instructions later.
+    pub(crate) fn lost_store(pc: u32, address: u32) -> Fault {
+        Fault { address: Some(address), ..Fault::new(pc, cfsr::IMPRECISERR) }
     }
 
     pub(crate) fn fetch(pc: u32) -> Fault {

@@ -69,6 +69,6 @@ pub use machine::{Machine, RAM_PATTERN, Stop};
 pub use mechanism::Mechanism;
 pub use model::{Error, Model};
 pub use profile::Visits;
-pub use seed::{Bug, Store};
+pub use seed::{Access, Bug};
 pub use stats::{Activity, Stats};
 pub use watch::{Moment, Point};

@@ -18,7 +18,7 @@ use crate::model::{Error, Model};
 use crate::profile::Visits;
 use crate::scb::cfsr;
 use crate::stats::Stats;
-use crate::stepping::Stepping;
+use crate::stepping::{self, Stepping};
 
 /// The value of every byte of RAM after power-on: what still has it was never written.
 pub const RAM_PATTERN: u8 = 0xA5;
@@ -335,10 +335,14 @@ impl<P: Peripherals + 'static> Machine<P> {
             return self.wait_for_flash(until);
         }
         self.loading = false;
-        let core = self.cpu.get_data();
         if self.locked.is_some() {
             return self.idle(until);
         }
+        if let Some(address) = self.cpu.get_data_mut().lost_store.take() {
+            self.sleeping = false;
+            return self.take_fault(Fault::lost_store(self.pc(), address));
+        }
+        let core = self.cpu.get_data();
         if self.sleeping {
             if !core.nvic.wakes(masks) && !core.lacks(Mechanism::Sleep) {
                 return self.idle(until);
@@ -402,9 +406,20 @@ impl<P: Peripherals + 'static> Machine<P> {
             (_, Some(Halt::Usage(status))) => self.take_fault(Fault::usage(self.pc(), status)),
             (_, Some(Halt::DataFault(address))) => self.take_fault(Fault::data(self.pc(), address)),
             (Err(uc_error::READ_PROT), None) if self.cpu.get_data().flash_closed => self.loading = true,
-            (Err(error), None) => self.take_fault(self.fault_of(error)),
+            (Err(error), None) => self.refused(error),
             (Ok(()), None) => self.sleeping = true,
         }
+    }
+
+    /// The library has stopped at an instruction. A store that is buffered is over for the program, which goes on.
+    fn refused(&mut self, error: uc_error) {
+        let core = self.cpu.get_data();
+        let store = core.unmapped.filter(|access| access.store && core.scb.buffers(access.address));
+        let Some(store) = store else { return self.take_fault(self.fault_of(error)) };
+        let (pc, mut code) = (self.pc(), [0; 2]);
+        let _ = self.read(pc, &mut code);
+        self.set(RegisterARM::PC, pc + stepping::width(u16::from_le_bytes(code)));
+        self.cpu.get_data_mut().lost_store = Some(store.address);
     }
 
     fn fault_of(&self, error: uc_error) -> Fault {

@@ -41,7 +41,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_1004 => self.cyccnt(),
             0xE000_1FB0..=0xE000_1FFF => 0,
             0xE000_E004 => 3,
-            0xE000_E008 => 0,
+            0xE000_E008 => self.scb.actlr,
             0xE000_E010..=0xE000_E01C => self.systick.read(address - 0xE000_E010, self.now),
             0xE000_E100..=0xE000_E11C => self.nvic.enabled_word((address - 0xE000_E100) / 4),
             0xE000_E180..=0xE000_E19C => self.nvic.enabled_word((address - 0xE000_E180) / 4),
@@ -80,7 +80,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_1004 => self.set_cyccnt(self.cyccnt_runs(), value),
             // The lock access register of the DWT: unlocked as a debugger would see it.
             0xE000_1FB0 => {}
-            0xE000_E008 => {}
+            0xE000_E008 => self.scb.actlr = value,
             0xE000_E010..=0xE000_E01C => {
                 self.systick.write(address - 0xE000_E010, value, self.now, self.cycle)
             }
@@ -174,11 +174,13 @@ impl<P: Peripherals> Core<P> {
 
     fn set_ccr(&mut self, value: u32) {
         self.scb.ccr = value;
-        if value & UNALIGN_TRP != 0 {
-            self.report(Breach::NotModelled { what: "CCR.UNALIGN_TRP" });
-        }
-        if value & DIV_0_TRP != 0 && self.stepping.is_none() {
-            self.report(Breach::NotModelled { what: "CCR.DIV_0_TRP, but with --interleave," });
+        let traps = [
+            (UNALIGN_TRP, "CCR.UNALIGN_TRP, but with --interleave,"),
+            (DIV_0_TRP, "CCR.DIV_0_TRP, but with --interleave,"),
+        ];
+        let sees_none = self.stepping.is_none();
+        for (_, what) in traps.into_iter().filter(|(bit, _)| value & bit != 0 && sees_none) {
+            self.report(Breach::NotModelled { what });
         }
     }
 

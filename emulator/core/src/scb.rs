@@ -1,11 +1,13 @@
 //! The system control block's own registers (ARMv7-M, B3.2): vector table, fault status, sleep, configuration.
 
 use crate::exception::Exception;
+use crate::ppb;
 
 /// Fault status bits of CFSR.
 pub(crate) mod cfsr {
     pub(crate) const IBUSERR: u32 = 1 << 8;
     pub(crate) const PRECISERR: u32 = 1 << 9;
+    pub(crate) const IMPRECISERR: u32 = 1 << 10;
     pub(crate) const UNSTKERR: u32 = 1 << 11;
     pub(crate) const STKERR: u32 = 1 << 12;
     pub(crate) const BFARVALID: u32 = 1 << 15;
@@ -36,6 +38,7 @@ pub(crate) struct Scb {
     pub(crate) cpacr: u32,
     pub(crate) fpccr: u32,
     pub(crate) demcr: u32,
+    pub(crate) actlr: u32,
 }
 
 impl Default for Scb {
@@ -52,9 +55,13 @@ impl Default for Scb {
             cpacr: 0,
             fpccr: 0xC000_0000,
             demcr: 0,
+            actlr: 0,
         }
     }
 }
+
+/// ACTLR: stores wait for their answer (Cortex-M4 technical reference manual, 4.3.1).
+const DISDEFWBUF: u32 = 1 << 1;
 
 /// CCR: traps of unaligned accesses and of divisions by zero.
 pub(crate) const UNALIGN_TRP: u32 = 1 << 3;
@@ -64,6 +71,12 @@ impl Scb {
     /// Whether CPACR lets the program use the floating-point unit: privileged access to CP10 and CP11.
     pub(crate) fn allows_floats(&self) -> bool {
         self.cpacr >> 20 & 0b0101 == 0b0101
+    }
+
+    /// Whether a store goes on before it is answered, so that the fault of one that nothing answers comes later, and without
+    /// its address. Stores into the system space wait.
+    pub(crate) fn buffers(&self, address: u32) -> bool {
+        self.actlr & DISDEFWBUF == 0 && !(ppb::BASE..ppb::BASE + ppb::SIZE).contains(&address)
     }
 
     /// Notes a fault that was taken as HardFault instead.

@@ -87,7 +87,7 @@ pub(crate) fn instructions(code: &[u8]) -> Vec<(u32, u32)> {
 }
 
 /// Bytes of an instruction that begins with this halfword.
-fn width(first: u16) -> u32 {
+pub(crate) fn width(first: u16) -> u32 {
     if first >> 11 >= 0b11101 { 4 } else { 2 }
 }
 

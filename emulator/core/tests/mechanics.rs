@@ -88,6 +88,11 @@ fn system_registers_are_as_the_architecture_says() {
 }
 
 #[test]
+fn a_store_to_nowhere_is_not_waited_for() {
+    assert_eq!(Bench::new("lost_store").run(), Verdict::Passed);
+}
+
+#[test]
 fn an_it_block_that_touches_a_new_page_ends_where_it_ends() {
     assert_eq!(Bench::new("it_miss").run(), Verdict::Passed);
 }

@@ -15,6 +15,8 @@ pub(crate) enum Node {
     Saving,
     /// The same; interrupts come between any two instructions, and faults of alignment are seen.
     Interleaved,
+    /// The same, on a chip whose receive FIFOs take long to give a mailbox back.
+    SlowFifo,
     /// An incremental encoder that turns.
     Encoder,
     /// An absolute encoder at a quarter of its revolution.
@@ -35,6 +37,8 @@ const POSITION: (u16, u8) = (0x6004, 0);
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
 /// A heartbeat time in milliseconds that is not the default.
 const PERIOD: u32 = 100;
+/// Cycles of PCLK1 that a slow FIFO takes: half of the shortest frame at 1 Mbit/s.
+const SLOW: u32 = 800;
 /// When the application runs.
 const STARTED: Time = Time::from_millis(400);
 
@@ -42,7 +46,7 @@ impl Node {
     /// The flags of the simulator for it.
     pub(crate) fn flags(self) -> &'static str {
         match self {
-            Node::Pressure | Node::Saving => "--bitrate 1000 --pressure const:400000",
+            Node::Pressure | Node::Saving | Node::SlowFifo => "--bitrate 1000 --pressure const:400000",
             Node::Interleaved => "--bitrate 1000 --pressure const:400000 --interleave 1",
             Node::Encoder => "--bitrate 1000 --node 1:encoder --shaft rpm:100",
             Node::Absolute => "--bitrate 1000 --node 1:encoder --shaft const:0.25",
@@ -61,6 +65,9 @@ pub(crate) fn observe(
     world.enforce_rules(false);
     let master = Master::join(&mut world);
     let mut said = Vec::new();
+    if node == Node::SlowFifo {
+        world.machine(0).peripherals_mut().can1_mut().release_after(SLOW);
+    }
     before(&mut world);
     world.run_until(STARTED);
     running(&mut world);
@@ -103,6 +110,10 @@ fn answers(world: &mut World, master: &Master, node: Node, said: &mut Vec<String
     if read(world, master, DEVICE_TYPE).is_none() {
         said.push("no answer to SDO".into());
     }
+    world.run_until(world.now() + Time::from_millis(5));
+    if !master.heard(world, 0x581).is_empty() {
+        said.push("more than one answer to SDO".into());
+    }
     if node == Node::Absolute && !write(world, master, SENSOR_TYPE, 1, 1) {
         said.push("the encoder cannot be chosen".into());
     }
@@ -128,7 +139,7 @@ fn flood(world: &mut World, master: &Master) {
 
 fn measures(world: &mut World, master: &Master, node: Node, said: &mut Vec<String>) {
     match node {
-        Node::Pressure | Node::Saving | Node::Interleaved => {
+        Node::Pressure | Node::Saving | Node::Interleaved | Node::SlowFifo => {
             let value = world.summary(1.0, 0).nodes[0].heard.process_value;
             if value.is_none_or(|bar| (bar - 4.0).abs() > 0.02) {
                 said.push(format!("the pressure is {value:?} instead of 4.0 bar"));

@@ -23,6 +23,8 @@ pub(super) fn builds_for_host() -> Vec<Step> {
 pub(super) fn builds_for_target(needs: &'static [Need], thorough: bool) -> Vec<Step> {
     let mut steps = vec![Step::new("system packages", move || setup::install(needs))];
     if thorough {
+        // By its name, so that `--only qemu` does.
+        steps.push(Step::new("install qemu", || setup::install(&[Need::Qemu])));
         // Before those of the default chip, which cargo puts into the same place.
         steps.push(Step::new("build other_chips", build_other_chips));
         steps.push(Step::new("build hal_examples", || hal_examples::build(&Toolchain::ensure()?)));

@@ -79,8 +79,13 @@ pub struct BxCan {
     pub(super) filters: FilterBanks,
     pub(super) status: Status,
     reception: Reception,
+    /// Cycles of its clock until a mailbox that is given back has made room.
+    release: u32,
     poke: bool,
 }
+
+/// So many, unless a test says otherwise. The manual says only that it takes a while.
+const RELEASE: u32 = 8;
 
 /// Frames that have passed a filter, since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -107,6 +112,7 @@ impl BxCan {
             filters: FilterBanks::new(),
             status: Status::default(),
             reception: Reception::default(),
+            release: RELEASE,
             poke: false,
         }
     }
@@ -115,8 +121,8 @@ impl BxCan {
     pub(super) fn reset(&mut self) {
         let mut monitor = self.monitor;
         monitor.cancel();
-        let reception = self.reception;
-        *self = BxCan { monitor, reception, poke: true, ..BxCan::new(self.slave, self.clock) };
+        let (reception, release) = (self.reception, self.release);
+        *self = BxCan { monitor, reception, release, poke: true, ..BxCan::new(self.slave, self.clock) };
     }
 
     /// CAN_BTR.
@@ -169,8 +175,8 @@ impl BxCan {
             }
             MSR => self.status.clear_flags(value),
             TSR => self.transmitter.write_status(value),
-            RF0R => self.fifos[0].write_status(value),
-            RF1R => self.fifos[1].write_status(value),
+            RF0R => self.fifos[0].write_status(value, now + self.release_time()),
+            RF1R => self.fifos[1].write_status(value, now + self.release_time()),
             IER => self.status.write_enable(value),
             ESR => self.status.write_errors(value),
             BTR => self.write_timing(value),
@@ -186,7 +192,8 @@ impl BxCan {
     /// The next instant at which something happens that neither software nor the bus causes.
     pub fn deadline(&self) -> Time {
         let looped = self.looped.map_or(Time::NEVER, |looped| looped.end);
-        self.monitor.due(self.bit()).min(looped)
+        let released = self.fifos[0].deadline().min(self.fifos[1].deadline());
+        self.monitor.due(self.bit()).min(looped).min(released)
     }
 
     /// Lets everything due up to `now` happen.
@@ -198,6 +205,16 @@ impl BxCan {
         while let Some(looped) = self.looped.take_if(|looped| looped.end <= now) {
             self.end_loop(&looped);
         }
+        self.fifos.iter_mut().for_each(|fifo| fifo.advance(now));
+    }
+
+    /// Has a mailbox that is given back (RFOM) take so many cycles to make room: what does not wait for it reads a frame twice.
+    pub fn release_after(&mut self, cycles: u32) {
+        self.release = cycles;
+    }
+
+    fn release_time(&self) -> Time {
+        Time(Time::PER_SECOND * u64::from(self.release) / self.clock.max(1))
     }
 
     /// The interrupt lines now.

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use canbus::Time;
+
 use super::mailbox::Registers;
 use crate::register::{bit, flag};
 
@@ -17,6 +19,8 @@ pub(crate) struct Fifo {
     output: Registers,
     full: bool,
     overrun: bool,
+    /// When the output mailbox, which software gives back, makes room for the next one.
+    release: Option<Time>,
 }
 
 impl Fifo {
@@ -39,14 +43,26 @@ impl Fifo {
 
     /// CAN_RFxR.
     pub(crate) fn status(&self) -> u32 {
-        self.mailboxes.len() as u32 | flag(self.full, FULL) | flag(self.overrun, FOVR)
+        self.mailboxes.len() as u32 | flag(self.full, FULL) | flag(self.overrun, FOVR) | flag(self.release.is_some(), RFOM)
     }
 
-    /// Writes CAN_RFxR: clears flags, releases the output mailbox.
-    pub(crate) fn write_status(&mut self, value: u32) {
+    /// Writes CAN_RFxR: clears flags, and gives the output mailbox back until an instant.
+    pub(crate) fn write_status(&mut self, value: u32, released: Time) {
         self.full &= !bit(value, FULL);
         self.overrun &= !bit(value, FOVR);
-        if bit(value, RFOM) {
+        if bit(value, RFOM) && !self.mailboxes.is_empty() {
+            self.release.get_or_insert(released);
+        }
+    }
+
+    /// When the output mailbox changes by itself.
+    pub(crate) fn deadline(&self) -> Time {
+        self.release.unwrap_or(Time::NEVER)
+    }
+
+    /// Lets everything due up to `now` happen.
+    pub(crate) fn advance(&mut self, now: Time) {
+        if self.release.take_if(|release| *release <= now).is_some() {
             self.mailboxes.pop_front();
             self.show();
         }

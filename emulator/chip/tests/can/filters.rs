@@ -79,7 +79,8 @@ fn observe(can: &mut DualCan, unit: u32, frame: &Frame) -> Option<(u32, u32)> {
         (can.read(status, now)? & 3 > 0).then_some(())?;
         let index = can.read(base + RX[fifo] + 4, now)? >> 8 & 0xFF;
         assert_eq!(can.read(base + RX[fifo], now), Some(forms(frame).0));
-        can.write(status, 1 << 5, now)?;
+        can.write(status, RFOM, now)?;
+        can.advance(now + Time::from_micros(1));
         Some((fifo as u32, index))
     })
 }

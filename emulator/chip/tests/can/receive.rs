@@ -40,8 +40,21 @@ fn three_frames_fill_a_fifo() {
     rig.write(0, RF0R, FULL);
     assert_eq!(rig.read(0, RF0R), 3);
     assert_eq!(drain(&mut rig, 0), [1, 2, 1]);
-    rig.write(0, RF0R, 1 << 5);
+    rig.write(0, RF0R, RFOM);
     assert_eq!(rig.read(0, RF0R), 0, "an empty FIFO has nothing to release");
+}
+
+#[test]
+fn a_mailbox_that_is_given_back_stays_for_a_while() {
+    let mut rig = Rig::started(1, 1, 0);
+    flood(&mut rig, 2);
+    let first = rig.read(0, RX[0]);
+    rig.write(0, RF0R, RFOM);
+    rig.write(0, RF0R, RFOM);
+    assert_eq!((rig.read(0, RF0R), rig.read(0, RX[0])), (2 | RFOM, first));
+    rig.run(Time::from_micros(1));
+    assert_eq!(rig.read(0, RF0R), 1, "to ask twice gives one back");
+    assert_ne!(rig.read(0, RX[0]), first);
 }
 
 #[test]

@@ -9,6 +9,8 @@ pub(crate) const MSR: u32 = 0x04;
 pub(crate) const TSR: u32 = 0x08;
 pub(crate) const RF0R: u32 = 0x0C;
 pub(crate) const RF1R: u32 = 0x10;
+/// The output mailbox is given back.
+pub(crate) const RFOM: u32 = 1 << 5;
 pub(crate) const IER: u32 = 0x14;
 pub(crate) const ESR: u32 = 0x18;
 pub(crate) const BTR: u32 = 0x1C;
@@ -122,7 +124,10 @@ impl Rig {
             return None;
         }
         let [id, control, low, high] = [0, 4, 8, 12].map(|offset| self.read(chip, RX[fifo] + offset));
-        self.write(chip, status, 1 << 5);
+        self.write(chip, status, RFOM);
+        while self.read(chip, status) & RFOM != 0 {
+            self.run(Time(1));
+        }
         let data = u64::from(high) << 32 | u64::from(low);
         Some((id >> 21, data.to_le_bytes()[..(control & 15) as usize].to_vec()))
     }

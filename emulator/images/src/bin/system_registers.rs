@@ -1,5 +1,5 @@
 //! System registers and exceptions where they are easily got wrong: SysTick, the cycle counter, states of exceptions, SVC under
-//! PRIMASK, returns that do not fit, and Thread mode without privileges.
+//! PRIMASK, Thread mode without privileges, BASEPRI and the choice of the stack.
 #![no_std]
 #![no_main]
 
@@ -18,9 +18,10 @@ const DEMCR: *mut u32 = 0xE000_EDFC as *mut u32;
 const DWT_CTRL: *mut u32 = 0xE000_1000 as *mut u32;
 const DWT_CYCCNT: *mut u32 = 0xE000_1004 as *mut u32;
 
-/// What handlers have seen: SHCSR and ICSR in SVCall, HFSR and CFSR in HardFault.
+/// What handlers have seen: SHCSR, ICSR and CONTROL in SVCall, HFSR and CFSR in HardFault.
 static STATES: AtomicU32 = AtomicU32::new(0);
 static CONTROL_STATE: AtomicU32 = AtomicU32::new(0);
+static SELECTED: AtomicU32 = AtomicU32::new(0);
 static HARD: AtomicU32 = AtomicU32::new(0);
 static STATUS: AtomicU32 = AtomicU32::new(0);
 
@@ -73,18 +74,49 @@ fn masked_call() -> Result<(), u32> {
     expect(HARD.swap(0, Relaxed) == 1 << 30, 31)
 }
 
+fn thread_mode() -> Result<(), u32> {
+    unprivileged().and(stacks())
+}
+
 fn unprivileged() -> Result<(), u32> {
     unsafe {
-        asm!("msr control, {0}", "isb", "ldr r3, [r2]", "isb", "svc 1", in(reg) 1, in("r2") SYST_CVR, out("r3") _);
+        asm!("msr control, {0}", "isb", "ldr r3, [r2]", "isb", "nop", "svc 1", in(reg) 1, in("r2") SYST_CVR, out("r3") _);
     }
     // PRECISERR and BFARVALID.
     expect(STATUS.swap(0, Relaxed) == 0x8200 && HARD.swap(0, Relaxed) == 1 << 30, 41)
 }
 
+/// The chip has the upper four of eight priority bits.
+fn priority_bits() -> Result<(), u32> {
+    let read: u32;
+    unsafe { asm!("msr basepri, {0}", "isb", "mrs {0}, basepri", "msr basepri, {1}", inout(reg) 0xFF => read, in(reg) 0) };
+    expect(read == 0xF0, 51)
+}
+
+/// A handler is on the main stack and says so; Thread mode finds its own stack again, with and without privileges.
+fn stacks() -> Result<(), u32> {
+    stack_of_thread(0b10).and(stack_of_thread(0b11))
+}
+
+fn stack_of_thread(chosen: u32) -> Result<(), u32> {
+    let mut stack = [0_u32; 64];
+    let top = stack.as_mut_ptr_range().end;
+    let (control, stack_pointer): (u32, u32);
+    unsafe {
+        asm!(
+            "msr psp, {top}", "msr control, {psp}", "isb", "svc 2", "mrs {control}, control", "mov {pointer}, sp",
+            "msr control, {msp}", "isb",
+            top = in(reg) top, psp = in(reg) chosen, msp = in(reg) 0, control = out(reg) control, pointer = out(reg) stack_pointer,
+        );
+    }
+    expect(SELECTED.load(Relaxed) & 2 == 0, 61)?;
+    expect(control & 2 != 0 && stack_pointer == top as u32, 62)
+}
+
 /// Each check is made, whatever the one before found: another core may differ in more than one.
 #[entry]
 fn main() -> ! {
-    let checks = [systick, cycle_counter, states, masked_call, unprivileged];
+    let checks = [systick, cycle_counter, states, masked_call, thread_mode, priority_bits];
     let mut result = Ok(());
     for (word, check) in checks.into_iter().enumerate() {
         let found = check();
@@ -100,6 +132,9 @@ fn SVCall() {
     write(ICSR, 1 << 28);
     STATES.store(read(SHCSR), Relaxed);
     CONTROL_STATE.store(read(ICSR), Relaxed);
+    let control: u32;
+    unsafe { asm!("mrs {0}, control", out(reg) control) };
+    SELECTED.store(control, Relaxed);
     unsafe { asm!("msr control, {0}", "isb", in(reg) 0) };
 }
 

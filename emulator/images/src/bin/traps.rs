@@ -1,5 +1,5 @@
-//! Instructions that silicon refuses: with the floating-point unit off, at an unaligned address, and a division by zero that is
-//! trapped. The handler notes the status and goes on behind the instruction, all of which have 32 bits.
+//! Instructions that silicon refuses: with the floating-point unit off, at an unaligned address, and those that are trapped: a division
+//! by zero, and any access to an unaligned word. The handler notes the status and goes on behind the instruction, all of which have 32 bits.
 #![no_std]
 #![no_main]
 
@@ -69,12 +69,22 @@ fn main() -> ! {
         asm!("dsb", "isb", "udiv {0}, {0}, {1}", inout(reg) odd => _, in(reg) 0);
     }
     let division = seen();
+    let word: u32;
+    unsafe { asm!("ldr.w {0}, [{1}]", out(reg) word, in(reg) odd) };
+    let allowed = seen() == 0 && word == 2 << 16;
+    unsafe {
+        CCR.write_volatile(CCR.read_volatile() | 1 << 3);
+        asm!("dsb", "isb", "ldr.w {0}, [{1}]", out(reg) _, in(reg) odd);
+    }
+    let any = seen();
     finish(
         expect(without_floats == NOCP, 1)
             .and_then(|()| expect(double == UNALIGNED, 2))
             .and_then(|()| expect(multiple == UNALIGNED, 3))
             .and_then(|()| expect(float == UNALIGNED, 4))
             .and_then(|()| expect(exclusive == UNALIGNED, 5))
-            .and_then(|()| expect(division == DIVBYZERO, 6)),
+            .and_then(|()| expect(division == DIVBYZERO, 6))
+            .and_then(|()| expect(allowed, 7))
+            .and_then(|()| expect(any == UNALIGNED, 8)),
     )
 }

@@ -52,7 +52,7 @@ fn bugs_show_fourth_part() {
 /// What shows a bug is the bug's.
 #[test]
 fn without_a_bug_the_board_says_nothing() {
-    for node in [Node::Saving, Node::Encoder, Node::Absolute] {
+    for node in [Node::Saving, Node::SlowFifo, Node::Encoder, Node::Absolute] {
         assert_eq!(observe(world(node.flags()), node, |_| (), |_| ()), [""; 0], "{node:?}");
     }
 }

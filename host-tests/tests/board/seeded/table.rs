@@ -1,6 +1,6 @@
 //! The bugs.
 
-use emulator::{Bug, Store};
+use emulator::{Access, Bug};
 use object::{Object, ObjectSymbol};
 use sim::world::World;
 
@@ -17,8 +17,8 @@ pub(super) struct Row {
 
 /// What is wrong in the program.
 enum Does {
-    /// What it stores in a register.
-    Store(Bug),
+    /// What it does with a register.
+    Access(Bug),
     /// What an interrupt handler begins with: halfwords of Thumb code.
     Code(&'static str, &'static [u16]),
 }
@@ -26,7 +26,7 @@ enum Does {
 impl Row {
     /// Before the program starts.
     pub(super) fn seed(&self, world: &mut World) {
-        if let Does::Store(bug) = self.does {
+        if let Does::Access(bug) = self.does {
             world.machine(0).seed(bug);
         }
     }
@@ -48,16 +48,21 @@ fn address_of(function: &str) -> u32 {
     u32::try_from(symbol.address()).unwrap() & !1
 }
 
-const fn row(name: &'static str, register: u32, store: Store, says: &'static str) -> Row {
-    Row { name, node: Node::Pressure, does: Does::Store(Bug { register, store }), says }
+const fn row(name: &'static str, register: u32, access: Access, says: &'static str) -> Row {
+    Row { name, node: Node::Pressure, does: Does::Access(Bug { register, access }), says }
 }
 
 const fn missing(name: &'static str, register: u32, says: &'static str) -> Row {
-    row(name, register, Store::Missing, says)
+    row(name, register, Access::Missing, says)
 }
 
 const fn wrong(name: &'static str, register: u32, bits: u32, value: u32, says: &'static str) -> Row {
-    row(name, register, Store::Wrong { bits, value }, says)
+    row(name, register, Access::Wrong { bits, value }, says)
+}
+
+/// The program does not look at bits of a register.
+const fn unseen(name: &'static str, register: u32, bits: u32, says: &'static str) -> Row {
+    row(name, register, Access::Unseen { bits }, says)
 }
 
 const fn code(name: &'static str, handler: &'static str, code: &'static [u16], says: &'static str) -> Row {
@@ -140,6 +145,8 @@ pub(super) const STORES: &[Row] = &[
     missing("FIFO 1 is not released", CAN1 + 0x10, "no answer to SDO"),
     missing("FIFO 0 is not released", CAN1 + 0x0C, "reset by the chip (watchdog)"),
     missing("sent mailboxes are not acknowledged", CAN1 + 0x08, "reset by the chip (watchdog)"),
+    unseen("nobody waits until FIFO 1 is released", CAN1 + 0x10, 1 << 5, "more than one answer to SDO")
+        .with(Node::SlowFifo),
     wrong("no filter is active", CAN1 + 0x21C, u32::MAX, 0, "no answer to SDO"),
     wrong("time-triggered mode", CAN1, 1 << 7, 1 << 7, "CAN1"),
     // ADC and DMA.
@@ -221,7 +228,7 @@ pub(super) const CODE: &[Row] = &[
     // movs r0, #0xF0; lsls r0, #24; ldr r0, [r0]
     code("a load from nowhere", SAMPLING, &[0x20F0, 0x0600, 0x6800], "CFSR 0x200, access to 0xf0000000"),
     // movs r0, #0xF0; lsls r0, #24; str r0, [r0]
-    code("a store to nowhere", SAMPLING, &[0x20F0, 0x0600, 0x6000], "CFSR 0x200, access to 0xf0000000"),
+    code("a store to nowhere", SAMPLING, &[0x20F0, 0x0600, 0x6000], "CFSR 0x400, access to 0xf0000000"),
     // push {r0-r7}; b .-2
     code("recursion without an end", SAMPLING, &[0xB4FF, 0xE7FD], "access to 0x1fffff"),
     // svc #0
