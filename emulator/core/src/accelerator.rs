@@ -85,8 +85,9 @@ mod tests {
     fn a_loop_that_fits_waits_once_and_one_that_does_not_always() {
         for (bytes, waits_again) in [(1024, 0), (1040, 65 * 5)] {
             let mut accelerator = Accelerator::new();
-            let mut run =
-                || (0..bytes / LINE).map(|line| accelerator.fetch(line * LINE, LINE, true, FLASH)).sum::<u32>();
+            let mut run = || {
+                (0..bytes / LINE).map(|line| accelerator.fetch(line * LINE, LINE, true, FLASH)).sum::<u32>()
+            };
             assert_eq!(run(), bytes / LINE * 5);
             assert_eq!(run(), waits_again, "{bytes}");
         }

@@ -122,7 +122,8 @@ mod tests {
             assert_eq!(with_traps(UNALIGN_TRP, unaligned, op), Some(cfsr::UNALIGNED), "{name}");
             assert_eq!(with(unaligned, op), None, "{name}");
         }
-        for (op, name) in [(0x7801, "ldrb r1, [r0]"), (0xF890_1001, "ldrb.w r1, [r0, #1]"), (0x1C40, "adds")] {
+        for (op, name) in [(0x7801, "ldrb r1, [r0]"), (0xF890_1001, "ldrb.w r1, [r0, #1]"), (0x1C40, "adds")]
+        {
             assert_eq!(with_traps(UNALIGN_TRP, 3, op), None, "{name}");
         }
     }

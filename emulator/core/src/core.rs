@@ -8,8 +8,8 @@ use chip::{Breach, Effect, Peripherals};
 
 use crate::accelerator::Accelerator;
 use crate::cost::Costs;
-use crate::estimate::Estimate;
 use crate::engine::RAM;
+use crate::estimate::Estimate;
 use crate::exception::Exception;
 use crate::mechanism::Mechanism;
 use crate::memory::Memory as Bytes;

@@ -178,7 +178,9 @@ fn wide(first: u16, second: u16, estimate: Estimate) -> u32 {
         // DSB, DMB and ISB.
         (0b10, _) if first == 0xF3BF && second >> 12 == 0b1000 => estimate.of(1, 1, 4),
         // MSR and MRS.
-        (0b10, _) if matches!(first & 0xFFE0, 0xF380 | 0xF3E0) && second & 0xD000 == 0x8000 => special(estimate),
+        (0b10, _) if matches!(first & 0xFFE0, 0xF380 | 0xF3E0) && second & 0xD000 == 0x8000 => {
+            special(estimate)
+        }
         (0b11, 0b00) if first & 0x0100 == 0 || first >> 8 == 0xF9 => memory(load, estimate),
         // SDIV and UDIV.
         (0b11, 0b01) if first & 0xFFD0 == 0xFB90 => estimate.of(2, 7, 12),
@@ -192,7 +194,8 @@ mod tests {
 
     /// The cycles of some instructions in flash, at best, as modelled and at worst.
     fn cycles(ops: &[u32]) -> [u16; 3] {
-        let halves = ops.iter().flat_map(|&op| if op > 0xFFFF { vec![op >> 16, op & 0xFFFF] } else { vec![op] });
+        let halves =
+            ops.iter().flat_map(|&op| if op > 0xFFFF { vec![op >> 16, op & 0xFFFF] } else { vec![op] });
         let code: Vec<u8> = halves.flat_map(|half| (half as u16).to_le_bytes()).collect();
         [Estimate::Best, Estimate::Modelled, Estimate::Worst].map(|estimate| {
             let cost = of_block(&code, estimate, false);

@@ -102,7 +102,10 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
 }
 
 /// Has constants that are read from flash waited for.
-pub(crate) fn watch_constants<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Result<(), Error> {
+pub(crate) fn watch_constants<P: Peripherals + 'static>(
+    cpu: &mut Cpu<P>,
+    model: &Model,
+) -> Result<(), Error> {
     let (first, last) = (model.flash.start.into(), u64::from(model.flash.end) - 1);
     cpu.add_mem_hook(HookType::MEM_READ, first, last, |cpu, _, address, _, _| {
         close_it_block(cpu);

@@ -13,7 +13,7 @@ use crate::scb::{Scb, cfsr};
 /// A fault as it was seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The instruction; for a load from a peripheral the start of its block, and for a store one behind it.
+    /// The instruction; for a load from a peripheral and for a store the beginning of the next block.
     pub pc: u32,
     /// The link register.
     pub lr: u32,

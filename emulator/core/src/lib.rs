@@ -24,13 +24,14 @@
 //!   [`Machine::interleave`] they are taken between any two instructions.
 //! * Floating-point registers are stacked at exception entry, never lazily; a higher interrupt that arrives within the
 //!   twelve cycles of an entry nests instead of going first.
-//! * A refused access to a peripheral is a precise bus fault with the right address, but with the program counter of
-//!   its block. Accesses to unmapped memory have the exact one.
+//! * A refused load from a peripheral is a precise bus fault with the right address, but with the program counter of
+//!   the next block. Loads from unmapped memory have the exact one. A refused store is an imprecise fault at the next block.
 //! * Flash becomes busy with the end of the block that has stored to it. A load from busy flash in an IT block is done once more from the start of the block.
 //! * WFE is a hint that never sleeps; there is no MPU, no bit-band alias of RAM and no alias of flash at address 0.
 //! * Where CPACR does not allow the floating-point unit, the fault comes at the start of the block that uses it.
-//! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and a division by zero that is trapped (CCR.DIV_0_TRP), fault after
-//!   [`Machine::interleave`] only, and not in an IT block; CCR.UNALIGN_TRP is not modelled and reported as a [`chip::Breach`].
+//! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and what CCR traps, a division by zero and unaligned accesses, fault after
+//!   [`Machine::interleave`] only, and not in an IT block; without it a program that sets the traps is reported ([`chip::Breach`]).
+//! * Cycles have a range ([`Estimate`]): the pipeline and the contention for the buses are not followed.
 
 mod accelerator;
 mod alignment;

@@ -52,7 +52,9 @@ fn start(personality: &str, rate: u32, estimate: Estimate) -> (World, Master) {
     let after_power_on = boot_up(&mut world);
     let after_reset = reset(&mut world, &master);
     let [power_on, again] = [after_power_on, after_reset].map(|time| time.as_micros() as f64 / 1e3);
-    println!("{personality} at {rate} kbit/s, {estimate}: boot-up {power_on:.1} ms after power-on, {again:.1} ms after a reset");
+    println!(
+        "{personality} at {rate} kbit/s, {estimate}: boot-up {power_on:.1} ms after power-on, {again:.1} ms after a reset"
+    );
     // The signature of the application is checked.
     let limit = if estimate == Estimate::Worst { 400 } else { 300 };
     assert!(after_power_on < Time::from_millis(limit), "{personality} at {rate} kbit/s: {after_power_on:?}");

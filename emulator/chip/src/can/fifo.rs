@@ -43,7 +43,10 @@ impl Fifo {
 
     /// CAN_RFxR.
     pub(crate) fn status(&self) -> u32 {
-        self.mailboxes.len() as u32 | flag(self.full, FULL) | flag(self.overrun, FOVR) | flag(self.release.is_some(), RFOM)
+        self.mailboxes.len() as u32
+            | flag(self.full, FULL)
+            | flag(self.overrun, FOVR)
+            | flag(self.release.is_some(), RFOM)
     }
 
     /// Writes CAN_RFxR: clears flags, and gives the output mailbox back until an instant.

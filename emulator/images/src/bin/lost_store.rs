@@ -50,7 +50,9 @@ global_asm!(
 /// Stores a word there; whether what comes behind was done, and once.
 fn store(place: *mut u32) -> bool {
     let count: u32;
-    unsafe { asm!("movs r1, #0", "str r1, [r0]", "adds r1, #1", "dsb", "isb", in("r0") place, out("r1") count) };
+    unsafe {
+        asm!("movs r1, #0", "str r1, [r0]", "adds r1, #1", "dsb", "isb", in("r0") place, out("r1") count)
+    };
     count == 1
 }
 

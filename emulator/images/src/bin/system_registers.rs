@@ -89,7 +89,9 @@ fn unprivileged() -> Result<(), u32> {
 /// The chip has the upper four of eight priority bits.
 fn priority_bits() -> Result<(), u32> {
     let read: u32;
-    unsafe { asm!("msr basepri, {0}", "isb", "mrs {0}, basepri", "msr basepri, {1}", inout(reg) 0xFF => read, in(reg) 0) };
+    unsafe {
+        asm!("msr basepri, {0}", "isb", "mrs {0}, basepri", "msr basepri, {1}", inout(reg) 0xFF => read, in(reg) 0)
+    };
     expect(read == 0xF0, 51)
 }
 
