@@ -8,7 +8,7 @@ use crate::area::Area;
 use crate::flash::{Flash, read_step};
 use crate::header::{HEADER, HEADER_LEN, Header};
 use crate::refusal::Refusal;
-use crate::signature::{Message, Verification};
+use crate::signature::{CONTEXT, HASH_LEN, Message, Verification};
 use crate::target::{Target, image_len};
 
 /// The header at the start of `area`.
@@ -63,13 +63,17 @@ impl CrcCheck {
     }
 }
 
-/// A check of everything that can be said of an image under way: what is in it, then who has signed it.
+/// A check of everything that can be said of an image under way: what is in it, then who has signed it. The signature is looked at
+/// twice, from the hash of the image on: one instruction that is left out, or one wrong bit, spoils one of the two only.
 pub(crate) struct FullCheck {
     header: Header,
     crc: CrcCheck,
     /// `None` where the signature does not matter.
     message: Option<Message>,
+    hash: [u8; HASH_LEN],
     signature: Option<Verification>,
+    /// The word of the first look at the signature.
+    first: Option<u32>,
 }
 
 impl FullCheck {
@@ -81,7 +85,8 @@ impl FullCheck {
     /// Of the image with this header in an area.
     pub(crate) fn of(header: Header, area: Area) -> FullCheck {
         let crc = CrcCheck::new(&header, area);
-        FullCheck { header, crc, message: Some(Message::of(&header)), signature: None }
+        let message = Some(Message::of(&header));
+        FullCheck { header, crc, message, hash: [0; HASH_LEN], signature: None, first: None }
     }
 
     /// The same without the signature.
@@ -95,19 +100,22 @@ impl FullCheck {
         flash: &mut F,
         target: &Target,
     ) -> Result<Option<Header>, Refusal> {
-        match &mut self.signature {
-            None => self.read(flash, target),
-            Some(signature) => match signature.step() {
-                None => Ok(None),
-                Some(true) => Ok(Some(self.header)),
-                Some(false) => Err(Refusal::Signature),
-            },
+        let Some(signature) = &mut self.signature else { return self.read(flash, target) };
+        match (signature.step(), self.first) {
+            (None, _) => Ok(None),
+            (Some(false), _) => Err(Refusal::Signature),
+            (Some(true), Some(_)) => Ok(Some(self.header)),
+            (Some(true), None) => {
+                self.first = Some(signature.seal(self.header.crc()));
+                self.verify(target)
+            }
         }
     }
 
-    /// The CRC of the header once the signature is known to be good; another word before, and with any other signature.
+    /// The CRC of the header once both looks have found the signature to be good; another word before, and with any other signature.
     pub(crate) fn seal(&self) -> u32 {
-        self.signature.as_ref().map_or(0, |signature| signature.seal(self.header.crc()))
+        let (Some(signature), Some(first)) = (&self.signature, self.first) else { return 0 };
+        signature.seal(first)
     }
 
     fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<Option<Header>, Refusal> {
@@ -116,8 +124,14 @@ impl FullCheck {
             return Ok(None);
         }
         let Some(message) = message else { return Ok(Some(self.header)) };
-        let signature = message.end(self.header.signature(), target.key_of(&self.header)?);
-        self.signature = Some(signature.ok_or(Refusal::Signature)?);
-        Ok(None)
+        self.hash = message.end();
+        self.verify(target)
+    }
+
+    /// Begins a look at the signature.
+    fn verify(&mut self, target: &Target) -> Result<Option<Header>, Refusal> {
+        let (signature, key) = (self.header.signature(), target.key_of(&self.header)?);
+        self.signature = Verification::new(&self.hash, CONTEXT, signature, key);
+        if self.signature.is_some() { Ok(None) } else { Err(Refusal::Signature) }
     }
 }

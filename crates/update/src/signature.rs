@@ -35,18 +35,14 @@ impl Message {
         self.0.update(code);
     }
 
-    /// That was all of it. `None` when no further look is needed: the signature cannot be a good one.
-    pub(crate) fn end(
-        &mut self,
-        signature: &[u8; SIGNATURE_LEN],
-        key: &[u8; KEY_LEN],
-    ) -> Option<Verification> {
-        Verification::new(&self.0.finalize_reset().into(), CONTEXT, signature, key)
+    /// That was all of it: its hash.
+    pub(crate) fn end(&mut self) -> [u8; HASH_LEN] {
+        self.0.finalize_reset().into()
     }
 }
 
 /// Bytes of a hash.
-const HASH_LEN: usize = 64;
+pub(crate) const HASH_LEN: usize = 64;
 /// Bytes of a number or a point.
 const LEN: usize = 32;
 /// The octets before what is hashed (RFC 8032, 2: dom2), then phflag, then the length of the context.
@@ -69,8 +65,8 @@ pub(crate) struct Verification {
 }
 
 impl Verification {
-    /// Of the hash of a message. `None` when S is not reduced, or the key is no point.
-    fn new(
+    /// Of the hash of a message. `None` when no further look is needed, as S is not reduced, or the key is no point.
+    pub(crate) fn new(
         hash: &[u8; HASH_LEN],
         context: &[u8],
         signature: &[u8; SIGNATURE_LEN],

@@ -54,6 +54,12 @@ impl Scene {
         let staged = |name, what, flash| Scene { name, what, flash, begin: Begin::Power, has_good: true };
         Ok(vec![
             alone("unsigned", "an application that nobody has signed", bare(&unsigned), Begin::Power),
+            alone(
+                "neutral",
+                "an application whose signature fits an equation that is left out",
+                bare(&neutral()?.to_bytes()),
+                Begin::Power,
+            ),
             alone("bare", "an application without a header", bare(&headless), Begin::Power),
             alone(
                 "exchanged",
@@ -103,8 +109,19 @@ fn older() -> Result<Image> {
 
 /// Newer than what is there, for this product, with good sums.
 fn unsigned() -> Result<Image> {
+    with_signature([0; 64])
+}
+
+/// The same. R is the neutral point, at which the sum of the equation begins, and S is zero.
+fn neutral() -> Result<Image> {
+    let mut signature = [0; 64];
+    signature[0] = 1;
+    with_signature(signature)
+}
+
+fn with_signature(signature: [u8; 64]) -> Result<Image> {
     let image = signed(BAD, NEWER)?;
-    Ok(Image { header: image.header.with_signature([0; 64]), ..image })
+    Ok(Image { header: image.header.with_signature(signature), ..image })
 }
 
 /// Of the sectors.

@@ -52,7 +52,7 @@ fn the_machine_says_what_it_does_and_the_bootloader_stays_responsive() {
     updater.finish().unwrap();
     assert_eq!((updater.phase(), updater.next()), (Phase::Checking, Next::Step));
     let steps = 1 + std::iter::from_fn(|| (updater.poll() == Next::Step).then_some(())).count();
-    assert_eq!(steps, 1 + 65, "the code in one piece, then the signature in many");
+    assert_eq!(steps, 1 + 2 * 65, "the code in one piece, then the signature in many, twice");
     assert_eq!((updater.phase(), updater.status()), (Phase::Committed, Status::GOOD));
     updater.install().unwrap();
     while updater.phase() == Phase::Checking {
