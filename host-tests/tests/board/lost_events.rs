@@ -173,7 +173,8 @@ fn an_index_capture_that_is_switched_off_is_switched_on_again() {
     assert_silent(&mut world);
 }
 
-/// The compare match of the services is lost: without it they would sleep for 71 minutes.
+/// The compare match of the services is lost: without it they would sleep for 71 minutes. One that is lost just before the look of a
+/// millisecond is in time all the same and not counted; of these it is the one of the heartbeat at most.
 #[test]
 fn a_lost_alarm_is_noticed_by_the_time() {
     let mut world = running();
@@ -183,7 +184,7 @@ fn a_lost_alarm_is_noticed_by_the_time() {
         lose(&mut world, Loss::Compare { channel: 1 }, 1);
         lose(&mut world, Loss::Compare { channel: 2 }, 1);
         world.run_until(world.now() + Time::from_millis(100));
-        assert!(counted(&mut world, &master, ALARMS) >= number);
+        assert!(counted(&mut world, &master, ALARMS) + 1 >= number);
     }
     let after = run(&mut world, SECOND * 4).nodes[0].heard.heartbeats;
     assert!(after - before >= 5, "{}", after - before);
