@@ -40,7 +40,7 @@ const PERIOD: u32 = 100;
 /// Cycles of PCLK1 that a slow FIFO takes: half of the shortest frame at 1 Mbit/s.
 const SLOW: u32 = 800;
 /// When the application runs.
-const STARTED: Time = Time::from_millis(400);
+const STARTED: Time = Time::from_millis(500);
 
 impl Node {
     /// The flags of the simulator for it.
@@ -180,7 +180,7 @@ fn saves(world: &mut World, master: &Master, said: &mut Vec<String>) {
     let now = world.now();
     world.machine(0).power_off();
     world.machine(0).power_on(now);
-    world.run_until(now + Time::from_millis(600));
+    world.run_until(now + Time::from_millis(900));
     if read(world, master, HEARTBEAT).is_none_or(|value| value & 0xFFFF != PERIOD) {
         said.push("what was saved is lost".into());
     }

@@ -81,7 +81,7 @@ pub(crate) fn comes_back(world: &mut World) -> String {
     let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
     let log = log.join("\n");
     assert_eq!(after.heard.boot_ups, before.heard.boot_ups + 1, "it boots once more: {log}");
-    assert!(after.sampling.samples > before.sampling.samples + 600, "it measures again: {log}");
+    assert!(after.sampling.samples > before.sampling.samples + 500, "it measures again: {log}");
     assert!(after.heard.process_value.is_some(), "it sends again: {log}");
     log
 }
