@@ -35,7 +35,7 @@ impl Message {
         self.0.update(code);
     }
 
-    /// That was all of it: its hash.
+    /// The hash of all that was added; the message is empty again.
     pub(crate) fn end(&mut self) -> [u8; HASH_LEN] {
         self.0.finalize_reset().into()
     }
@@ -65,7 +65,8 @@ pub(crate) struct Verification {
 }
 
 impl Verification {
-    /// Of the hash of a message. `None` when no further look is needed, as S is not reduced, or the key is no point.
+    /// Begins to verify the signature of a message with this hash. `None` when the signature cannot be good: S is not reduced, or the
+    /// key is no point.
     pub(crate) fn new(
         hash: &[u8; HASH_LEN],
         context: &[u8],

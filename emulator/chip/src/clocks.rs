@@ -50,20 +50,21 @@ impl Clocks {
 
     /// One cycle of the clock of a bus.
     pub(crate) fn apb_cycle(&self, bus: Apb) -> Time {
+        times(self.hclk_cycle(), self.divider(bus))
+    }
+
+    /// HCLK divided by this is the clock of a bus.
+    pub(crate) fn divider(&self, bus: Apb) -> u32 {
         match bus {
-            Apb::One => self.pclk1_cycle(),
-            Apb::Two => self.pclk2_cycle(),
+            Apb::One => self.apb1_divider,
+            Apb::Two => self.apb2_divider,
         }
     }
 
     /// One cycle of the clock of the timers on a bus (RM0390 section 6.2, RCC_DCKCFGR.TIMPRE).
     pub(crate) fn timer_cycle(&self, bus: Apb) -> Time {
-        let divider = match bus {
-            Apb::One => self.apb1_divider,
-            Apb::Two => self.apb2_divider,
-        };
         let gain = if self.fast_timers { 4 } else { 2 };
-        times(self.hclk_cycle(), (divider / gain).max(1))
+        times(self.hclk_cycle(), (self.divider(bus) / gain).max(1))
     }
 }
 

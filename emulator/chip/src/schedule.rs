@@ -3,6 +3,7 @@
 use canbus::Time;
 
 use crate::can::Lines;
+use crate::clocks::Apb;
 use crate::iwdg::Iwdg;
 use crate::loss::Loss;
 use crate::map::{ADC_IRQ, CAN_IRQS, DMA_IRQS, FLASH_IRQ, SPIS, TIMERS};
@@ -41,8 +42,8 @@ impl Peripherals for Stm32f4 {
 
     fn apb_divider(&self, address: u32) -> Option<u32> {
         match address >> 16 {
-            0x4000 => Some(self.clocks.apb1_divider),
-            0x4001 => Some(self.clocks.apb2_divider),
+            0x4000 => Some(self.clocks.divider(Apb::One)),
+            0x4001 => Some(self.clocks.divider(Apb::Two)),
             _ => None,
         }
     }

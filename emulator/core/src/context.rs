@@ -5,6 +5,7 @@ use unicorn_engine::RegisterARM;
 
 use crate::clock;
 use crate::engine;
+use crate::estimate::TAIL_CHAIN;
 use crate::exception::Exception;
 use crate::fault::Fault;
 use crate::machine::Machine;
@@ -192,8 +193,7 @@ impl<P: Peripherals + 'static> Machine<P> {
 
     fn chain(&mut self, exception: Exception, exc_return: u32) {
         let pended = self.cpu.get_data().pended[usize::from(exception.0)];
-        let change = self.cpu.get_data().estimate().tail_chain();
-        self.vector(exception, exc_return, change);
+        self.vector(exception, exc_return, TAIL_CHAIN);
         let core = self.cpu.get_data_mut();
         let latency = core.now.since(pended);
         core.stats.tail_chained += 1;

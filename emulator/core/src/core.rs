@@ -339,11 +339,17 @@ impl<P: Peripherals> Core<P> {
     pub(crate) fn fetch_cycles(&mut self, address: u32, size: u32) -> u32 {
         let in_a_row = std::mem::replace(&mut self.ahead, address + size) == address;
         let refill = if in_a_row { 0 } else { self.estimate().refill() };
+        refill + self.flash_cycles(address, size, in_a_row)
+    }
+
+    /// What the flash lets the core wait for code.
+    #[inline]
+    fn flash_cycles(&mut self, address: u32, size: u32, in_a_row: bool) -> u32 {
         match &mut self.accelerator {
             Some(accelerator) if address < RAM => {
-                refill + accelerator.fetch(address, size, in_a_row, self.chip.flash_access())
+                accelerator.fetch(address, size, in_a_row, self.chip.flash_access())
             }
-            _ => refill,
+            _ => 0,
         }
     }
 
@@ -357,10 +363,8 @@ impl<P: Peripherals> Core<P> {
 
     /// An entry of the vector table is read, as code is.
     pub(crate) fn wait_for_vector(&mut self, address: u32) {
-        if let Some(accelerator) = self.accelerator.as_mut().filter(|_| address < RAM) {
-            let cycles = accelerator.fetch(address, 4, false, self.chip.flash_access());
-            self.spend(0, cycles);
-        }
+        let cycles = self.flash_cycles(address, 4, false);
+        self.spend(0, cycles);
     }
 
     /// A register of the chip is accessed.

@@ -51,16 +51,14 @@ impl Estimate {
         12 + self.of(0, 0, if floats { FLOATS_OF_FRAME } else { 0 })
     }
 
-    /// The change from one handler to the next.
-    pub(crate) fn tail_chain(self) -> u32 {
-        6
-    }
-
     /// The return of an exception to the program.
     pub(crate) fn exit(self, floats: bool) -> u32 {
         self.of(10, 12, 12 + if floats { FLOATS_OF_FRAME } else { 0 })
     }
 }
+
+/// Cycles of the change from one handler to the next.
+pub(crate) const TAIL_CHAIN: u32 = 6;
 
 /// S0 to S15 and FPSCR, a cycle each.
 const FLOATS_OF_FRAME: u32 = 17;

@@ -173,8 +173,8 @@ fn an_index_capture_that_is_switched_off_is_switched_on_again() {
     assert_silent(&mut world);
 }
 
-/// The compare match of the services is lost: without it they would sleep for 71 minutes. One that is lost just before the look of a
-/// millisecond is in time all the same and not counted; of these it is the one of the heartbeat at most.
+/// The compare match of the services is lost: without it they would sleep for 71 minutes. A match
+/// that is lost just before the look of a millisecond is not counted, because that look is in time: one of these ten may be such a one.
 #[test]
 fn a_lost_alarm_is_noticed_by_the_time() {
     let mut world = running();

@@ -124,8 +124,8 @@ impl Flash {
 
     /// How the core reads the array (RM0390, 3.8.1).
     pub(crate) fn access(&self) -> FlashAccess {
-        let is_on = |bit: u32| self.acr & 1 << bit != 0;
-        FlashAccess { wait_states: self.wait_states(), caches_code: is_on(9), caches_constants: is_on(10) }
+        let (caches_code, caches_constants) = (bit(self.acr, 9), bit(self.acr, 10));
+        FlashAccess { wait_states: self.wait_states(), caches_code, caches_constants }
     }
 
     /// FLASH_ACR.LATENCY.
