@@ -4,10 +4,10 @@ use bsp::{ProgramFlash, board, factory};
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Part};
-use update::{Proof, Refusal, Status, Target, Updater};
+use update::{Proof, Refusal, Status, Updater};
 
 use crate::dictionary::DICTIONARY;
-use crate::target::{PRODUCT, REVISION, VENDOR};
+use crate::target::{PRODUCT, REVISION, TARGET, VENDOR};
 
 /// What 1F51h takes (CiA 302-3).
 const STOP: u8 = 0;
@@ -28,14 +28,13 @@ const STATUS: Field = DICTIONARY.field(0x1F57, 1);
 /// The update under way, as the application of the CANopen device.
 pub(crate) struct Program {
     updater: Updater<ProgramFlash>,
-    target: Target,
     /// The program was told to start, and there is one.
     starts: bool,
 }
 
 impl Program {
-    pub(crate) fn new(updater: Updater<ProgramFlash>, target: Target) -> Program {
-        Program { updater, target, starts: false }
+    pub(crate) fn new(updater: Updater<ProgramFlash>) -> Program {
+        Program { updater, starts: false }
     }
 
     pub(crate) fn updater(&mut self) -> &mut Updater<ProgramFlash> {
@@ -66,7 +65,7 @@ impl Program {
         if self.updater.status().busy {
             return Err(Abort::DeviceState);
         }
-        let found = update::application(self.updater.flash(), &self.target, Proof::Waived);
+        let found = update::application(self.updater.flash(), &TARGET, Proof::Waived);
         self.starts = found.is_ok() || crate::start::unsigned().is_some();
         if self.starts { Ok(()) } else { Err(Abort::DeviceState) }
     }

@@ -11,7 +11,7 @@ use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
 use canopen::{Action, CanId, Duration, Instant, NodeId, ServiceDevice};
-use update::{Decision, Next, Phase, Proof, Start, Updater};
+use update::{Crashes, Decision, Next, Phase, Proof, Start, Updater};
 
 use crate::dictionary::{DICTIONARY, ROWS};
 use crate::identity::Identity;
@@ -59,16 +59,18 @@ impl Session {
     ) -> Session {
         let status = if let Reason::Stay(status) = reason { status } else { update::Status::GOOD };
         let mut updater = Updater::new(flash, TARGET, status);
-        if reason == Reason::Copy {
-            // A refusal shows in the status.
-            let _ = updater.install();
-        }
+        // A refusal shows in the status.
+        let _ = match reason {
+            Reason::Stay(_) => Ok(()),
+            Reason::Copy => updater.install(),
+            Reason::Revert => updater.revert(),
+        };
         Session {
-            device: ServiceDevice::new(&DICTIONARY, identity.node_id, Program::new(updater, TARGET)),
+            device: ServiceDevice::new(&DICTIONARY, identity.node_id, Program::new(updater)),
             can,
             timing: identity.timing.unwrap_or(BitTiming::FASTEST),
             back_off: BackOff::default(),
-            is_resuming: reason == Reason::Copy,
+            is_resuming: !matches!(reason, Reason::Stay(_)),
             reset: None,
         }
     }
@@ -142,8 +144,13 @@ impl Session {
 
     /// The copy of an earlier start is finished or was refused: the application starts in either case, if the application is good.
     fn start_if_good(&mut self, now: Instant) {
-        let start = Start { stay: false, trial: retained::trial(), proof: Proof::Waived };
-        let flash = self.device.application_mut().updater().flash();
+        let updater = self.device.application_mut().updater();
+        if updater.phase() == Phase::Installed {
+            // Of another image.
+            retained::set_crashes(Crashes::default());
+        }
+        let start = Start { crashes: retained::crashes(), proof: Proof::Waived, ..Start::default() };
+        let flash = updater.flash();
         if matches!(update::boot(flash, &TARGET, start), Decision::Start(_)) {
             self.reset = Some(now);
         }
@@ -172,7 +179,7 @@ impl Session {
             next = self.device.poll(Clock::now(), out);
         }
         if self.device.application().starts() {
-            retained::set_trial(retained::trial().confirmed());
+            retained::set_crashes(Crashes::default());
             self.reset_soon();
         }
         next.due()

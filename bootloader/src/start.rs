@@ -15,6 +15,8 @@ pub(crate) enum Reason {
     Stay(Status),
     /// A checked image waits to be copied.
     Copy,
+    /// The image before the one in place is to come back.
+    Revert,
 }
 
 /// What a start has come to.
@@ -32,21 +34,25 @@ pub(crate) fn decide(loader: &mut Loader) -> Outcome {
     if let Some(note) = note {
         retained::hand_over(&Handover { stay: false, ..note });
     }
-    let trial = retained::trial().after(loader.reset);
-    retained::set_trial(trial);
+    let crashes = retained::crashes().after(loader.reset);
+    retained::set_crashes(crashes);
     if loader.reset == Reset::Power {
         retained::forget_proof();
     }
-    let start = Start { stay: note.is_some_and(|note| note.stay), trial, proof: retained::proof() };
+    let stay = note.is_some_and(|note| note.stay);
+    let start = Start { stay, reset: loader.reset, crashes, proof: retained::proof() };
     let mut seal = 0;
     match update::boot_sealed(&mut loader.flash, &TARGET, start, &mut seal) {
         Decision::Start(_) => {
             retained::set_proof(seal);
-            application::vectors().map_or(stay(Stay::Asked, note), Outcome::Application)
+            application::vectors().map_or(self::stay(Stay::Asked, note), Outcome::Application)
         }
         Decision::Copy => Outcome::Stay(Reason::Copy, note),
-        Decision::Stay(why @ Stay::NoProgram(_)) => unsigned().map_or(stay(why, note), Outcome::Application),
-        Decision::Stay(why) => stay(why, note),
+        Decision::Revert => Outcome::Stay(Reason::Revert, note),
+        Decision::Stay(why @ Stay::NoProgram(_)) => {
+            unsigned().map_or(self::stay(why, note), Outcome::Application)
+        }
+        Decision::Stay(why) => self::stay(why, note),
     }
 }
 

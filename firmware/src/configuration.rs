@@ -3,10 +3,12 @@
 use core::mem::MaybeUninit;
 
 use bsp::reset_cause::ResetCause;
+use bsp::update_layout::LAYOUT;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
 use node::{BitRate, Fault, Identity, LastingRecord, NodeId, Parameters, Personality, Protocol, Setup};
 use profiles::board::{ChipThermometer, LASTING_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
+use update::Trial;
 
 use crate::bit_rate::Rate;
 
@@ -50,7 +52,11 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
     let protocol = make(place, &setup);
     let parameters = protocol.load(&mut view);
     let lasting = LastingRecord::read(&mut view);
-    Loaded { protocol, parameters, setup, rate, boot_data: fault, store: prepare(view), lasting }
+    let mut store = prepare(view);
+    if let Some(store) = &mut store {
+        protocol.set_trial(Trial::read(&mut store.flash().trial(), &LAYOUT));
+    }
+    Loaded { protocol, parameters, setup, rate, boot_data: fault, store, lasting }
 }
 
 /// Not inlined: the stack on which the value is made is free again for what reads the flash.

@@ -241,6 +241,7 @@ mod app {
     #[task(binds = SDIO, priority = 1, local = [storage], shared = [protocol, transmit, retained, &watchdog])]
     fn store(mut cx: store::Context) {
         let mut node = (cx.shared.protocol, cx.shared.transmit);
+        cx.local.storage.judge(&mut node);
         cx.local.storage.run(&mut node);
         let retained = cx.shared.retained.lock(|retained| *retained);
         cx.local.storage.keep(&retained, &mut node);

@@ -10,7 +10,7 @@ use bsp::losses::{EVENTS, Event, Losses};
 use bsp::transmit_queue::TransmitQueue;
 use bsp::{Alarm, Clock, Frames, retained};
 use canopen::{Duration, Instant};
-use node::fault::{PARAMETER_STORE, UNEXPECTED_RESET};
+use node::fault::{PARAMETER_STORE, PROGRAM_TAKEN_BACK, UNEXPECTED_RESET};
 use node::{Action, BusEvent, Fault, Next, NodeId, Parameters, Protocol};
 
 use crate::bit_rate::Rate;
@@ -107,10 +107,12 @@ impl Services {
         let now = Clock::now();
         let next = self.call(node, |protocol, out| protocol.poll_services(now, out));
         let next = self.settle(next, node);
-        let trial = retained::trial();
-        if now >= CONFIRMATION && trial != trial.confirmed() && self.is_well(node) {
-            retained::set_trial(trial.confirmed());
+        let crashes = retained::crashes();
+        if now >= CONFIRMATION && crashes != crashes.confirmed() && self.is_well(node) {
+            retained::set_crashes(crashes.confirmed());
         }
+        let is_on_bus = self.can.state() != BusState::Off;
+        node.call(|protocol, _| protocol.judge(now, is_on_bus));
         self.led.set(blink(now));
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
         // It tells the watchdog that it is there, whether there is something to store or not.
@@ -237,6 +239,12 @@ impl Services {
             // The messages go out with the next poll.
             for fault in faults.all() {
                 let _ = protocol.set_fault(fault, true, now);
+            }
+            // It is told, and over: the program that runs is well.
+            if protocol.is_taken_back() {
+                for is_active in [true, false] {
+                    let _ = protocol.set_fault(&PROGRAM_TAKEN_BACK, is_active, now);
+                }
             }
             next
         });

@@ -3,10 +3,12 @@
 
 use bsp::Clock;
 use bsp::ParameterFlash;
+use bsp::update_layout::LAYOUT;
 use canopen::sdo::Abort;
-use node::{LastingRecord, StoreJob};
+use node::{LastingRecord, StoreJob, Verdict};
 use profiles::board::RETAINED_WORDS;
 use storage::Store;
+use update::Trial;
 
 use crate::SERVICES;
 use crate::shared::Shared;
@@ -48,13 +50,41 @@ impl StorageTask {
         }
     }
 
-    /// Does the job that waits, if one does.
+    /// Does what the protocol has found about the trial of this program.
+    pub(crate) fn judge(&mut self, node: &mut impl Shared) {
+        let Some(verdict) = node.call(|protocol, _| protocol.verdict()) else { return };
+        let Some(store) = &mut self.store else { return };
+        let mut records = store.flash().trial();
+        let is_done = match verdict {
+            Verdict::Confirm => Trial::confirm(&mut records, &LAYOUT).is_ok(),
+            Verdict::TakeBack => Trial::withdraw(&mut records, &LAYOUT).is_ok(),
+        };
+        match verdict {
+            // The next turn tries again.
+            _ if !is_done => defmt::error!("the trial of this program cannot be ended"),
+            Verdict::Confirm => {
+                defmt::info!("this program is confirmed");
+                node.call(|protocol, _| protocol.end_trial());
+            }
+            Verdict::TakeBack => {
+                defmt::warn!("the program before this one comes back");
+                cortex_m::peripheral::SCB::sys_reset()
+            }
+        }
+    }
+
+    /// Does the job that waits, if one does. A program on trial stores nothing: the one before it has to find its settings.
     pub(crate) fn run(&mut self, node: &mut impl Shared) {
         let job = &mut *self.job;
         if !node.call(|protocol, _| protocol.take_job(job)) {
             return;
         }
-        let result = self.store.as_mut().map_or(Err(Abort::Hardware), |store| job.run(store));
+        let is_on_trial = node.call(|protocol, _| protocol.is_on_trial());
+        let result = match &mut self.store {
+            Some(_) if is_on_trial => Err(Abort::DeviceState),
+            Some(store) => job.run(store),
+            None => Err(Abort::Hardware),
+        };
         match result {
             Ok(()) => defmt::info!("stored"),
             Err(abort) => defmt::error!("not stored: {=u32:#010x}", abort.code()),

@@ -17,7 +17,7 @@ pub struct BitTiming {
 /// Prescaler and segments with the sample point near the 87.5 % that CiA 301 asks for. The second segment has two quanta: with one, as
 /// eight quanta a bit would have it, the answer of a receiver whose clock is a quantum ahead falls on the sample point of the
 /// transmitter as soon as the oscillators are 0.1 % apart (`host-tests/tests/node/bit_timing.rs`).
-const TABLE: [BitTiming; 8] = [
+static TABLE: [BitTiming; 8] = [
     BitTiming { kbit: 1000, prescaler: 2, segment1: 15, segment2: 2 },
     BitTiming { kbit: 800, prescaler: 3, segment1: 12, segment2: 2 },
     BitTiming { kbit: 500, prescaler: 4, segment1: 15, segment2: 2 },
@@ -39,12 +39,28 @@ const _: () = {
 
 impl BitTiming {
     /// Bit timing of 1 Mbit/s.
-    pub const FASTEST: BitTiming = TABLE[0];
+    pub const FASTEST: BitTiming = BitTiming::at(1000);
 
     /// The timing for a bit rate in kbit/s; `None` when it is none of CiA 301.
     #[must_use]
-    pub fn of(kbit: u16) -> Option<BitTiming> {
-        TABLE.into_iter().find(|timing| timing.kbit == kbit)
+    #[inline(never)]
+    pub const fn of(kbit: u16) -> Option<BitTiming> {
+        let mut rest = TABLE.as_slice();
+        while let [timing, others @ ..] = rest {
+            if timing.kbit == kbit {
+                return Some(*timing);
+            }
+            rest = others;
+        }
+        None
+    }
+
+    /// The same for a bit rate that is known to the compiler, which refuses any other.
+    pub(crate) const fn at(kbit: u16) -> BitTiming {
+        match BitTiming::of(kbit) {
+            Some(timing) => timing,
+            None => panic!("no bit rate of CiA 301"),
+        }
     }
 
     /// The bit rate in kbit/s.

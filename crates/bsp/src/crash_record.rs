@@ -83,10 +83,10 @@ impl Crash {
     /// The record to leave in RAM.
     #[must_use]
     pub fn seal(&self) -> Sealed {
-        let mut words = [0; WORDS];
         let (kind, content) = self.content();
-        let body = [MAGIC, kind].into_iter().chain(content);
-        words.iter_mut().zip(body).for_each(|(to, from)| *to = from);
+        let mut words = [0; WORDS];
+        (words[0], words[1]) = (MAGIC, kind);
+        words.iter_mut().skip(2).zip(content).for_each(|(to, from)| *to = from);
         words[WORDS - 1] = check(&words);
         words
     }

@@ -15,8 +15,8 @@ use canopen::{Duration, Instant};
 use crate::bit_rate_detection::{Detector, Heard, Step};
 use crate::bit_timing::BitTiming;
 
-/// Where a node without a bit rate waits on a silent bus, in kbit/s (as CMP 8271 does).
-const ASSUMED: u16 = 250;
+/// Where a node without a bit rate waits on a silent bus (as CMP 8271 does).
+const ASSUMED: BitTiming = BitTiming::at(250);
 /// So long the frame of a sender that is alone may look like an error: 16 attempts of 135 bits and an error flag at 250 kbit/s
 /// make the sender error passive.
 const ATTEMPTS: Duration = Duration::from_millis(12);
@@ -40,7 +40,7 @@ impl Guest {
     pub fn new(stored: Option<BitTiming>) -> (Guest, Step) {
         match stored {
             Some(timing) => (Guest(State::Trying), Step::Found(timing)),
-            None => (Guest(State::Resting(None)), Step::Listen(assumed())),
+            None => (Guest(State::Resting(None)), Step::Listen(ASSUMED)),
         }
     }
 
@@ -70,7 +70,7 @@ impl Guest {
             | (State::Trying | State::Resting(None), Heard::Silence)
             | (State::Trying, Heard::Nobody) => return Step::Stay,
             (State::Trying, Heard::Frame) => (State::Staying, Step::Stay),
-            (State::Resting(_), Heard::Frame) => (State::Staying, Step::Found(assumed())),
+            (State::Resting(_), Heard::Frame) => (State::Staying, Step::Found(ASSUMED)),
             (State::Resting(None), _) => (State::Resting(Some(now)), Step::Stay),
             (State::Resting(Some(since)), _) if now < *since + ATTEMPTS => return Step::Stay,
             (State::Trying, Heard::Error) | (State::Resting(_), _) => search(now),
@@ -88,10 +88,6 @@ fn search(now: Instant) -> (State, Step) {
     let detector = Detector::new(now);
     let timing = detector.timing();
     (State::Searching(detector), Step::Listen(timing))
-}
-
-fn assumed() -> BitTiming {
-    BitTiming::of(ASSUMED).unwrap_or(BitTiming::FASTEST)
 }
 
 #[cfg(test)]

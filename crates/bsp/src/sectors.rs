@@ -4,7 +4,7 @@
 pub const FLASH: u32 = 0x0800_0000;
 const KIB: u32 = 1024;
 /// Of a part with 512 KiB; the larger ones go on in the same way.
-const SIZES: [u32; 8] = [16 * KIB, 16 * KIB, 16 * KIB, 16 * KIB, 64 * KIB, 128 * KIB, 128 * KIB, 128 * KIB];
+static SIZES: [u32; 8] = [16 * KIB, 16 * KIB, 16 * KIB, 16 * KIB, 64 * KIB, 128 * KIB, 128 * KIB, 128 * KIB];
 
 /// A sector: what an erase erases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub struct Sector {
 
 /// All sectors, in order.
 pub fn all() -> impl Iterator<Item = Sector> {
-    (0..).zip(SIZES).scan(FLASH, |next, (number, size)| {
+    (0..).zip(&SIZES).scan(FLASH, |next, (number, &size)| {
         let start = *next;
         *next += size;
         Some(Sector { number, start, size })

@@ -5,7 +5,7 @@ use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, Part, Soundness};
-use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY};
+use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY, PROGRAM_TRIAL};
 use profiles::fault::Flags;
 use profiles::{AnyProfile, Snapshot};
 
@@ -14,6 +14,7 @@ use crate::configured::Configured;
 use crate::fault::{CONDITIONS, flag_of};
 use crate::stored::Stored;
 use crate::transfer_buffer::TransferBuffer;
+use crate::trial::ProgramTrial;
 
 /// How many kinds of lost events there are: sub-indexes 1 to this one of 2001h.
 pub const LOST_EVENTS: usize = LOST_EVENT_KINDS as usize;
@@ -31,6 +32,7 @@ pub(crate) struct NodeApplication {
     pub(crate) stored: Stored,
     /// As counted by the firmware (2001h).
     pub(crate) lost_events: [u32; LOST_EVENTS],
+    pub(crate) trial: ProgramTrial,
     buffer: TransferBuffer,
 }
 
@@ -44,6 +46,7 @@ impl NodeApplication {
             flags: Flags::default(),
             stored: Stored::NOTHING,
             lost_events: [0; LOST_EVENTS],
+            trial: ProgramTrial::default(),
             buffer: TransferBuffer::EMPTY,
         }
     }
@@ -88,15 +91,21 @@ impl Application for NodeApplication {
         show(0x1018, 3, &product::REVISION.to_le_bytes());
         show(0x1018, 4, &setup.serial_number.to_le_bytes());
         show(0x1F56, 1, &setup.program_id.to_le_bytes());
-        show(0x1F57, 1, &self.stored.flash_status().to_le_bytes());
+        let status = self.trial.flash_status().unwrap_or(self.stored.flash_status());
+        show(0x1F57, 1, &status.to_le_bytes());
         self.profile.initialise(image);
         self.show_personality(image);
         self.show_flags(image);
         self.show_lost_events(image);
+        self.show_trial(image);
         self.show_values(image);
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if entry.index() == PROGRAM_TRIAL {
+            let is_at_work = self.has_measured();
+            return self.trial.command(bytes, is_at_work);
+        }
         self.profile.write(entry, bytes, image)
     }
 

@@ -18,6 +18,9 @@ pub const OLDER_BOOT_DATA: Fault = with_detail("OlderBootData", OLDER_HOLDS);
 /// The node restarted without having been told to.
 pub const UNEXPECTED_RESET: Fault = fault("UnexpectedReset", 0x6101, Flags::system(6));
 
+/// A new program has failed its trial, and the one before is back (2002h).
+pub const PROGRAM_TAKEN_BACK: Fault = fault("ProgramTakenBack", 0x6102, Flags::NONE);
+
 /// First byte of the error field of an EMCY about stored data, as in [`canopen::Fault::OlderData`] and
 /// [`canopen::Fault::StoredData`].
 const OLDER_HOLDS: u8 = 1;
@@ -29,7 +32,7 @@ const fn with_detail(name: &'static str, holds: u8) -> Fault {
 }
 
 /// The faults that no profile finds.
-const OWN: &[Fault] = &[PARAMETER_STORE, BOOT_DATA, OLDER_BOOT_DATA, UNEXPECTED_RESET];
+const OWN: &[Fault] = &[PARAMETER_STORE, BOOT_DATA, OLDER_BOOT_DATA, UNEXPECTED_RESET, PROGRAM_TAKEN_BACK];
 
 const LISTS: &[&[Fault]] = &[OWN, &profiles::FAULTS];
 

@@ -21,6 +21,7 @@ mod store_job;
 mod stored;
 mod storing;
 mod transfer_buffer;
+mod trial;
 
 pub use application::LOST_EVENTS;
 pub use canopen::lss::BitRate;
@@ -34,3 +35,4 @@ pub use profiles::{Measurement, Parameters, Personality, Snapshot};
 pub use protocol::Protocol;
 pub use setup::Setup;
 pub use store_job::StoreJob;
+pub use trial::Verdict;

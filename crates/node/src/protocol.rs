@@ -70,18 +70,19 @@ impl Protocol {
     /// Whether the node does what it is for: it has said its boot-up message, and values were measured.
     #[must_use]
     pub fn is_at_work(&self) -> bool {
-        self.state() != State::Initialising
-            && !matches!(self.device.application().snapshot, Snapshot::Nothing)
+        self.state() != State::Initialising && self.device.application().has_measured()
     }
 
     /// A frame of FIFO 0: NMT, SYNC, RPDO, or a remote request for a TPDO.
     pub fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        self.note_master(frame);
         let next = self.device.on_process_frame(frame, now, out);
         self.note(next)
     }
 
     /// A frame of FIFO 1: everything else.
     pub fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit) -> Next {
+        self.note_master(frame);
         let next = self.device.on_service_frame(frame, now, out);
         self.note(next)
     }

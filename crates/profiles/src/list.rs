@@ -102,12 +102,14 @@ macro_rules! personalities {
                 pub(crate) static FIELDS: <own::Objects as $crate::profile::Profile>::Fields =
                     own::fields(list::Personality::$Name.dictionary());
 
-                // A row that its profile does not handle, or a rule without a row, does not compile.
+                // A row that neither its profile nor the node handles, or a rule without a row, does not compile.
                 const _: () = {
                     let mut i = 0;
                     while i < ROWS.len() {
                         let is_handled = $crate::table::is_handled(&ROWS[i]);
-                        assert!(is_handled == own::handles(ROWS[i].index, ROWS[i].sub), "a row and its rule");
+                        let (index, sub) = (ROWS[i].index, ROWS[i].sub);
+                        let has_rule = own::handles(index, sub) || $crate::communication::handles(index, sub);
+                        assert!(is_handled == has_rule, "a row and its rule");
                         i += 1;
                     }
                 };

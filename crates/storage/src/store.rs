@@ -23,6 +23,11 @@ pub struct Store<F> {
 }
 
 impl<F: NorFlash> Store<F> {
+    /// The flash, for what lies beside the pages.
+    pub fn flash(&mut self) -> &mut F {
+        &mut self.view.flash
+    }
+
     /// Makes the store ready for saving: erases whatever page is not in use and not erased yet. Where the page in use
     /// was cut or damaged, first moves what can be read to the other page, so that nothing is ever appended to doubtful
     /// words, and what this start has read holds for good.

@@ -2,8 +2,8 @@
 
 use core::ops::Range;
 
-use crate::commit::RECORD_ROOM;
 use crate::header::HEADER;
+use crate::record::RECORD_ROOM;
 use crate::security::Security;
 
 /// Consecutive sectors, of whatever sizes.
@@ -59,13 +59,14 @@ pub struct Layout {
     security: Area,
     application: Area,
     staging: Area,
+    kept: Area,
 }
 
 impl Layout {
     /// A layout; `None` when there is no room for an image, or for a security counter.
     #[must_use]
-    pub const fn new(security: Area, application: Area, staging: Area) -> Option<Layout> {
-        let layout = Layout { security, application, staging };
+    pub const fn new(security: Area, application: Area, staging: Area, kept: Area) -> Option<Layout> {
+        let layout = Layout { security, application, staging, kept };
         let fits = layout.longest_image() > HEADER && layout.highest_counter() > 0;
         if fits { Some(layout) } else { None }
     }
@@ -88,12 +89,18 @@ impl Layout {
         self.staging
     }
 
-    /// Bytes of the longest image, header and code: it fits the application area, and staging beside the commit record.
+    /// Where the image that ran before is kept while the one in the application area is on trial, with a record as that of staging.
+    #[must_use]
+    pub const fn kept(&self) -> Area {
+        self.kept
+    }
+
+    /// Bytes of the longest image, header and code: it fits the application area, and staging and the kept image beside their
+    /// records.
     #[must_use]
     pub const fn longest_image(&self) -> u32 {
-        let (application, staged) =
-            (self.application.size(), self.staging.size().saturating_sub(RECORD_ROOM));
-        if application < staged { application } else { staged }
+        let beside_record = least(self.staging.size(), self.kept.size()).saturating_sub(RECORD_ROOM);
+        least(self.application.size(), beside_record)
     }
 
     /// The highest security counter that an image may have.
@@ -101,6 +108,10 @@ impl Layout {
     pub const fn highest_counter(&self) -> u32 {
         Security(self.security).highest_counter()
     }
+}
+
+const fn least(one: u32, other: u32) -> u32 {
+    if one < other { one } else { other }
 }
 
 #[cfg(test)]
@@ -119,17 +130,21 @@ mod tests {
     #[test]
     fn the_longest_image_fits_where_it_runs_and_where_it_is_staged() {
         let (security, application) = (Area::new(0, &[256]), Area::new(256, &[1024, 2048]));
-        let longest = |staging: Area| Layout::new(security, application, staging).unwrap().longest_image();
-        assert_eq!(longest(Area::new(3328, &[2048, 2048])), 3072);
-        assert_eq!(longest(Area::new(3328, &[2048, 1024])), 2560, "the commit record takes 512");
+        let (short, long) = (Area::new(3328, &[2048, 1024]), Area::new(3328, &[2048, 2048]));
+        let longest =
+            |staging, kept| Layout::new(security, application, staging, kept).unwrap().longest_image();
+        assert_eq!(longest(long, long), 3072);
+        assert_eq!(longest(short, long), 2560, "the commit record takes 512");
+        assert_eq!(longest(long, short), 2560, "the record of the kept image does so");
     }
 
     #[test]
     fn areas_that_are_too_small_are_refused() {
         let (security, image) = (Area::new(0, &[256]), Area::new(256, &[2048]));
-        assert!(Layout::new(security, image, image).is_some());
-        assert!(Layout::new(Area::new(0, &[128]), image, image).is_none());
-        assert!(Layout::new(security, Area::new(256, &[512]), image).is_none());
-        assert!(Layout::new(security, image, Area::new(256, &[1024])).is_none());
+        assert!(Layout::new(security, image, image, image).is_some());
+        assert!(Layout::new(Area::new(0, &[128]), image, image, image).is_none());
+        assert!(Layout::new(security, Area::new(256, &[512]), image, image).is_none());
+        assert!(Layout::new(security, image, Area::new(256, &[1024]), image).is_none());
+        assert!(Layout::new(security, image, image, Area::new(256, &[1024])).is_none());
     }
 }

@@ -1,21 +1,24 @@
 //! What to do at a start.
 
-use crate::commit::{Commit, Record};
+use crate::crashes::{Crashes, Reset};
 use crate::flash::Flash;
 use crate::header::Header;
 use crate::image::{self, FullCheck};
+use crate::record::Commit;
 use crate::refusal::Refusal;
 use crate::status::Status;
 use crate::target::Target;
-use crate::trial::Trial;
+use crate::trial::{self, Trial};
 
 /// What a start has to go by besides the flash.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Start {
     /// The application was told to enter the bootloader (1F51h = 0 or 2).
     pub stay: bool,
+    /// Why the chip was reset.
+    pub reset: Reset,
     /// The crashes of the application, this reset counted.
-    pub trial: Trial,
+    pub crashes: Crashes,
     /// How far the signature of the application is proven.
     pub proof: Proof,
 }
@@ -41,6 +44,8 @@ pub enum Decision {
     /// A checked image waits in staging: [`crate::Updater::install`], then ask again. If the answer is the same then, the
     /// copy has failed; stay with what [`crate::Updater::status`] says.
     Copy,
+    /// The trial of the application is lost: [`crate::Updater::revert`], then ask again.
+    Revert,
     /// Stay in the bootloader.
     Stay(Stay),
 }
@@ -72,8 +77,9 @@ impl Stay {
 /// Decides at every start. It reads the application once for its CRC and, without a [`Proof`], for its signature, so the clock
 /// should be fast by then: whoever has put an application there, and whatever has become of it since, only one that is signed
 /// starts. It writes where a commit was cut: a record that may read
-/// otherwise next time is revoked, so what this start decides holds for good. And it keeps the security counter of an application
-/// that is found to be signed, and the keys that this application revokes.
+/// otherwise next time is revoked, so what this start decides holds for good. It counts the starts of an application on trial that
+/// nobody asked for. And it keeps the security counter of an application that is found to be signed and is not on trial, and the
+/// keys that this application revokes.
 ///
 /// `flash` must not be busy.
 pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision {
@@ -84,22 +90,27 @@ pub fn boot<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Decision 
 /// the decision; what the word was before is lost. To start the application without this word is not allowed: see crate bsp.
 pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal: &mut u32) -> Decision {
     let commit = commit(flash, target);
-    let crashes = start.trial.crashes();
-    if let Ok(header) = proven(flash, target, start.proof) {
-        note(flash, target, &header);
+    let trial = trial(flash, target, start);
+    let is_on_trial = matches!(trial, Trial::Open | Trial::Lost(_));
+    let crashes = start.crashes.count();
+    if !is_on_trial {
+        note_proven(flash, target, start.proof);
     }
     if commit == Commit::Pending {
         return Decision::Copy;
     }
+    if let Trial::Lost(_) = trial {
+        return Decision::Revert;
+    }
     if start.stay {
         return Decision::Stay(Stay::Asked);
     }
-    if crashes >= Trial::LIMIT {
+    if crashes >= Crashes::LIMIT {
         return Decision::Stay(Stay::Crashes(crashes));
     }
     match sealed(flash, target, start.proof, seal) {
         Ok(header) => {
-            if start.proof != Proof::Waived {
+            if start.proof != Proof::Waived && !is_on_trial {
                 note(flash, target, &header);
             }
             Decision::Start(header)
@@ -113,8 +124,8 @@ pub fn boot_sealed<F: Flash>(flash: &mut F, target: &Target, start: Start, seal:
 
 /// What the commit record says, after a torn one was revoked.
 fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
-    let record = Record(target.layout.staging().end());
-    let commit = record.read(flash).unwrap_or(Commit::None);
+    let record = trial::staged(&target.layout);
+    let commit = record.read(flash);
     if commit == Commit::Torn {
         // Should it fail, the next start tries again.
         let _ = record.revoke(flash);
@@ -122,10 +133,23 @@ fn commit<F: Flash>(flash: &mut F, target: &Target) -> Commit {
     commit
 }
 
-/// The header of the application, when its signature was found good since power-on. It has run, and may be about to be replaced.
-fn proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Result<Header, Refusal> {
-    let header = image::header(flash, target.layout.application())?;
-    if proof == Proof::Of(header.crc()) { Ok(header) } else { Err(Refusal::Signature) }
+/// How the trial stands, after this start was counted.
+fn trial<F: Flash>(flash: &mut F, target: &Target, start: Start) -> Trial {
+    let is_counted = start.reset != Reset::Asked && start.proof != Proof::Waived;
+    if is_counted && Trial::read(flash, &target.layout) == Trial::Open {
+        // Should it fail, the next start tries again.
+        let _ = trial::strike(flash, &target.layout);
+    }
+    Trial::read(flash, &target.layout)
+}
+
+/// The application whose signature was found good since power-on has run, and may be about to be replaced.
+fn note_proven<F: Flash>(flash: &mut F, target: &Target, proof: Proof) {
+    if let Ok(header) = image::header(flash, target.layout.application())
+        && proof == Proof::Of(header.crc())
+    {
+        note(flash, target, &header);
+    }
 }
 
 /// Nothing older than this application runs from now on.
@@ -144,8 +168,7 @@ pub fn application<F: Flash>(flash: &mut F, target: &Target, proof: Proof) -> Re
 
 fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32) -> Result<Header, Refusal> {
     let area = target.layout.application();
-    let header = image::header(flash, area)?;
-    target.admit(flash, &header)?;
+    let header = image::admitted(flash, target, area)?;
     let is_proven = proof == Proof::Waived || proof == Proof::Of(header.crc());
     let mut check = if is_proven { FullCheck::of_sum(header, area) } else { FullCheck::of(header, area) };
     loop {

@@ -1,5 +1,5 @@
-//! The copy from staging to the application area. The header comes last and its CRC last of all, so a copy that was cut is
-//! no application.
+//! The copy of an image from one area to another. The header comes last and its CRC last of all, so a copy that was cut is
+//! no image.
 
 use core::ops::Range;
 
@@ -8,28 +8,27 @@ use crate::flash::{CHUNK, CHUNK_LEN, Flash, first, program};
 use crate::header::{HEADER_LEN, Header};
 use crate::image::{self, CrcCheck};
 use crate::refusal::Refusal;
-use crate::target::Target;
 
-/// A copy under way: the application area is erased, the staged image is checked.
+/// A copy, about to begin or under way: the image is checked, and its new place is erased before the first step.
 pub(crate) struct Copy {
     header: Header,
-    application: Area,
-    /// Distance from the application area to staging.
+    to: Area,
+    /// How far behind its new place the code is.
     distance: u32,
-    /// Code that is not copied yet, in the application area.
+    /// Code that is not copied yet, in its new place.
     rest: Range<u32>,
     crc: CrcCheck,
 }
 
 impl Copy {
-    pub(crate) fn new(header: Header, target: &Target) -> Copy {
-        let (application, staging) = (target.layout.application(), target.layout.staging());
+    /// Of the image with this header.
+    pub(crate) fn new(header: Header, from: Area, to: Area) -> Copy {
         Copy {
             header,
-            application,
-            distance: staging.start().wrapping_sub(application.start()),
-            rest: image::code(&header, application),
-            crc: CrcCheck::new(&header, application),
+            to,
+            distance: from.start().wrapping_sub(to.start()),
+            rest: image::code(&header, to),
+            crc: CrcCheck::new(&header, to),
         }
     }
 
@@ -58,7 +57,7 @@ impl Copy {
         const { assert!(HEADER_LEN == 2 * CHUNK, "two chunks") };
         let bytes = self.header.encode();
         let (start, end) = bytes.split_at(CHUNK);
-        program(flash, self.application.start(), start)?;
-        program(flash, self.application.start().saturating_add(CHUNK_LEN), end)
+        program(flash, self.to.start(), start)?;
+        program(flash, self.to.start().saturating_add(CHUNK_LEN), end)
     }
 }

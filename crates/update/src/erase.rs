@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use crate::area::Area;
-use crate::flash::{Flash, read_step};
+use crate::flash::{Flash, all_are, read_step};
 use crate::refusal::Refusal;
 
 /// An erase under way.
@@ -48,7 +48,7 @@ impl Erase {
     fn prove<F: Flash>(&mut self, flash: &mut F) -> Result<bool, Refusal> {
         let mut erased = true;
         self.rest.start = read_step(flash, self.rest.clone(), |bytes| {
-            erased &= bytes.iter().all(|byte| *byte == 0xFF);
+            erased &= all_are(bytes, 0xFF);
         })?;
         if erased { Ok(self.rest.is_empty()) } else { Err(Refusal::NotCleared) }
     }

@@ -79,6 +79,12 @@ pub(crate) fn read_step<F: Flash>(
     Ok(end)
 }
 
+/// Whether all bytes have this value.
+#[inline(never)] // Many places, little room.
+pub(crate) fn all_are(bytes: &[u8], value: u8) -> bool {
+    bytes.iter().all(|byte| *byte == value)
+}
+
 /// At most `len` bytes of `buffer`.
 pub(crate) fn first(buffer: &mut [u8], len: u32) -> &mut [u8] {
     let len = buffer.len().min(len as usize);

@@ -18,6 +18,12 @@ pub(crate) fn header<F: Flash>(flash: &mut F, area: Area) -> Result<Header, Refu
     Header::parse(&bytes)
 }
 
+/// The header at the start of `area`, when the image may run on this node if the rest of it is good.
+pub(crate) fn admitted<F: Flash>(flash: &mut F, target: &Target, area: Area) -> Result<Header, Refusal> {
+    let header = header(flash, area)?;
+    target.admit(flash, &header).map(|()| header)
+}
+
 /// Where the code of an image in `area` is.
 pub(crate) fn code(header: &Header, area: Area) -> Range<u32> {
     let start = area.start();
@@ -27,8 +33,7 @@ pub(crate) fn code(header: &Header, area: Area) -> Range<u32> {
 /// The header of the staged image, when it may take the place of the application: it may run on this node, and its security counter
 /// is not lower than that of the application, which may not have been noted yet.
 pub(crate) fn candidate<F: Flash>(flash: &mut F, target: &Target) -> Result<Header, Refusal> {
-    let staged = header(flash, target.layout.staging())?;
-    target.admit(flash, &staged)?;
+    let staged = admitted(flash, target, target.layout.staging())?;
     let least = header(flash, target.layout.application()).map_or(0, |header| header.description().counter);
     if staged.description().counter < least { Err(Refusal::Counter { least }) } else { Ok(staged) }
 }

@@ -9,9 +9,11 @@
 //!
 //! /// What a bootloader does at a start: the application to be started, or what 1F57h reads while it stays.
 //! fn decide<F: Flash>(flash: &mut F, target: Target, start: Start) -> Result<Header, Status> {
-//!     if boot(flash, &target, start) == Decision::Copy {
+//!     let decision = boot(flash, &target, start);
+//!     if matches!(decision, Decision::Copy | Decision::Revert) {
 //!         let mut updater = Updater::new(&mut *flash, target, Status::GOOD);
-//!         let _ = updater.install(); // a refusal shows in the status
+//!         // A refusal shows in the status.
+//!         let _ = if decision == Decision::Copy { updater.install() } else { updater.revert() };
 //!         while updater.poll() != Next::Nothing { /* serve the bus */ }
 //!         if updater.status() != Status::GOOD {
 //!             return Err(updater.status());
@@ -20,7 +22,7 @@
 //!     match boot(flash, &target, start) {
 //!         Decision::Start(header) => Ok(header),
 //!         Decision::Stay(stay) => Err(stay.status()),
-//!         Decision::Copy => Err(Stay::Asked.status()),
+//!         Decision::Copy | Decision::Revert => Err(Stay::Asked.status()),
 //!     }
 //! }
 //! ```
@@ -50,8 +52,8 @@ extern crate std;
 
 mod area;
 mod boot;
-mod commit;
 mod copy;
+mod crashes;
 mod erase;
 mod flash;
 mod header;
@@ -60,6 +62,7 @@ pub mod key;
 #[cfg(feature = "mock")]
 pub mod mock;
 mod receive;
+mod record;
 mod refusal;
 mod seal;
 mod security;
@@ -71,11 +74,12 @@ mod updater;
 
 pub use area::{Area, Layout};
 pub use boot::{Decision, Proof, Start, Stay, application, boot, boot_sealed};
+pub use crashes::{Crashes, Reset};
 pub use flash::Flash;
 pub use header::{Description, HEADER_LEN, Header, SIGNATURE_LEN, SIGNED_LEN, Version};
 pub use refusal::Refusal;
 pub use signature::CONTEXT;
 pub use status::Status;
 pub use target::Target;
-pub use trial::{Reset, Trial};
+pub use trial::{Reason, Trial};
 pub use updater::{Next, Phase, Updater};

@@ -1,6 +1,7 @@
 //! Why an image or a command is refused, and the code of each reason in 1F57h.
 
 use crate::status::Status;
+use crate::trial::Reason;
 
 /// Why there is no update, or no start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +55,11 @@ pub enum Refusal {
         /// How often.
         count: u8,
     },
+    /// The application has failed its trial, and the one before is back.
+    TakenBack {
+        /// Why.
+        reason: Reason,
+    },
 }
 
 impl Refusal {
@@ -76,6 +82,7 @@ impl Refusal {
             Refusal::Excess => 69,
             Refusal::Crashes { .. } => 70,
             Refusal::Revoked { .. } => 71,
+            Refusal::TakenBack { .. } => 72,
         }
     }
 
@@ -88,6 +95,8 @@ impl Refusal {
             Refusal::Counter { least } => u16::try_from(least).unwrap_or(u16::MAX),
             Refusal::Crashes { count } => count.into(),
             Refusal::Revoked { key } => key.into(),
+            Refusal::TakenBack { reason: Reason::Starts } => 1,
+            Refusal::TakenBack { reason: Reason::Withdrawn } => 2,
             _ => 0,
         }
     }

@@ -12,8 +12,9 @@
 //! zeros may be programmed once more over such a word.
 
 use crate::area::Area;
-use crate::flash::{Flash, first, program};
+use crate::flash::Flash;
 use crate::header::{Description, Header, MOST_KEYS};
+use crate::record::{is_zero, mark};
 use crate::refusal::Refusal;
 
 /// Room of a mark in either half: a word of whatever size.
@@ -77,11 +78,10 @@ impl Security {
     }
 
     /// Sets both words, where they are not: one of them may have been cut.
-    fn set<F: Flash>(self, flash: &mut F, mark: u32) -> Result<(), Refusal> {
-        for place in self.places(mark) {
+    fn set<F: Flash>(self, flash: &mut F, number: u32) -> Result<(), Refusal> {
+        for place in self.places(number) {
             if !is_zero(flash, place)? {
-                let word = flash.word_size();
-                program(flash, place, first(&mut [0; ROOM as usize], word))?;
+                mark(flash, place)?;
             }
         }
         Ok(())
@@ -91,12 +91,6 @@ impl Security {
 /// The mark of a counter above 0.
 fn mark_of(counter: u32) -> u32 {
     counter.saturating_add(MOST_KEYS).saturating_sub(1)
-}
-
-fn is_zero<F: Flash>(flash: &mut F, place: u32) -> Result<bool, Refusal> {
-    let mut word = [0xFF; 4];
-    flash.read(place, &mut word).map_err(|_| Refusal::Unspecified)?;
-    Ok(word == [0; 4])
 }
 
 #[cfg(test)]

@@ -64,6 +64,12 @@ impl fmt::Display for Status {
             68 => f.write_str("the download ended before the image did"),
             69 => f.write_str("the download went on after the end of the image"),
             70 => write!(f, "the application crashed {detail} times without confirming itself"),
+            72 if detail == 1 => f.write_str(
+                "the new program started three times without being confirmed; the one before is back",
+            ),
+            72 => f.write_str(
+                "the new program was not confirmed in time, or was taken back; the one before is back",
+            ),
             71 => write!(f, "the key number {detail}, with which the image is signed, is revoked"),
             code => write!(f, "error {code} of the manufacturer, detail {detail}"),
         }
@@ -76,8 +82,9 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::trial::Reason;
 
-    const ALL: [Refusal; 17] = [
+    const ALL: [Refusal; 18] = [
         Refusal::NoProgram,
         Refusal::UnknownFormat,
         Refusal::HeaderCrc,
@@ -95,6 +102,7 @@ mod tests {
         Refusal::Excess,
         Refusal::Crashes { count: 3 },
         Refusal::Revoked { key: 1 },
+        Refusal::TakenBack { reason: Reason::Starts },
     ];
 
     #[test]
@@ -117,6 +125,7 @@ mod tests {
             (Refusal::Counter { least: 70_000 }, u16::MAX),
             (Refusal::Crashes { count: 5 }, 5),
             (Refusal::Revoked { key: 1 }, 1),
+            (Refusal::TakenBack { reason: Reason::Withdrawn }, 2),
             (Refusal::Signature, 0),
         ] {
             assert_eq!(Status::refused(refusal).detail, detail, "{refusal}");

@@ -1,92 +1,139 @@
-//! How often the application has crashed since it last said that it is well.
+//! The trial of a new image: the image that ran before it is kept until the new one is confirmed, and comes back when the new one
+//! fails.
+//!
+//! The trial is open from the end of the copy (the commit record of staging says *done*) for as long as the record of the kept
+//! image says *pending*; to confirm is to program *done* there. In front of the commit record of staging are the marks of
+//! the trial, which an update erases with staging:
+//!
+//! | mark | it is set |
+//! |---|---|
+//! | 0 to 2 | at each start that nobody asked for: after a crash, the watchdog, or power-on |
+//! | 3 | the trial is withdrawn: nobody has confirmed the image in time, or a master wants the one before. Also when the way back begins: marks that a cut left half programmed decide nothing any more |
+//!
+//! With mark 3, or with 0 to 2, the trial is lost. A mark is a word of zeros, as those of the record. The trial is that of one image: of
+//! an application that a debugger has put there since, nothing is said.
 
-/// The count, kept in RAM that survives a reset (region `RETAINED` of memory.x).
-///
-/// The bootloader takes it from RAM at every start, counts the reset, puts it back, and asks [`crate::boot`]. The
-/// application [confirms](Trial::confirmed) ten seconds after its start if it is on the bus and measures then, else as soon as it does. A
-/// start that is asked for (1F51h = 1) confirms too: it is another try.
+use core::ops::Range;
+
+use crate::area::{Area, Layout};
+use crate::crashes::Crashes;
+use crate::flash::Flash;
+use crate::header::HEADER;
+use crate::record::{Commit, RECORD_ROOM, Record, is_zero, mark};
+use crate::refusal::Refusal;
+
+/// Room of a mark: a word of whatever size.
+const ROOM: u32 = 8;
+/// So many starts that nobody asked for lose the trial.
+const STRIKES: u32 = Crashes::LIMIT as u32;
+/// The mark that the trial is withdrawn.
+const WITHDRAWN: u32 = STRIKES;
+
+/// How the trial of the application stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Trial(u8);
+pub enum Trial {
+    /// There is none: the application was confirmed, or nothing could have come back.
+    #[default]
+    None,
+    /// The application is to be confirmed.
+    Open,
+    /// The image before is to come back.
+    Lost(Reason),
+    /// The image before is back.
+    Over(Reason),
+}
 
-/// Why the chip was reset, as far as it matters here.
+/// Why a trial was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reset {
-    /// Power came: RAM holds nothing.
-    Power,
-    /// Somebody asked for it: an NMT command, 1F51h, the debugger.
-    Asked,
-    /// A fault, a panic or the watchdog.
-    Crash,
+pub enum Reason {
+    /// Three starts that nobody asked for, and no confirmation.
+    Starts,
+    /// No confirmation in time, or the command of a master.
+    Withdrawn,
 }
 
 impl Trial {
-    /// So many crashes without a confirmation keep the bootloader from starting the application.
-    pub const LIMIT: u8 = 3;
-
-    /// The count in a word of RAM; 0 when the word is none, as after power-up.
-    #[must_use]
-    pub fn from_word(word: u32) -> Trial {
-        let [count, ..] = word.to_le_bytes();
-        let trial = Trial(count);
-        if trial.word() == word { trial } else { Trial(0) }
-    }
-
-    /// The word to keep: the count, and its complement in the other three bytes.
-    #[must_use]
-    pub fn word(self) -> u32 {
-        u32::from_le_bytes([self.0, !self.0, !self.0, !self.0])
-    }
-
-    /// The count after a reset.
-    #[must_use]
-    pub fn after(self, reset: Reset) -> Trial {
-        match reset {
-            Reset::Power => Trial(0),
-            Reset::Asked => self,
-            Reset::Crash => Trial(self.0.saturating_add(1)),
+    /// Reads how the trial stands.
+    pub fn read<F: Flash>(flash: &mut F, layout: &Layout) -> Trial {
+        let (staged, kept) = (staged(layout).read(flash), kept(layout).read(flash));
+        let image = if staged == Commit::None { layout.kept() } else { layout.staging() };
+        let is_in_place = crc(flash, layout.application()) == crc(flash, image);
+        match (staged, kept, reason(flash, layout)) {
+            // The application may be half copied then.
+            (Commit::Done, Commit::Pending, Some(reason)) => Trial::Lost(reason),
+            (Commit::Done, Commit::Pending, None) if is_in_place => Trial::Open,
+            (Commit::None, _, Some(reason)) if is_in_place => Trial::Over(reason),
+            _ => Trial::None,
         }
     }
 
-    /// The application is well.
+    /// Where the marks and records are that a trial reads and programs, as offsets.
     #[must_use]
-    pub fn confirmed(self) -> Trial {
-        Trial(0)
+    pub fn records(layout: &Layout) -> [Range<u32>; 2] {
+        [layout.staging().end(), layout.kept().end()].map(|end| end.saturating_sub(RECORD_ROOM)..end)
     }
 
-    /// Crashes since the last confirmation.
-    #[must_use]
-    pub fn crashes(self) -> u8 {
-        self.0
+    /// The application is confirmed. To do so again does no harm.
+    ///
+    /// # Errors
+    /// [`Refusal::Write`], [`Refusal::Unspecified`].
+    pub fn confirm<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+        kept(layout).done(flash)
+    }
+
+    /// The image before is to come back at the next start.
+    ///
+    /// # Errors
+    /// [`Refusal::Write`], [`Refusal::Unspecified`].
+    pub fn withdraw<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+        mark(flash, place(layout, WITHDRAWN))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The record of staging.
+pub(crate) fn staged(layout: &Layout) -> Record {
+    Record(layout.staging().end())
+}
 
-    #[test]
-    fn what_ram_holds_after_power_up_counts_nothing() {
-        for word in [0, u32::MAX, 0x5555_5555, 0xFFFF_FF01, 3] {
-            assert_eq!(Trial::from_word(word).crashes(), 0);
-        }
-        for count in 0..=u8::MAX {
-            assert_eq!(Trial::from_word(Trial(count).word()), Trial(count));
-        }
-    }
+/// The record of the kept image.
+pub(crate) fn kept(layout: &Layout) -> Record {
+    Record(layout.kept().end())
+}
 
-    #[test]
-    fn the_word_is_the_count_and_its_complement_three_times() {
-        assert_eq!(Trial(0).word(), 0xFFFF_FF00);
-        assert_eq!(Trial(0x12).word(), 0xEDED_ED12);
-    }
+/// The CRC of the header in this area, by which an image is known. A flash that cannot be read has none.
+fn crc<F: Flash>(flash: &mut F, area: Area) -> [u8; 4] {
+    let mut crc = [0; 4];
+    let _ = flash.read(area.start().saturating_add(HEADER - 4), &mut crc);
+    crc
+}
 
-    #[test]
-    fn only_crashes_count_and_only_until_a_confirmation() {
-        let trial =
-            [Reset::Crash, Reset::Asked, Reset::Crash].into_iter().fold(Trial::default(), Trial::after);
-        assert_eq!(trial.crashes(), 2);
-        assert_eq!(trial.confirmed().after(Reset::Crash).crashes(), 1);
-        assert_eq!(trial.after(Reset::Power).crashes(), 0);
-        assert_eq!(Trial(u8::MAX).after(Reset::Crash).crashes(), u8::MAX);
+/// A start that nobody asked for.
+pub(crate) fn strike<F: Flash>(flash: &mut F, layout: &Layout) -> Result<(), Refusal> {
+    let next = strikes(flash, layout).min(STRIKES - 1);
+    mark(flash, place(layout, next))
+}
+
+fn reason<F: Flash>(flash: &mut F, layout: &Layout) -> Option<Reason> {
+    if strikes(flash, layout) == STRIKES {
+        Some(Reason::Starts)
+    } else if is_set(flash, layout, WITHDRAWN) {
+        Some(Reason::Withdrawn)
+    } else {
+        None
     }
+}
+
+/// The marks from the first on that are set.
+fn strikes<F: Flash>(flash: &mut F, layout: &Layout) -> u32 {
+    let is_open = |number: &u32| !is_set(flash, layout, *number);
+    (0..STRIKES).find(is_open).unwrap_or(STRIKES)
+}
+
+fn is_set<F: Flash>(flash: &mut F, layout: &Layout, number: u32) -> bool {
+    is_zero(flash, place(layout, number)).unwrap_or(false)
+}
+
+fn place(layout: &Layout, number: u32) -> u32 {
+    let first = layout.staging().end().saturating_sub(RECORD_ROOM);
+    first.saturating_add(number.saturating_mul(ROOM))
 }

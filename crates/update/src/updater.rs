@@ -1,15 +1,17 @@
 //! The update as a machine that is polled: each poll does one bounded step.
 
-use crate::commit::{Commit, Record};
+use crate::area::{Area, Layout};
 use crate::copy::Copy;
 use crate::erase::Erase;
 use crate::flash::Flash;
 use crate::header::Header;
-use crate::image::FullCheck;
+use crate::image::{self, FullCheck};
 use crate::receive::Receiver;
+use crate::record::{Commit, Record};
 use crate::refusal::Refusal;
 use crate::status::Status;
 use crate::target::Target;
+use crate::trial::{self, Trial};
 
 /// What the next [`Updater::poll`] will do, so that the caller knows when to call it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,11 +36,11 @@ pub enum Phase {
     Cleared,
     /// A download is under way.
     Receiving,
-    /// The staged image is being checked.
+    /// The staged image is being checked, or the one that is to be kept or to come back.
     Checking,
     /// It is good, and will be copied whatever happens.
     Committed,
-    /// It is being copied.
+    /// It is being copied, or the image before it.
     Copying,
     /// It was copied: ask [`crate::boot`].
     Installed,
@@ -50,8 +52,6 @@ pub struct Updater<F> {
     target: Target,
     state: State,
     status: Status,
-    /// Of the last download that was found good.
-    identification: Option<u32>,
 }
 
 #[expect(clippy::large_enum_variant, reason = "there is one machine, and no heap")]
@@ -60,26 +60,43 @@ enum State {
     Clearing(Erase),
     Cleared,
     Receiving(Receiver),
-    Checking(FullCheck, Then),
+    Checking(FullCheck, Plan),
     Committed,
-    /// The application area is being erased for this image.
-    Erasing(Erase, Header),
-    Copying(Copy),
+    /// The new place of the image with this header is being erased.
+    Erasing(Erase, Header, Plan),
+    Copying(Copy, Plan),
     Installed,
 }
 
-/// What follows when the staged image is good.
-#[derive(Clone, Copy)]
-enum Then {
+/// What an image is checked for, and copied.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Plan {
+    /// The staged image, to be committed.
     Commit,
-    Copy,
+    /// The staged image, to be the application.
+    Install,
+    /// The application, to be kept while the staged image is on trial. What follows is to install that.
+    Keep,
+    /// The kept image, to be the application again.
+    Revert,
+}
+
+impl Plan {
+    /// Where the image is, and where it will be.
+    fn areas(self, layout: &Layout) -> (Area, Area) {
+        match self {
+            Plan::Keep => (layout.application(), layout.kept()),
+            Plan::Revert => (layout.kept(), layout.application()),
+            Plan::Commit | Plan::Install => (layout.staging(), layout.application()),
+        }
+    }
 }
 
 impl<F: Flash> Updater<F> {
     /// A machine with nothing to do. `status` is what 1F57h reads until something was done: [`Status::GOOD`], or that of
     /// [`crate::Stay`].
     pub fn new(flash: F, target: Target, status: Status) -> Updater<F> {
-        Updater { flash, target, state: State::Idle, status, identification: None }
+        Updater { flash, target, state: State::Idle, status }
     }
 
     /// The flash.
@@ -96,7 +113,7 @@ impl<F: Flash> Updater<F> {
             State::Receiving(_) => Phase::Receiving,
             State::Checking(..) => Phase::Checking,
             State::Committed => Phase::Committed,
-            State::Erasing(..) | State::Copying(_) => Phase::Copying,
+            State::Erasing(..) | State::Copying(..) => Phase::Copying,
             State::Installed => Phase::Installed,
         }
     }
@@ -106,15 +123,10 @@ impl<F: Flash> Updater<F> {
         if self.is_busy() { Status::BUSY } else { self.status }
     }
 
-    /// What identifies the program that was downloaded and found good: the CRC of its code. `None` until then.
-    pub fn identification(&self) -> Option<u32> {
-        self.identification
-    }
-
     /// What the next poll will do.
     pub fn next(&self) -> Next {
         match &self.state {
-            State::Clearing(erase) | State::Erasing(erase, _) if erase.is_at_work() => Next::Erasing,
+            State::Clearing(erase) | State::Erasing(erase, ..) if erase.is_at_work() => Next::Erasing,
             _ if self.is_busy() => Next::Step,
             _ => Next::Nothing,
         }
@@ -127,10 +139,9 @@ impl<F: Flash> Updater<F> {
     /// [`Refusal::Unspecified`] while the machine is busy; [`Refusal::Write`].
     pub fn clear(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
-        self.identification = None;
-        let outcome = self.record().revoke(&mut self.flash);
-        let erase = Erase::new(self.target.layout.staging());
-        self.settle(outcome.map(|()| State::Clearing(erase)))
+        let outcome = self.staged().revoke(&mut self.flash);
+        self.state = State::Clearing(Erase::new(self.target.layout.staging()));
+        self.settle(outcome)
     }
 
     /// A download to 1F50h begins. `size` in bytes, where the client has said it.
@@ -145,7 +156,8 @@ impl<F: Flash> Updater<F> {
         if size.is_some_and(|size| size > self.target.layout.longest_image()) {
             return self.refuse(Refusal::TooLong);
         }
-        self.settle(Ok(State::Receiving(Receiver::new())))
+        self.state = State::Receiving(Receiver::new());
+        self.settle(Ok(()))
     }
 
     /// The next bytes of the download, any number. They are programmed before this returns, in chunks of 64 words, so a
@@ -171,10 +183,11 @@ impl<F: Flash> Updater<F> {
         };
         let complete = receiver.finish(&mut self.flash, &self.target);
         let check = complete.and_then(|()| FullCheck::new(&mut self.flash, &self.target));
-        self.settle(check.map(|check| State::Checking(check, Then::Commit)))
+        self.check(Plan::Commit, check)
     }
 
-    /// Copies the staged image to the application area, after another check of it. For a committed image, of this start
+    /// Copies the staged image to the application area, after another check of it. The application there is kept before, if it is
+    /// whole, and the new one is on trial then. For a committed image, of this start
     /// or one before ([`crate::Decision::Copy`]); there nothing else may come first.
     ///
     /// # Errors
@@ -182,27 +195,63 @@ impl<F: Flash> Updater<F> {
     /// again then.
     pub fn install(&mut self) -> Result<(), Refusal> {
         self.not_busy()?;
-        if !matches!(self.record().read(&mut self.flash), Ok(Commit::Pending | Commit::Done)) {
+        if !matches!(self.staged().read(&mut self.flash), Commit::Pending | Commit::Done) {
             return Err(Refusal::Unspecified);
         }
-        let outcome = match FullCheck::new(&mut self.flash, &self.target) {
-            Ok(check) => Ok(State::Checking(check, Then::Copy)),
-            Err(refusal) => self.give_up(Then::Copy, refusal),
+        let check = FullCheck::new(&mut self.flash, &self.target);
+        self.check(Plan::Install, check)
+    }
+
+    /// Copies the kept image back to the application area, after a check of it: the trial of the application is lost
+    /// ([`crate::Decision::Revert`]). If the kept image is not good, the trial ends without it.
+    ///
+    /// # Errors
+    /// [`Refusal::Unspecified`] when no trial is lost, or while busy; why the kept image is refused.
+    pub fn revert(&mut self) -> Result<(), Refusal> {
+        self.not_busy()?;
+        let layout = &self.target.layout;
+        if !matches!(Trial::read(&mut self.flash, layout), Trial::Lost(_)) {
+            return Err(Refusal::Unspecified);
+        }
+        // The trial must be lost for good before the application is touched.
+        Trial::withdraw(&mut self.flash, layout)?;
+        let kept = layout.kept();
+        let header = image::admitted(&mut self.flash, &self.target, kept);
+        self.check(Plan::Revert, header.map(|header| FullCheck::of(header, kept)))
+    }
+
+    /// Begins a check.
+    fn check(&mut self, plan: Plan, check: Result<FullCheck, Refusal>) -> Result<(), Refusal> {
+        let outcome = match check {
+            Ok(check) => {
+                self.state = State::Checking(check, plan);
+                Ok(())
+            }
+            Err(refusal) => self.give_up(plan, refusal),
         };
         self.settle(outcome)
     }
 
     /// One step of what was begun, if anything was. Returns what the next one will do.
     pub fn poll(&mut self) -> Next {
-        if let Some(outcome) = self.step().transpose() {
+        let keeps = matches!(self.state, State::Erasing(.., Plan::Keep) | State::Copying(_, Plan::Keep));
+        if let Err(refusal) = self.step() {
+            if keeps {
+                // The application is whole, and stays: the next start must not try the staged image again.
+                let _ = self.staged().revoke(&mut self.flash);
+            }
             // Whoever wants to know reads the status.
-            let _ = self.settle(outcome);
+            let _ = self.settle(Err(refusal));
         }
         self.next()
     }
 
-    fn record(&self) -> Record {
-        Record(self.target.layout.staging().end())
+    fn staged(&self) -> Record {
+        trial::staged(&self.target.layout)
+    }
+
+    fn kept(&self) -> Record {
+        trial::kept(&self.target.layout)
     }
 
     fn is_busy(&self) -> bool {
@@ -220,73 +269,123 @@ impl<F: Flash> Updater<F> {
     }
 
     /// What was begun goes on, or is over.
-    fn settle(&mut self, outcome: Result<State, Refusal>) -> Result<(), Refusal> {
-        match outcome {
-            Ok(state) => {
-                (self.state, self.status) = (state, Status::GOOD);
-                Ok(())
-            }
-            Err(refusal) => {
-                self.state = State::Idle;
-                self.refuse(refusal)
-            }
+    fn settle(&mut self, outcome: Result<(), Refusal>) -> Result<(), Refusal> {
+        if let Err(refusal) = outcome {
+            self.state = State::Idle;
+            return self.refuse(refusal);
         }
+        self.status = Status::GOOD;
+        Ok(())
     }
 
-    /// What follows, when what was begun has come to its end.
-    fn step(&mut self) -> Result<Option<State>, Refusal> {
+    /// One step, and what follows when what was begun has come to its end.
+    fn step(&mut self) -> Result<(), Refusal> {
         let (flash, target) = (&mut self.flash, &self.target);
         match &mut self.state {
-            State::Clearing(erase) => Ok(erase.step(flash)?.then_some(State::Cleared)),
-            State::Checking(check, then) => {
-                let (then, checked) = (*then, check.step(flash, target));
-                self.follow(then, checked)
-            }
-            State::Erasing(erase, header) => {
-                Ok(erase.step(flash)?.then(|| State::Copying(Copy::new(*header, target))))
-            }
-            State::Copying(copy) => {
-                if !copy.step(flash)? {
-                    return Ok(None);
+            State::Clearing(erase) => {
+                if erase.step(flash)? {
+                    self.state = State::Cleared;
                 }
-                self.record().done(&mut self.flash).map(|()| Some(State::Installed))
+                Ok(())
+            }
+            State::Checking(check, plan) => {
+                let plan = *plan;
+                match check.step(flash, target) {
+                    Ok(None) => Ok(()),
+                    Ok(Some(header)) => self.accept(plan, header),
+                    Err(refusal) => self.give_up(plan, refusal),
+                }
+            }
+            State::Erasing(erase, header, plan) => {
+                if erase.step(flash)? {
+                    let (from, to) = plan.areas(&target.layout);
+                    self.state = State::Copying(Copy::new(*header, from, to), *plan);
+                }
+                Ok(())
+            }
+            State::Copying(copy, plan) => {
+                let plan = *plan;
+                if copy.step(flash)? { self.copied(plan) } else { Ok(()) }
             }
             State::Idle | State::Cleared | State::Receiving(_) | State::Committed | State::Installed => {
-                Ok(None)
+                Ok(())
             }
         }
     }
 
-    /// What a step of the check has found.
-    fn follow(
-        &mut self,
-        then: Then,
-        checked: Result<Option<Header>, Refusal>,
-    ) -> Result<Option<State>, Refusal> {
-        match checked {
-            Ok(None) => Ok(None),
-            Ok(Some(header)) => self.accept(then, header).map(Some),
-            Err(refusal) => self.give_up(then, refusal).map(Some),
-        }
-    }
-
-    /// The staged image is good.
-    fn accept(&mut self, then: Then, header: Header) -> Result<State, Refusal> {
-        self.identification = Some(header.code_crc());
-        match then {
-            Then::Commit => self.record().write(&mut self.flash).map(|()| State::Committed),
-            Then::Copy => {
+    /// The image is good.
+    fn accept(&mut self, plan: Plan, header: Header) -> Result<(), Refusal> {
+        match plan {
+            Plan::Commit => {
+                self.staged().write(&mut self.flash)?;
+                self.state = State::Committed;
+                return Ok(());
+            }
+            Plan::Install => {
                 // The commit must hold for good before the application is touched.
-                self.record().close(&mut self.flash)?;
-                Ok(State::Erasing(Erase::new(self.target.layout.application()), header))
+                self.staged().close(&mut self.flash)?;
+                return self.keep(header);
             }
+            Plan::Keep => self.kept().revoke(&mut self.flash)?,
+            Plan::Revert => {}
         }
+        self.replace(plan, header);
+        Ok(())
     }
 
-    /// The staged image is not good; if it was committed, the next start must not try it again.
-    fn give_up(&mut self, then: Then, refusal: Refusal) -> Result<State, Refusal> {
-        if matches!(then, Then::Copy) {
-            self.record().revoke(&mut self.flash)?;
+    /// Keeps the application, unless an image is kept already: the one that ran before an application that nobody has confirmed, or
+    /// this application, if the copy was cut.
+    fn keep(&mut self, staged: Header) -> Result<(), Refusal> {
+        let application = self.target.layout.application();
+        if self.kept().read(&mut self.flash) == Commit::Pending {
+            self.kept().close(&mut self.flash)?;
+        } else if let Ok(header) = image::header(&mut self.flash, application) {
+            self.state = State::Checking(FullCheck::of_sum(header, application), Plan::Keep);
+            return Ok(());
+        }
+        self.replace(Plan::Install, staged);
+        Ok(())
+    }
+
+    /// Begins to erase the new place of an image.
+    fn replace(&mut self, plan: Plan, header: Header) {
+        let (_, to) = plan.areas(&self.target.layout);
+        self.state = State::Erasing(Erase::new(to), header, plan);
+    }
+
+    /// The copy is whole.
+    fn copied(&mut self, plan: Plan) -> Result<(), Refusal> {
+        match plan {
+            Plan::Keep => {
+                self.kept().write(&mut self.flash)?;
+                return self.install_staged();
+            }
+            Plan::Revert => {
+                // Without the record of staging there is no trial. What is left open of the kept image does no harm.
+                self.staged().revoke(&mut self.flash)?;
+                self.kept().done(&mut self.flash)?;
+            }
+            Plan::Commit | Plan::Install => self.staged().done(&mut self.flash)?,
+        }
+        self.state = State::Installed;
+        Ok(())
+    }
+
+    /// The staged image, which was found good before the application was kept.
+    fn install_staged(&mut self) -> Result<(), Refusal> {
+        let header = image::candidate(&mut self.flash, &self.target)?;
+        self.replace(Plan::Install, header);
+        Ok(())
+    }
+
+    /// The image is not good. What was committed must not be tried again at the next start.
+    fn give_up(&mut self, plan: Plan, refusal: Refusal) -> Result<(), Refusal> {
+        match plan {
+            Plan::Commit => {}
+            Plan::Install => self.staged().revoke(&mut self.flash)?,
+            // There is nothing that could be kept.
+            Plan::Keep => return self.install_staged(),
+            Plan::Revert => self.kept().done(&mut self.flash)?,
         }
         Err(refusal)
     }

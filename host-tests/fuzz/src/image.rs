@@ -6,12 +6,12 @@ use std::sync::LazyLock;
 use arbitrary::{Arbitrary, Unstructured};
 use update::mock::{MockFlash, Weak};
 use update::{
-    Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Start, Status, Target,
-    Updater, Version, boot,
+    Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Reset, Start, Status,
+    Target, Trial, Updater, Version, boot,
 };
 
-/// Security counter; application in two sectors; staging in two.
-const SECTORS: [usize; 5] = [256, 512, 512, 512, 1024];
+/// Security counter; application in two sectors; staging in two; the kept image in two.
+const SECTORS: [usize; 7] = [256, 512, 512, 512, 1024, 512, 1024];
 const APPLICATION: usize = 256;
 const PRODUCT: u32 = 0x8271;
 /// More polls than any step of an update takes.
@@ -39,6 +39,12 @@ enum Step<'a> {
     Restart,
     /// The power is cut so many operations from now.
     Cut { after: u8, weak: u8 },
+    /// The application confirms itself.
+    Confirm,
+    /// The application is to be taken back.
+    Withdraw,
+    /// The application crashes.
+    Crash,
 }
 
 /// Takes steps; and the first bytes as a header.
@@ -54,7 +60,7 @@ pub fn run(data: &[u8]) {
         let Ok(step) = input.arbitrary::<Step>() else { break };
         node.take(&step);
     }
-    node.restart();
+    node.restart(Reset::Power);
 }
 
 fn keys() -> salty::Keypair {
@@ -65,7 +71,12 @@ static PUBLIC_KEYS: LazyLock<[[u8; 32]; 1]> = LazyLock::new(|| [keys().public.to
 
 fn target() -> Target {
     let application = Area::new(256, &[512, 512]);
-    let layout = Layout::new(Area::new(0, &[256]), application, Area::new(1280, &[512, 1024]));
+    let layout = Layout::new(
+        Area::new(0, &[256]),
+        application,
+        Area::new(1280, &[512, 1024]),
+        Area::new(2816, &[512, 1024]),
+    );
     Target { layout: layout.expect("they fit"), product: PRODUCT, hardware: 0, keys: &*PUBLIC_KEYS }
 }
 
@@ -109,7 +120,8 @@ impl Node {
                 self.updater.poll();
             }),
             Step::PollAll => poll_all(&mut self.updater),
-            Step::Restart => self.restart(),
+            Step::Restart => self.restart(Reset::Power),
+            Step::Crash => self.restart(Reset::Crash),
             Step::Cut { after, weak } => {
                 let weak = Weak::ALL[usize::from(weak) % Weak::ALL.len()];
                 self.updater.flash().cut_after(after.into(), weak);
@@ -118,7 +130,7 @@ impl Node {
             ref command => drop(self.command(command)),
         }
         if self.updater.flash().is_down() {
-            self.restart();
+            self.restart(Reset::Power);
         }
     }
 
@@ -136,6 +148,10 @@ impl Node {
             }
             Step::Finish => self.updater.finish(),
             Step::Install => self.updater.install(),
+            // No application runs while the bootloader is at work.
+            Step::Confirm | Step::Withdraw if self.updater.next() != Next::Nothing => Ok(()),
+            Step::Confirm => Trial::confirm(self.updater.flash(), &target().layout),
+            Step::Withdraw => Trial::withdraw(self.updater.flash(), &target().layout),
             _ => Ok(()),
         }
     }
@@ -153,13 +169,15 @@ impl Node {
         piece
     }
 
-    /// Power off and on: what the bootloader does, and what must come of it.
-    fn restart(&mut self) {
+    /// A start: what the bootloader does, and what must come of it.
+    fn restart(&mut self, reset: Reset) {
         let mut flash = self.updater.flash().clone();
         flash.power_up();
-        if boot(&mut flash, &target(), Start::default()) == Decision::Copy {
+        let decision = boot(&mut flash, &target(), Start { reset, ..Start::default() });
+        if matches!(decision, Decision::Copy | Decision::Revert) {
             let mut updater = Updater::new(flash, target(), Status::GOOD);
-            updater.install().expect("a checked image waits");
+            let begun = if decision == Decision::Copy { updater.install() } else { updater.revert() };
+            begun.expect("a checked image waits");
             poll_all(&mut updater);
             flash = updater.flash().clone();
         }

@@ -37,8 +37,9 @@ const POSITION: (u16, u8) = (0x6004, 0);
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
 /// A heartbeat time in milliseconds that is not the default.
 const PERIOD: u32 = 100;
-/// Cycles of PCLK1 that a slow FIFO takes: half of the shortest frame at 1 Mbit/s.
-const SLOW: u32 = 800;
+/// Cycles of PCLK1 that a slow FIFO takes, 17 us: more than a third of the shortest frame at 1 Mbit/s, and less than a sample may be late,
+/// as a sample waits for who waits for the FIFO.
+const SLOW: u32 = 600;
 /// When the application runs.
 const STARTED: Time = Time::from_millis(500);
 

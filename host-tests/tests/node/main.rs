@@ -21,5 +21,6 @@ mod module_cycles;
 mod object_tables;
 mod personalities;
 mod pressure_node;
+mod program_trial;
 mod stuck_client;
 mod unsafe_code;

@@ -51,7 +51,12 @@ fn every_part_of_flash_that_is_erased_on_its_own_is_made_of_whole_sectors() {
     let regions = regions();
     let starts = sector_starts();
     let end = FLASH + SECTORS.iter().sum::<u32>() * KIB;
-    for range in [regions["BOOTLOADER"].clone(), regions["PARAMETERS"].clone(), regions["STAGING"].clone()] {
+    for range in [
+        regions["BOOTLOADER"].clone(),
+        regions["PARAMETERS"].clone(),
+        regions["STAGING"].clone(),
+        regions["KEPT"].clone(),
+    ] {
         assert!(starts.contains(&range.start), "{:#x} is no sector's start", range.start);
         assert!(starts.contains(&range.end) || range.end == end, "{:#x} is no sector's end", range.end);
     }
@@ -74,7 +79,7 @@ fn the_security_counter_has_a_sector_of_its_own() {
 #[test]
 fn the_regions_of_the_flash_do_not_overlap() {
     let regions = regions();
-    let order = ["BOOTLOADER", "PARAMETERS", "SECURITY", "IMAGE_HEADER", "APPLICATION", "STAGING"];
+    let order = ["BOOTLOADER", "PARAMETERS", "SECURITY", "IMAGE_HEADER", "APPLICATION", "STAGING", "KEPT"];
     let mut next = FLASH;
     for name in order {
         assert!(regions[name].start >= next, "{name}");
@@ -84,11 +89,11 @@ fn the_regions_of_the_flash_do_not_overlap() {
 }
 
 #[test]
-fn staging_holds_any_image_of_the_application_area_beside_the_commit_record() {
+fn staging_and_the_kept_image_have_room_for_any_image_of_the_application_area_beside_their_records() {
     let regions = regions();
     let image = regions["IMAGE_HEADER"].len() + regions["APPLICATION"].len();
     assert_eq!(bsp::update_layout::LAYOUT.longest_image() as usize, image);
-    assert!(regions["STAGING"].len() >= image + 512);
+    assert!(["STAGING", "KEPT"].iter().all(|name| regions[*name].len() >= image + 512));
 }
 
 /// What the bootloader erases is what memory.x says, sector by sector.
@@ -101,6 +106,7 @@ fn the_update_knows_the_areas_and_their_sectors() {
         (layout.security(), regions["SECURITY"].clone()),
         (layout.application(), regions["IMAGE_HEADER"].start..regions["APPLICATION"].end + 512),
         (layout.staging(), regions["STAGING"].clone()),
+        (layout.kept(), regions["KEPT"].clone()),
     ] {
         assert_eq!(FLASH + area.start()..FLASH + area.end(), region);
         let inside = sector_starts().into_iter().filter(|start| region.contains(start));

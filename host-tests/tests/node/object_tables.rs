@@ -77,6 +77,7 @@ fn writing_is_refused_or_taken_as_the_access_says() {
             0x6125 | 0x6925 => b"zero".to_vec(),
             0x1010 | 0x2204 => b"save".to_vec(),
             0x1011 => b"load".to_vec(),
+            0x2002 if row.sub == 2 => b"back".to_vec(),
             0x2F00 => vec![1, 2, 3],
             _ if row.access == "wo" => vec![0; size],
             _ => bench.read(row.index, row.sub).unwrap(),
@@ -90,6 +91,8 @@ fn writing_is_refused_or_taken_as_the_access_says() {
             (0x6010, 2) => Err(DEVICE_STATE),
             // Nothing was measured yet.
             (0x6382, _) => Err(DEVICE_STATE),
+            // The program is not on trial.
+            (0x2002, 2) => Err(DEVICE_STATE),
             _ => Ok(()),
         };
         assert_eq!(bench.write(row.index, row.sub, &value), expected, "{personality:?} {row:X?}");

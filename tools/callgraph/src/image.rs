@@ -138,19 +138,29 @@ impl<'a> Image<'a> {
         parts
     }
 
-    /// Everything that an exception or an interrupt starts: the tables of cortex-m-rt, without the reset.
+    /// Everything that an exception or an interrupt starts: the tables of vectors, without the reset.
     pub(crate) fn handlers(&self) -> Result<BTreeSet<u32>> {
         let mut handlers = BTreeSet::new();
-        for table in ["__EXCEPTIONS", "__INTERRUPTS"] {
-            let &(start, size) =
-                self.symbols.get(table).with_context(|| format!("the image has no {table}"))?;
-            ensure!(size > 0, "{table} is empty");
+        for (start, size) in [self.table("__EXCEPTIONS")?, self.interrupts()?] {
+            ensure!(size > 0, "a table of vectors is empty");
             for address in (start..start + size).step_by(4) {
                 let word = self.word(address)?;
                 handlers.extend(self.function_at(word).map(|function| function.start));
             }
         }
         Ok(handlers)
+    }
+
+    /// The vectors of the interrupts: the table of the device crate, or a shorter one that the bootloader's linker script makes.
+    fn interrupts(&self) -> Result<(u32, u32)> {
+        self.table("__INTERRUPTS").or_else(|_| {
+            let start = self.symbol("__eexceptions")?;
+            Ok((start, self.symbol("__evectors")?.saturating_sub(start)))
+        })
+    }
+
+    fn table(&self, name: &str) -> Result<(u32, u32)> {
+        self.symbols.get(name).copied().with_context(|| format!("the image has no {name}"))
     }
 
     /// The value of a symbol.

@@ -52,13 +52,22 @@ impl Flash {
         Flash(flash)
     }
 
-    /// Copies bytes out of the flash.
+    /// Copies bytes out of the flash: a few of them, as a word has.
     pub(super) fn read(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
         // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
         // value too.
         let there = unsafe { core::slice::from_raw_parts(address as *const u8, bytes.len()) };
         bytes.iter_mut().zip(there).for_each(|(to, from)| *to = *from);
+        Ok(())
+    }
+
+    /// The same for many bytes, which takes half the time then.
+    pub(super) fn read_many(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        let address = area.address(offset, bytes.len(), 1)?;
+        // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this
+        // value too. The bytes are in RAM.
+        unsafe { core::ptr::copy_nonoverlapping(address as *const u8, bytes.as_mut_ptr(), bytes.len()) };
         Ok(())
     }
 

@@ -52,13 +52,14 @@ pub fn parameter_pages() -> &'static [u8; 2 * PARAMETER_PAGE as usize] {
     unsafe { &*(parameters().start as *const _) }
 }
 
-/// The flash that an update may program: the security counter and the revoked keys, the application with its header, and staging.
+/// The flash that an update may program: the security counter and the revoked keys, the application with its header, staging, and the
+/// kept image.
 pub(super) fn updatable() -> Range<u32> {
     // SAFETY: only the addresses are used.
     unsafe { region(&_updatable_start, &_updatable_end) }
 }
 
-/// The part of [`updatable`] that an update may erase: the application with its header, and staging.
+/// The part of [`updatable`] that an update may erase: the application with its header, staging, and the kept image.
 pub(super) fn erasable() -> Range<u32> {
     // SAFETY: only the addresses are used.
     unsafe { region(&_erasable_start, &_updatable_end) }

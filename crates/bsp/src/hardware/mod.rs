@@ -24,6 +24,7 @@ mod ssi;
 mod stream;
 mod time_base;
 mod transmit;
+mod trial_flash;
 mod watchdog;
 
 pub use backup::BackupMemory;
@@ -39,6 +40,7 @@ pub use ssi::Ssi;
 pub use stm32f4xx_hal::pac;
 pub use time_base::{Alarm, Clock, Ring, TimeInterrupt};
 pub use transmit::Transmitter;
+pub use trial_flash::TrialFlash;
 pub use watchdog::{StartUpWatchdog, Watchdog};
 
 // The logger of every image.

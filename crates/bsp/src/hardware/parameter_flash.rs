@@ -21,6 +21,17 @@ impl ParameterFlash {
         ParameterFlash { flash, area: FlashArea::new(pages.start, pages), losses }
     }
 
+    /// Reads in another area of the flash.
+    pub(super) fn read_in(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        self.flash.read(area, offset, bytes)
+    }
+
+    /// Programs in another area of the flash.
+    pub(super) fn write_in(&mut self, area: &FlashArea, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        let written = self.flash.write(area, offset, bytes);
+        self.noted(written)
+    }
+
     fn noted(&self, result: Result<(), Error>) -> Result<(), Error> {
         if result == Err(Error::Busy) {
             self.losses.count(Event::Flash);

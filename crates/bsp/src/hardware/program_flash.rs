@@ -20,8 +20,8 @@ pub struct ProgramFlash {
 
 impl ProgramFlash {
     pub(super) fn new(flash: Flash) -> ProgramFlash {
-        let [area, erasable] =
-            [memory::updatable(), memory::erasable()].map(|range| FlashArea::new(sectors::FLASH, range));
+        let area = FlashArea::new(sectors::FLASH, memory::updatable());
+        let erasable = FlashArea::new(sectors::FLASH, memory::erasable());
         ProgramFlash { flash, area, erasable, erases: false }
     }
 }
@@ -34,7 +34,7 @@ impl ReadNorFlash for ProgramFlash {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
-        self.flash.read(&self.area, offset, bytes)
+        self.flash.read_many(&self.area, offset, bytes)
     }
 
     fn capacity(&self) -> usize {

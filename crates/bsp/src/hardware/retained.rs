@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use update::{Proof, Trial};
+use update::{Crashes, Proof};
 
 use crate::crash_record::{self, WORDS};
 use crate::handover::{self, Handover};
@@ -11,7 +11,7 @@ use crate::handover::{self, Handover};
 #[repr(C)]
 struct Retained {
     handover: [AtomicU32; 2],
-    trial: AtomicU32,
+    crashes: AtomicU32,
     crash: [AtomicU32; WORDS],
     proven: [AtomicU32; 2],
     bootloader: AtomicU32,
@@ -22,7 +22,7 @@ struct Retained {
 #[unsafe(link_section = ".retained")]
 static RETAINED: Retained = Retained {
     handover: [const { AtomicU32::new(0) }; 2],
-    trial: AtomicU32::new(0),
+    crashes: AtomicU32::new(0),
     crash: [const { AtomicU32::new(0) }; WORDS],
     proven: [const { AtomicU32::new(0) }; 2],
     bootloader: AtomicU32::new(0),
@@ -45,13 +45,13 @@ pub fn hand_over(note: &Handover) {
 
 /// How often the application has crashed since it last confirmed itself.
 #[must_use]
-pub fn trial() -> Trial {
-    Trial::from_word(RETAINED.trial.load(Ordering::Relaxed))
+pub fn crashes() -> Crashes {
+    Crashes::from_word(RETAINED.crashes.load(Ordering::Relaxed))
 }
 
 /// Stores the count of crashes.
-pub fn set_trial(trial: Trial) {
-    RETAINED.trial.store(trial.word(), Ordering::Relaxed);
+pub fn set_crashes(crashes: Crashes) {
+    RETAINED.crashes.store(crashes.word(), Ordering::Relaxed);
 }
 
 /// The image whose signature was found good since power-on, by the CRC of its header.

@@ -6,7 +6,10 @@ mod objects;
 mod pdos;
 mod start_up;
 
-pub use node::{LOST_EVENT_KINDS, LOST_EVENT_ROWS, LOST_EVENTS, PERSONALITY, TRANSFER_BUFFER, personality};
+pub use node::{
+    LOST_EVENT_KINDS, LOST_EVENT_ROWS, LOST_EVENTS, PERSONALITY, PROGRAM_TRIAL, PROGRAM_TRIAL_ROWS,
+    TRANSFER_BUFFER, handles, personality,
+};
 pub use objects::{ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, device_name, device_type, error_behaviour};
 pub use pdos::{
     RPDOS, Tpdo, cob_id, count, event_timer, inhibit_time, off, slot, sync_start, tpdo_mappings, tpdos,
@@ -17,5 +20,12 @@ pub use start_up::START_UP;
 use canopen::dictionary::Object;
 
 /// The rows that every device has.
-pub const COMMON: &[&[Object]] =
-    &[&[ERROR_REGISTER], ERRORS_AND_SYNC, SERVICES, START_UP, LOST_EVENT_ROWS, &[TRANSFER_BUFFER]];
+pub const COMMON: &[&[Object]] = &[
+    &[ERROR_REGISTER],
+    ERRORS_AND_SYNC,
+    SERVICES,
+    START_UP,
+    LOST_EVENT_ROWS,
+    PROGRAM_TRIAL_ROWS,
+    &[TRANSFER_BUFFER],
+];

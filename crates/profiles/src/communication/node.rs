@@ -1,6 +1,6 @@
 //! Manufacturer-specific objects that every device of the project has.
 
-use canopen::dictionary::{Access, Object, Type};
+use canopen::dictionary::{Access, Group, Object, Type};
 
 /// Index of the object that says which personality the node has after the next reset.
 pub const PERSONALITY: u16 = 0x2000;
@@ -19,6 +19,31 @@ pub const fn personality(own: u8, count: usize) -> Object {
 /// 2F00h: a domain in RAM, for trying out transfers.
 pub const TRANSFER_BUFFER: Object =
     Object::new(0x2F00, 0, "Transfer buffer", Type::Domain, Access::ReadWrite);
+
+/// Index of the object about the trial of a new program.
+pub const PROGRAM_TRIAL: u16 = 0x2002;
+
+/// Whether the node handles what is written there.
+#[must_use]
+pub const fn handles(index: u16, sub: u8) -> bool {
+    matches!((index, sub), (PROGRAM_TRIAL, 2))
+}
+
+const fn seconds(sub: u8, name: &'static str, default: i64) -> Object {
+    Object::new(PROGRAM_TRIAL, sub, name, Type::Unsigned16, Access::ReadWrite)
+        .value(default)
+        .stored(Group::Application)
+}
+
+/// 2002h: how the trial of a new program stands, the commands that end it, and its times in seconds (0: none). docs/update.md says how
+/// they work together.
+pub const PROGRAM_TRIAL_ROWS: &[Object] = &[
+    Object::highest(PROGRAM_TRIAL, 4, "Program trial"),
+    Object::new(PROGRAM_TRIAL, 1, "State", Type::Unsigned8, Access::ReadOnly),
+    Object::new(PROGRAM_TRIAL, 2, "Command", Type::Unsigned32, Access::WriteOnly).handled(),
+    seconds(3, "Time to be confirmed", 600),
+    seconds(4, "Time of the automatic confirmation", 0),
+];
 
 /// Index of the object that counts lost events.
 pub const LOST_EVENTS: u16 = 0x2001;

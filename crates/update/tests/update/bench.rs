@@ -4,17 +4,18 @@ use std::sync::LazyLock;
 
 use update::mock::MockFlash;
 use update::{
-    Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Start, Status, Target,
-    Updater, Version, boot,
+    Area, CONTEXT, Decision, Description, HEADER_LEN, Header, Layout, Next, Refusal, Reset, Start, Status,
+    Target, Trial, Updater, Version, boot,
 };
 
-/// Sectors of the mock: security counter and revoked keys; application in two; staging in two.
-pub(crate) const SECTORS: [usize; 5] = [512, 1024, 2048, 2048, 2048];
+/// Sectors of the mock: security counter and revoked keys; application in two; staging in two; the kept image in two.
+pub(crate) const SECTORS: [usize; 7] = [512, 1024, 2048, 2048, 2048, 2048, 2048];
 pub(crate) const APPLICATION: usize = 512;
 pub(crate) const STAGING: usize = 512 + 3072;
 const SECURITY_AREA: Area = Area::new(0, &[512]);
 const APPLICATION_AREA: Area = Area::new(512, &[1024, 2048]);
 const STAGING_AREA: Area = Area::new(512 + 3072, &[2048, 2048]);
+const KEPT_AREA: Area = Area::new(512 + 3072 + 4096, &[2048, 2048]);
 
 pub(crate) const PRODUCT: u32 = 0x0001_8271;
 pub(crate) const REVISION: u8 = 2;
@@ -33,7 +34,7 @@ static PUBLIC_KEYS: LazyLock<[[u8; 32]; 2]> =
     LazyLock::new(|| [0, 1].map(|number| key_number(number).public.to_bytes()));
 
 pub(crate) fn target() -> Target {
-    let layout = Layout::new(SECURITY_AREA, APPLICATION_AREA, STAGING_AREA).unwrap();
+    let layout = Layout::new(SECURITY_AREA, APPLICATION_AREA, STAGING_AREA, KEPT_AREA).unwrap();
     Target { layout, product: PRODUCT, hardware: REVISION, keys: &*PUBLIC_KEYS }
 }
 
@@ -163,12 +164,31 @@ pub(crate) fn install(flash: &mut MockFlash) -> Result<(), Refusal> {
     run(&mut updater)
 }
 
-/// What the bootloader does at a start: the decision, after a copy that was left to do.
+/// Copies the kept image back.
+pub(crate) fn revert(flash: &mut MockFlash) -> Result<(), Refusal> {
+    let mut updater = Updater::new(flash, target(), Status::GOOD);
+    updater.revert()?;
+    run(&mut updater)
+}
+
+/// The application says that it is well.
+pub(crate) fn confirm(flash: &mut MockFlash) {
+    Trial::confirm(flash, &target().layout).unwrap();
+}
+
+/// What the bootloader does at a start that was asked for: the decision, after a copy that was left to do.
 pub(crate) fn start(flash: &mut MockFlash) -> Decision {
-    if boot(flash, &target(), Start::default()) == Decision::Copy {
-        // A refusal shows in the next decision.
-        let _ = install(flash);
-    }
+    start_after(flash, Reset::Asked)
+}
+
+/// The same at a start after this reset.
+pub(crate) fn start_after(flash: &mut MockFlash, reset: Reset) -> Decision {
+    // A refusal shows in the next decision.
+    let _ = match boot(flash, &target(), Start { reset, ..Start::default() }) {
+        Decision::Copy => install(flash),
+        Decision::Revert => revert(flash),
+        decision => return decision,
+    };
     boot(flash, &target(), Start::default())
 }
 

@@ -6,3 +6,4 @@ mod corrupted;
 mod header;
 mod ordinary;
 mod power_cuts;
+mod trial;

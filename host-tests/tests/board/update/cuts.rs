@@ -1,7 +1,8 @@
 //! The power goes, with the real bootloader. Crate `update` does the same with every outcome of a torn word; here it is the
 //! bootloader with its flash driver, on a flash that the emulator tears.
 //!
-//! B is a program of five words, so that all of its update can be cut at every operation; A is the real application.
+//! B is a program of five words, so that all of its update can be cut at every operation; A is the real application, whose copy to
+//! where it is kept is cut here and there.
 
 use canbus::Time;
 use host_tests::thorough::{either, is_thorough};
@@ -14,12 +15,12 @@ use crate::support::SECOND;
 const MARK: u32 = 0x2001_0000;
 /// Never comes.
 const NO_CUT: u64 = u64::MAX >> 1;
-/// The operations of a copy: a sector, the program, the mark that it is done.
+/// The operations of the copy of B: a sector, the program, the mark that it is done.
 const COPY: u64 = 1 + 133 + 1;
 /// Of so many cuts in the copy, two are followed by another one.
 const SECOND_CUTS: u64 = 7;
-/// The longest that a recovery takes: an erase, and a start.
-const PATIENCE: u32 = 200;
+/// The longest that a recovery takes: two erases, and a start.
+const PATIENCE: u32 = 300;
 
 /// Stack pointer, reset vector, and `ldr r0, [pc, #4]`, `str r0, [r0]`, `b .` with the address of the mark (the code starts
 /// at 0802 0200h).
@@ -122,28 +123,54 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
 /// Every one of so many operations is cut where not all are.
 const SAMPLE: u64 = 10;
 
+/// Of the operations that keep A, one of so many is cut, and each of so many at either end.
+const KEPT_SAMPLE: [u64; 2] = [2001, 6];
+
+/// How far an operation is into those that keep A.
+fn into_keeping(cut: u64, all: u64) -> Option<u64> {
+    let keeping = 4 + 1 + version_a().to_bytes().len() as u64 / 4 + 3;
+    let into = cut.checked_sub(all - COPY - keeping)?;
+    let [_, end] = KEPT_SAMPLE;
+    (end..keeping - end).contains(&into).then_some(into)
+}
+
+/// Whether the power is to go in this operation.
+fn is_cut(cut: u64, all: u64) -> bool {
+    let [sample, _] = KEPT_SAMPLE;
+    match into_keeping(cut, all) {
+        Some(into) => (into / 2).is_multiple_of(either(sample, sample / 10)),
+        None => is_thorough() || (cut / 2).is_multiple_of(SAMPLE),
+    }
+}
+
 /// Cuts at every operation whose number has this rest by two, so that two processes share the work; at a tenth of them
 /// without `--thorough`.
 fn cut_everywhere(rest: u64) {
     let mut victim = Victim::new();
     let all = victim.update(NO_CUT);
     assert_eq!(victim.recover(), Some(Runs::B), "without a cut");
-    let (mut runs, mut twice) = ([0; 2], 0);
+    let (mut runs, mut kept, mut twice) = ([0; 2], 0, 0);
     victim.restore();
-    for cut in (1..=all).filter(|cut| cut % 2 == rest && (is_thorough() || cut / 2 % SAMPLE == 0)) {
+    for cut in (1..=all).filter(|cut| cut % 2 == rest && is_cut(*cut, all)) {
         victim.update(cut);
         let second = 1 + cut * 37 % COPY;
-        if cut > all / 2 && cut / 2 % SECOND_CUTS < 2 {
+        if cut > all - COPY && cut / 2 % SECOND_CUTS < 2 {
             twice += usize::from(victim.cut_again(second));
         }
         let Some(found) = victim.recover() else { panic!("cut {cut} of {all}, perhaps then {second}") };
-        runs[found as usize] += 1;
+        if into_keeping(cut, all).is_some() {
+            assert_eq!(found, Runs::B, "it was committed: cut {cut} of {all}");
+            kept += 1;
+        } else {
+            runs[found as usize] += 1;
+        }
         if found == Runs::B {
             victim.restore();
         }
     }
     println!(
-        "{} cuts in an update of {all} operations, {twice} of them with a second one: {} times A, {} times B",
+        "{} cuts in an update of {all} operations, {twice} of them with a second one: {} times A, {} times B; \
+         and {kept} where A is kept, B each time",
         runs[0] + runs[1],
         runs[0],
         runs[1]
@@ -169,8 +196,8 @@ fn whenever_the_power_goes_the_node_comes_back_with_one_of_the_two() {
     let cuts = either(4, 8);
     let (a, b) = (version_a(), version_b(0));
     let words = (b.to_bytes().len() / 4) as u64;
-    // Clear, download, the copy with its erases; the commit record in between.
-    let all = 6 + words + 4 + 2 + words;
+    // Clear, download, keeping A, the copy with its erases; the records in between.
+    let all = 6 + words + 4 + 8 + words + 2 + words;
     let (mut old, mut new) = (0, 0);
     for cut in 0..cuts {
         let mut bench = Bench::running();

@@ -90,6 +90,7 @@ fn updated(node: u8, [from, to]: [&Image; 2]) -> Value {
         "old_identification": from.header.code_crc(),
         "new_version": version(to),
         "new_identification": to.header.code_crc(),
+        "on_trial": false,
         "error": null,
     })
 }

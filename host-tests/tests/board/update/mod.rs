@@ -8,6 +8,7 @@ mod fleet;
 mod guest;
 mod owner;
 mod protected;
+mod trial;
 
 use bsp::sectors::FLASH;
 use bsp::update_layout::LAYOUT;
@@ -164,6 +165,10 @@ fn the_security_counter_outlives_the_application() {
     let [older, newer] = [1, 2].map(|counter| signed(code.clone(), |about| about.counter = counter));
     let mut bench = Bench::running();
     bench.update(&newer);
+    // Its counter holds from the first start after its confirmation on.
+    bench.run(SECOND * 10);
+    bench.power_cycle();
+    assert_eq!(bench.identification_of_running(), newer.header.code_crc());
     // Neither the application nor what it could be copied from once more is whole.
     for place in [HEADER, FLASH + LAYOUT.staging().start()] {
         bench.machine().write(place, &[0; 64]).unwrap();

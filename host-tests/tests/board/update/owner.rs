@@ -51,7 +51,7 @@ fn it_takes_what_its_owner_has_signed_and_nothing_else() {
     assert_eq!(bench.start(), image.header.code_crc());
 }
 
-/// The second key takes the first one's rights: from the start of the image that says so.
+/// The second key takes the first one's rights: from the first start after the confirmation of the image that says so.
 #[test]
 fn one_of_its_keys_revokes_the_other_one() {
     let mut bench = bench();
@@ -66,6 +66,9 @@ fn one_of_its_keys_revokes_the_other_one() {
     let second = signed_by_owner(&version_b(0), 1, 1);
     assert!(take(&mut bench, &second));
     assert_eq!(bench.start(), second.header.code_crc());
+    bench.run(SECOND * 10);
+    bench.power_cycle();
+    assert_eq!(bench.identification_of_running(), second.header.code_crc());
     bench.stop();
     assert!(!take(&mut bench, &first));
     assert_eq!((bench.settled().code, bench.settled().detail), (REVOKED, 0));

@@ -32,6 +32,10 @@ pub(super) struct Update {
     #[arg(long)]
     raw: bool,
 
+    /// Leave the new program on trial: the node takes it back unless it is confirmed (2002h).
+    #[arg(long)]
+    no_confirm: bool,
+
     /// How long a node that is lost may stay away, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     patience: u32,
@@ -45,6 +49,7 @@ struct Report {
     old_identification: Option<u32>,
     new_version: Option<String>,
     new_identification: Option<u32>,
+    on_trial: bool,
     error: Option<String>,
 }
 
@@ -56,6 +61,7 @@ impl Update {
             sdo: session.options.sdo(),
             patience: Duration::from_millis(u64::from(self.patience) * 1000),
             force: self.force,
+            confirm: !self.no_confirm,
         };
         let results = update(&mut session.network, &nodes, &image, &options, &mut Bar::new());
         // The error of the only node is that of the command.
@@ -88,6 +94,7 @@ fn verdict(results: Vec<(NodeId, Result<Outcome, Error>)>) -> Result<(), Failure
 impl Report {
     fn new(node: NodeId, result: &Result<Outcome, Error>) -> Report {
         let outcome = result.as_ref().ok().cloned();
+        let on_trial = outcome.as_ref().is_some_and(|outcome| outcome.is_on_trial);
         let what = match &outcome {
             None => "failed",
             Some(outcome) if outcome.is_changed => "updated",
@@ -102,6 +109,7 @@ impl Report {
             old_identification,
             new_version,
             new_identification,
+            on_trial,
             error: result.as_ref().err().map(Error::to_string),
         }
     }
@@ -118,9 +126,10 @@ impl fmt::Display for Report {
         let old = program(&self.old_version, self.old_identification);
         let new = program(&self.new_version, self.new_identification);
         match self.result {
-            "unchanged" => write!(f, "node {}: has {new} already", self.node),
-            _ => write!(f, "node {}: {old} -> {new}", self.node),
+            "unchanged" => write!(f, "node {}: has {new} already", self.node)?,
+            _ => write!(f, "node {}: {old} -> {new}", self.node)?,
         }
+        if self.on_trial { f.write_str(", on trial") } else { Ok(()) }
     }
 }
 

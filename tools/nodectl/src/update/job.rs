@@ -16,6 +16,8 @@ const POLL: Duration = Duration::from_millis(100);
 const RESTART: Duration = Duration::from_millis(15_000);
 /// How long it may take to erase, or to check.
 const FLASH: Duration = Duration::from_millis(60_000);
+/// How long it may take to end a trial.
+const CONFIRM: Duration = Duration::from_millis(5_000);
 /// How often clearing is tried, when it is refused although the flash is not busy.
 const CLEARS: usize = 5;
 /// How often one run goes on with a node that was lost.
@@ -30,6 +32,8 @@ pub struct Options {
     pub patience: Duration,
     /// Update also where the node runs this program already, or a newer one.
     pub force: bool,
+    /// End the trial of the new program once it runs. Else the node does so, or takes the program back.
+    pub confirm: bool,
 }
 
 /// What has become of a node.
@@ -45,6 +49,8 @@ pub struct Outcome {
     pub new_identification: Option<u32>,
     /// Whether something was downloaded: the node had this program already if not.
     pub is_changed: bool,
+    /// Whether the node may still take the program back.
+    pub is_on_trial: bool,
 }
 
 /// A program as it is on a node.
@@ -123,7 +129,45 @@ impl<'a> Job<'a> {
             self.wait_until_running(network, true, "start the new program")?;
         }
         let after = self.state(network)?;
-        Ok(self.outcome(after))
+        let is_on_trial = self.end_trial(network, &after, watcher)?;
+        Ok(Outcome { is_on_trial, ..self.outcome(after) })
+    }
+
+    /// Confirms the new program if that is wanted. Whether it is still on trial.
+    fn end_trial(
+        &self,
+        network: &mut Network,
+        after: &State,
+        watcher: &mut dyn Watcher,
+    ) -> Result<bool, Error> {
+        // What other devices have at 2002h is not known here.
+        let Some(info) = &self.image.info else { return Ok(false) };
+        if let Some(found) = after.identification.filter(|found| *found != info.identification) {
+            return Err(self.is_another(network, info.identification, found)?);
+        }
+        let is_on_trial = self.program(network).is_on_trial()?;
+        if !(is_on_trial && self.options.confirm) {
+            return Ok(is_on_trial);
+        }
+        watcher.step(self.node, Step::Confirm);
+        self.program(network).confirm()?;
+        let until = network.now() + CONFIRM;
+        while self.program(network).is_on_trial()? {
+            if network.now() >= until {
+                return Err(Error::Stuck { node: self.node, what: "confirm the new program" });
+            }
+            network.pause(POLL)?;
+        }
+        Ok(false)
+    }
+
+    /// Why the node runs another program than the new one: it says so where it has taken the new one back.
+    fn is_another(&self, network: &mut Network, expected: u32, found: u32) -> Result<Error, Error> {
+        let node = self.node;
+        Ok(match self.program(network).status()? {
+            Some(status) if !is_good(status) => Error::Flash { node, status },
+            _ => Error::Identification { node, expected, found },
+        })
     }
 
     /// Refuses what would do harm, before anything is changed.
@@ -286,6 +330,7 @@ impl<'a> Job<'a> {
             new_version: after.version,
             new_identification: after.identification,
             is_changed: self.progress != Progress::Untouched,
+            is_on_trial: false,
         }
     }
 

@@ -1,4 +1,5 @@
-//! The objects of the program (CiA 302-3): 1F50h, 1F51h, 1F56h, 1F57h, each at sub-index 1.
+//! The objects of the program (CiA 302-3): 1F50h, 1F51h, 1F56h, 1F57h, each at sub-index 1; and 2002h, the trial of a new program,
+//! which only nodes of this project have.
 
 use canopen::NodeId;
 use canopen::client::sdo;
@@ -14,12 +15,17 @@ const CONTROL: Multiplexer = at(0x1F51, 1);
 const IDENTIFICATION: Multiplexer = at(0x1F56, 1);
 const STATUS: Multiplexer = at(0x1F57, 1);
 
+const TRIAL_STATE: Multiplexer = at(0x2002, 1);
+const TRIAL_COMMAND: Multiplexer = at(0x2002, 2);
+
 /// Names of the objects, for errors.
-const NAMES: [(Multiplexer, &str); 4] = [
+const NAMES: [(Multiplexer, &str); 6] = [
     (DATA, "Program data"),
     (CONTROL, "Program control"),
     (IDENTIFICATION, "Program software identification"),
     (STATUS, "Flash status identification"),
+    (TRIAL_STATE, "Program trial: state"),
+    (TRIAL_COMMAND, "Program trial: command"),
 ];
 
 /// What 1F51h takes. More is not portable.
@@ -69,6 +75,27 @@ impl<'n> Program<'n> {
     /// Those of SDO.
     pub fn status(&mut self) -> Result<Option<Status>, Error> {
         Ok(self.word(STATUS)?.map(Status::from_word))
+    }
+
+    /// Whether the program that runs is on trial: the one before comes back unless it is confirmed. Of nodes of this project only.
+    ///
+    /// # Errors
+    /// Those of SDO.
+    pub fn is_on_trial(&mut self) -> Result<bool, Error> {
+        match self.read(TRIAL_STATE) {
+            Ok(state) => Ok(state.first() == Some(&1)),
+            // Of an older program.
+            Err(error) if error.is_absent() => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Confirms the program that runs. The node ends the trial a moment later.
+    ///
+    /// # Errors
+    /// Those of SDO.
+    pub fn confirm(&mut self) -> Result<(), Error> {
+        self.client(self.options).download(TRIAL_COMMAND, b"conf", |_| ()).map_err(named)
     }
 
     /// A command that is acknowledged.

@@ -32,6 +32,8 @@ pub enum Step {
     Verify,
     /// It is started.
     Start,
+    /// It runs, and its trial is ended.
+    Confirm,
     /// The node or the bus is gone.
     Lost,
     /// It is there again.
@@ -49,6 +51,7 @@ impl fmt::Display for Step {
             Step::DownloadSegments => "download in segments",
             Step::Verify => "verify",
             Step::Start => "start",
+            Step::Confirm => "confirm",
             Step::Lost => "lost, waiting",
             Step::Back => "back",
         })

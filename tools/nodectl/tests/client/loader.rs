@@ -32,6 +32,9 @@ const ROWS: &[Object] = &[
     read_only(0x1F56, 1, Type::Unsigned32),
     Object::highest(0x1F57, 1, ""),
     read_only(0x1F57, 1, Type::Unsigned32),
+    Object::highest(0x2002, 2, ""),
+    read_only(0x2002, 1, Type::Unsigned8),
+    Object::new(0x2002, 2, "", Type::Unsigned32, Access::ReadWrite).handled(),
 ];
 
 const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
@@ -53,6 +56,11 @@ pub(crate) struct Flash {
     pub(crate) verdict: u32,
     /// How often it was erased.
     pub(crate) erased: usize,
+    /// Whether a new program is on trial, and whether this one is.
+    pub(crate) has_trials: bool,
+    pub(crate) is_on_trial: bool,
+    /// The program that comes back when another one is started.
+    pub(crate) takes_back: Option<Vec<u8>>,
     /// Commands of 1F51h as they came.
     pub(crate) commands: Vec<u8>,
     status: u32,
@@ -70,7 +78,12 @@ impl Flash {
             (0, true) => self.next = Some(false),
             (0, false) => (),
             (1, false) if self.program.is_empty() => return Err(Abort::DeviceState),
-            (1, false) => self.next = Some(true),
+            (1, false) => {
+                (self.next, self.is_on_trial) = (Some(true), self.has_trials);
+                if let Some(program) = self.takes_back.take() {
+                    (self.program, self.status) = (program, 0x0001_0090);
+                }
+            }
             (3, false) => {
                 (self.program, self.status, self.erased) = (Vec::new(), 0, self.erased + 1);
                 self.busy_until = self.now + ERASE;
@@ -91,8 +104,15 @@ pub(crate) fn identification(program: &[u8]) -> u32 {
 }
 
 impl Application for Flash {
-    fn write(&mut self, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
-        self.command(bytes[0])
+    fn write(&mut self, entry: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
+        match (entry.index(), bytes) {
+            (0x2002, b"conf") if self.is_on_trial => {
+                self.is_on_trial = false;
+                Ok(())
+            }
+            (0x2002, _) => Err(Abort::DeviceState),
+            _ => self.command(bytes[0]),
+        }
     }
 
     fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {
@@ -130,6 +150,9 @@ impl Loader {
             has_blocks: true,
             verdict: 0,
             erased: 0,
+            has_trials: false,
+            is_on_trial: false,
+            takes_back: None,
             commands: Vec::new(),
             status: 0,
             busy_until: Instant(0),
@@ -167,10 +190,11 @@ impl Loader {
         let version = if flash.runs { flash.version().to_vec() } else { b"loader 1".to_vec() };
         let status = if now < flash.busy_until { 1 } else { flash.status };
         let identification = if flash.program.is_empty() { 0 } else { identification(&flash.program) };
-        let runs = flash.runs;
+        let (runs, is_on_trial) = (flash.runs, flash.is_on_trial);
         self.device.show(|_, image| {
             DICTIONARY.field(0x1000, 0).set(image, &device_type.to_le_bytes());
             DICTIONARY.field(0x100A, 0).set(image, &version);
+            DICTIONARY.field(0x2002, 1).set(image, &[u8::from(is_on_trial)]);
             DICTIONARY.field(0x1F51, 1).set(image, &[u8::from(runs)]);
             DICTIONARY.field(0x1F56, 1).set(image, &identification.to_le_bytes());
             DICTIONARY.field(0x1F57, 1).set(image, &status.to_le_bytes());

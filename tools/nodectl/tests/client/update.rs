@@ -53,7 +53,7 @@ const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
 
 fn options() -> Options {
     let sdo = sdo::Options { timeout: Duration::from_millis(500), ..sdo::Options::default() };
-    Options { sdo, patience: Duration::from_millis(20_000), force: false }
+    Options { sdo, patience: Duration::from_millis(20_000), force: false, confirm: true }
 }
 
 fn nodes(ids: &[u8]) -> Vec<NodeId> {
@@ -98,7 +98,37 @@ fn the_sequence_of_cia_302() {
             new_version: Some("1.1.0".into()),
             new_identification: Some(identification(&program("1.1.0"))),
             is_changed: true,
+            is_on_trial: false,
         }
+    );
+}
+
+#[test]
+fn a_program_on_trial_is_confirmed_unless_that_is_not_wanted() {
+    let (wire, mut diary) = (fleet(&[3]), Diary::default());
+    wire.station(|loaders| loaders[0].flash().has_trials = true);
+    let outcome = one(&wire, &image(NEW), &options(), &mut diary).unwrap();
+    assert!(!outcome.is_on_trial && !wire.station(|loaders| loaders[0].flash().is_on_trial));
+    assert_eq!(diary.steps_of(3).last(), Some(&Step::Confirm));
+    let left = Options { confirm: false, force: true, ..options() };
+    let outcome = one(&wire, &image(OLD), &left, &mut Diary::default()).unwrap();
+    assert!(outcome.is_on_trial && wire.station(|loaders| loaders[0].flash().is_on_trial));
+    // Who comes later and finds the program there ends its trial.
+    let outcome = one(&wire, &image(OLD), &options(), &mut Diary::default()).unwrap();
+    assert!(!outcome.is_on_trial && !outcome.is_changed);
+    assert!(!wire.station(|loaders| loaders[0].flash().is_on_trial));
+}
+
+#[test]
+fn a_node_that_has_taken_the_program_back_says_why() {
+    let wire = fleet(&[3]);
+    wire.station(|loaders| loaders[0].flash().takes_back = Some(program("1.0.0")));
+    let error = one(&wire, &image(NEW), &options(), &mut Diary::default()).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .ends_with("the new program started three times without being confirmed; the one before is back"),
+        "{error}"
     );
 }
 

@@ -93,11 +93,12 @@ fn version_check(new: Version, running: Option<&str>, check: impl Fn(&str, bool,
 pub(super) fn start(node: NodeId, bytes: Vec<u8>, force: bool) -> Result<Job, String> {
     let image = parse(bytes)?;
     let work = move |context: &mut Context| {
-        let options = Options { sdo: context.session.options.sdo(), patience: PATIENCE, force };
+        let options =
+            Options { sdo: context.session.options.sdo(), patience: PATIENCE, force, confirm: true };
         let mut teller = Teller { orders: context.teller(), told: 0, step: Step::Identify };
         let results = update(&mut context.session.network, &[node], &image, &options, &mut teller);
         let (_, result) = results.into_iter().next().ok_or_else(|| Failure::Usage("no node".to_owned()))?;
-        let Outcome { old_version, old_identification, new_version, new_identification, is_changed } =
+        let Outcome { old_version, old_identification, new_version, new_identification, is_changed, .. } =
             result?;
         Ok(json!({
             "result": if is_changed { "updated" } else { "unchanged" },
@@ -125,6 +126,7 @@ impl<T: Fn(Json)> Teller<T> {
             Step::Download | Step::DownloadSegments => "download",
             Step::Verify => "verify",
             Step::Start => "start",
+            Step::Confirm => "confirm",
             Step::Lost => "lost",
             Step::Back => "back",
         };

@@ -1,19 +1,19 @@
-//! The commit record in the last bytes of staging: whether the image there is to be copied.
+//! The record in the last bytes of staging, and of the same form in the last bytes of the kept image.
 //!
-//! | place | meaning |
-//! |---|---|
-//! | eight bytes | magic, programmed when the staged image has passed every check |
-//! | a word | 0: the magic is whole, not just lucky to read well after a cut. From this word on the image is to be copied |
-//! | a word | 0: it was copied, and need not be again while the application is whole |
+//! | place | in staging: whether the image there is to be copied | beside the kept image: whether it may have to come back |
+//! |---|---|---|
+//! | eight bytes | magic, programmed when the staged image has passed every check | the same when the copy of the application is whole |
+//! | a word | 0: the magic is whole, not just lucky to read well after a cut. From this word on the image is to be copied | 0: the same; from this word on there is a way back |
+//! | a word | 0: it was copied, and need not be again while the application is whole | 0: the way back is not needed any more |
 //!
 //! A word is what the flash programs as one, 4 or 8 bytes. The two words that decide are zeros, because zeros may be programmed once more over a word that a cut left half
 //! programmed, and then hold for good. To revoke is to program zeros over everything, the last word first: it comes before
-//! every erase of staging, so no erase that is cut can bring a record back.
+//! every erase of the area, so no erase that is cut can bring a record back.
 
-use crate::flash::{Flash, first, program};
+use crate::flash::{Flash, all_are, first, program};
 use crate::refusal::Refusal;
 
-/// Bytes at the end of staging that belong to the record.
+/// Bytes at the end of the area that belong to the record, and to the marks of the trial ([`crate::Trial`]).
 pub(crate) const RECORD_ROOM: u32 = 512;
 /// Bytes of the longest record, that of a flash with words of 8 bytes.
 const RECORD_LEN: usize = 24;
@@ -24,38 +24,40 @@ const MAGIC_LEN: u32 = 8;
 /// What the record says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Commit {
-    /// Nothing is to be copied.
+    /// There is nothing to be done.
     None,
-    /// A commit was cut; it does not count, but its words may read otherwise next time.
+    /// The record was cut; it does not count, but its words may read otherwise next time.
     Torn,
-    /// The image is to be copied.
+    /// The image is to be copied, or may have to be.
     Pending,
-    /// It was copied, and is still there.
+    /// That is over, and the image still there.
     Done,
 }
 
-/// The record, by the offset at which staging ends.
+/// The record, by the offset at which its area ends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record(pub(crate) u32);
 
 impl Record {
-    pub(crate) fn read<F: Flash>(self, flash: &mut F) -> Result<Commit, Refusal> {
+    /// What it says. A flash that cannot be read holds nothing.
+    pub(crate) fn read<F: Flash>(self, flash: &mut F) -> Commit {
         let word = flash.word_size();
         let mut bytes = [0; RECORD_LEN];
         let record = first(&mut bytes, len(word));
-        flash.read(self.start(word), record).map_err(|_| Refusal::Unspecified)?;
+        if flash.read(self.start(word), record).is_err() {
+            return Commit::None;
+        }
         let (magic, marks) = record.split_at(record.len().min(MAGIC.len()));
         let (closed, done) = marks.split_at(marks.len().min(word as usize));
-        let is = |bytes: &[u8], value: u8| bytes.iter().all(|byte| *byte == value);
-        Ok(match (is(closed, 0), is(done, 0)) {
+        match (all_are(closed, 0), all_are(done, 0)) {
             (true, true) if magic == MAGIC => Commit::Done,
             (true, false) if magic == MAGIC => Commit::Pending,
-            _ if is(record, 0) || is(record, 0xFF) => Commit::None,
+            _ if all_are(record, 0) || all_are(record, 0xFF) => Commit::None,
             _ => Commit::Torn,
-        })
+        }
     }
 
-    /// The staged image is to be copied.
+    /// The image is whole, and pending.
     pub(crate) fn write<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         let start = self.start(flash.word_size());
         program(flash, start, &MAGIC)?;
@@ -68,7 +70,7 @@ impl Record {
         mark(flash, self.start(word).saturating_add(MAGIC_LEN))
     }
 
-    /// The copy is complete.
+    /// The image is not pending any more.
     pub(crate) fn done<F: Flash>(self, flash: &mut F) -> Result<(), Refusal> {
         let word = flash.word_size();
         mark(flash, self.0.saturating_sub(word))
@@ -93,9 +95,16 @@ fn len(word: u32) -> u32 {
 }
 
 /// Programs a word of zeros.
-fn mark<F: Flash>(flash: &mut F, at: u32) -> Result<(), Refusal> {
+pub(crate) fn mark<F: Flash>(flash: &mut F, at: u32) -> Result<(), Refusal> {
     let word = flash.word_size();
     program(flash, at, first(&mut [0; 8], word))
+}
+
+/// Whether there is a word of zeros.
+pub(crate) fn is_zero<F: Flash>(flash: &mut F, at: u32) -> Result<bool, Refusal> {
+    let mut word = [0xFF; 4];
+    flash.read(at, &mut word).map_err(|_| Refusal::Unspecified)?;
+    Ok(word == [0; 4])
 }
 
 #[cfg(test)]
@@ -126,7 +135,7 @@ mod tests {
             for (at, word) in (48..).step_by(4).zip(words).filter(|(_, word)| *word != ERASED) {
                 program(&mut flash, at, &word).unwrap();
             }
-            assert_eq!(Record(64).read(&mut flash), Ok(says), "{words:?}");
+            assert_eq!(Record(64).read(&mut flash), says, "{words:?}");
         }
     }
 
@@ -137,7 +146,7 @@ mod tests {
                 let mut flash = MockFlash::with_words(&[64], word, 1);
                 write(Record(64), &mut flash).unwrap();
                 Record(64).revoke(&mut flash).unwrap();
-                assert_eq!(Record(64).read(&mut flash), Ok(Commit::None));
+                assert_eq!(Record(64).read(&mut flash), Commit::None);
                 assert_eq!(flash.bytes()[64 - len..], [0; 24][..len]);
                 assert_eq!(flash.bytes()[..64 - len], [0xFF; 64][..64 - len]);
             }
@@ -149,9 +158,9 @@ mod tests {
         for word in [4, 8] {
             let mut flash = MockFlash::with_words(&[64], word, 1);
             Record(64).write(&mut flash).unwrap();
-            assert_eq!(Record(64).read(&mut flash), Ok(Commit::Pending));
+            assert_eq!(Record(64).read(&mut flash), Commit::Pending);
             Record(64).done(&mut flash).unwrap();
-            assert_eq!(Record(64).read(&mut flash), Ok(Commit::Done));
+            assert_eq!(Record(64).read(&mut flash), Commit::Done);
         }
     }
 }

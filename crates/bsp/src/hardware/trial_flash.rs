@@ -1,0 +1,62 @@
+//! The records of an update, as the application may reach them: to confirm itself, or to be taken back.
+
+use embedded_storage::nor_flash::{ErrorType, NorFlashErrorKind, ReadNorFlash};
+use update::Trial;
+
+use super::ParameterFlash;
+use super::flash::Error;
+use crate::flash_area::FlashArea;
+use crate::sectors;
+use crate::update_layout::LAYOUT;
+
+/// All that an update has, to be read. The last bytes of staging and of the kept image can be programmed, and nothing is erased.
+pub struct TrialFlash<'a>(&'a mut ParameterFlash);
+
+impl ParameterFlash {
+    /// The records of an update.
+    pub fn trial(&mut self) -> TrialFlash<'_> {
+        TrialFlash(self)
+    }
+}
+
+/// The record that has a byte at `offset`.
+fn record(offset: u32) -> Result<FlashArea, Error> {
+    let record = Trial::records(&LAYOUT).into_iter().find(|record| record.contains(&offset));
+    let record = record.ok_or(NorFlashErrorKind::OutOfBounds)?;
+    Ok(FlashArea::new(sectors::FLASH, sectors::FLASH + record.start..sectors::FLASH + record.end))
+}
+
+impl ErrorType for TrialFlash<'_> {
+    type Error = Error;
+}
+
+impl ReadNorFlash for TrialFlash<'_> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        self.0.read_in(
+            &FlashArea::new(sectors::FLASH, sectors::FLASH..sectors::FLASH + LAYOUT.kept().end()),
+            offset,
+            bytes,
+        )
+    }
+
+    fn capacity(&self) -> usize {
+        LAYOUT.kept().end() as usize
+    }
+}
+
+impl update::Flash for TrialFlash<'_> {
+    fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        self.0.write_in(&record(offset)?, offset, bytes)
+    }
+
+    /// Refused.
+    fn start_erase(&mut self, _: u32) -> Result<(), Error> {
+        Err(NorFlashErrorKind::OutOfBounds.into())
+    }
+
+    fn is_busy(&mut self) -> Result<bool, Error> {
+        Ok(false)
+    }
+}

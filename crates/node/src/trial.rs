@@ -1,0 +1,166 @@
+//! 2002h: the trial of a new program (docs/update.md). The program that ran before comes back unless the new one is confirmed.
+
+use canopen::sdo::Abort;
+use canopen::{CanId, Duration, Frame, Instant};
+use profiles::Snapshot;
+use profiles::communication::PROGRAM_TRIAL;
+use update::{Reason, Refusal, Status, Trial};
+
+use crate::Protocol;
+use crate::application::NodeApplication;
+
+/// What 2002h:2 takes: "conf" and "back" in ASCII, the first character in the low byte.
+const CONFIRM: [u8; 4] = *b"conf";
+const TAKE_BACK: [u8; 4] = *b"back";
+
+/// So long after its start a program is well that is on the bus and measures, and to which a master has spoken.
+const CONFIRMATION: Duration = Duration::from_millis(10_000);
+
+/// So long the answer to a command has to get on the wire.
+const FAREWELL: Duration = Duration::from_millis(20);
+
+/// What is to be done about a trial.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The program is well: [`Trial::confirm`].
+    Confirm,
+    /// The program before is to come back: [`Trial::withdraw`], and a reset.
+    TakeBack,
+}
+
+/// The trial as the running program knows it.
+#[derive(Debug, Default)]
+pub(crate) struct ProgramTrial {
+    state: Trial,
+    /// A master has spoken to the node.
+    is_addressed: bool,
+    /// What a master has written to 2002h:2.
+    command: Option<Verdict>,
+    /// When the command is carried out: the answer to the master goes first.
+    due: Option<Instant>,
+    verdict: Option<Verdict>,
+}
+
+impl ProgramTrial {
+    /// 2002h:1.
+    fn state(&self) -> u8 {
+        match self.state {
+            Trial::None => 0,
+            Trial::Open | Trial::Lost(_) => 1,
+            Trial::Over(Reason::Starts) => 2,
+            Trial::Over(Reason::Withdrawn) => 3,
+        }
+    }
+
+    /// Why the program before is back, as 1F57h says it; `None` when it is not.
+    pub(crate) fn flash_status(&self) -> Option<u32> {
+        let Trial::Over(reason) = self.state else { return None };
+        Some(Status::refused(Refusal::TakenBack { reason }).word())
+    }
+
+    /// 2002h:2 is written.
+    pub(crate) fn command(&mut self, bytes: &[u8], is_at_work: bool) -> Result<(), Abort> {
+        let verdict = match <[u8; 4]>::try_from(bytes) {
+            Ok(CONFIRM) if is_at_work => Verdict::Confirm,
+            Ok(CONFIRM) => return Err(Abort::DeviceState),
+            Ok(TAKE_BACK) => Verdict::TakeBack,
+            _ => return Err(Abort::InvalidValue),
+        };
+        if self.state != Trial::Open {
+            return Err(Abort::DeviceState);
+        }
+        self.command = Some(verdict);
+        Ok(())
+    }
+}
+
+impl Protocol {
+    /// How the trial of this program stands. To be called before the start.
+    pub fn set_trial(&mut self, trial: Trial) {
+        self.device.application_mut().trial.state = trial;
+    }
+
+    /// Whether the program may still be taken back. What is stored must be what the program before has stored: it finds its settings.
+    #[must_use]
+    pub fn is_on_trial(&self) -> bool {
+        self.device.application().trial.state == Trial::Open
+    }
+
+    /// Why the program before is back, for the bus.
+    #[must_use]
+    pub fn is_taken_back(&self) -> bool {
+        matches!(self.device.application().trial.state, Trial::Over(_))
+    }
+
+    /// Notes that a master has spoken: with an NMT command, a request to the SDO server, or a heartbeat that is monitored. Frames for
+    /// others do not come here.
+    pub(crate) fn note_master(&mut self, frame: &Frame) {
+        const FUNCTION: u16 = 0x780;
+        let function = frame.id() & FUNCTION;
+        if frame.id() == CanId::NMT.get() || matches!(function, 0x600 | 0x700) {
+            self.device.application_mut().trial.is_addressed = true;
+        }
+    }
+
+    /// Looks at the trial, for [`verdict`](Protocol::verdict). `now` counts from the start of the program.
+    pub fn judge(&mut self, now: Instant, is_on_bus: bool) {
+        if self.is_on_trial() {
+            let verdict = self.commanded(now).or_else(|| self.found(now, is_on_bus));
+            self.device.application_mut().trial.verdict = verdict;
+        }
+    }
+
+    /// What is to be done about the trial now, and again until it succeeds.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Verdict> {
+        self.device.application().trial.verdict
+    }
+
+    /// The command of a master, when its answer had time to go.
+    fn commanded(&mut self, now: Instant) -> Option<Verdict> {
+        let trial = &mut self.device.application_mut().trial;
+        trial.command?;
+        let due = *trial.due.get_or_insert(now + FAREWELL);
+        trial.command.filter(|_| now >= due)
+    }
+
+    /// What follows from the state of the node and the times of 2002h.
+    fn found(&self, now: Instant, is_on_bus: bool) -> Option<Verdict> {
+        let is_well = is_on_bus && self.is_at_work();
+        let [limit, automatic] = [3, 4].map(|sub| self.seconds(sub));
+        let is_past = |time: Option<Duration>| time.is_some_and(|time| now >= Instant(0) + time);
+        let is_addressed = self.device.application().trial.is_addressed;
+        let is_confirmed = is_addressed && is_past(Some(CONFIRMATION)) || is_past(automatic);
+        if is_well && is_confirmed {
+            Some(Verdict::Confirm)
+        } else {
+            is_past(limit).then_some(Verdict::TakeBack)
+        }
+    }
+
+    /// The program is confirmed.
+    pub fn end_trial(&mut self) {
+        self.device.application_mut().trial = ProgramTrial::default();
+        self.device.show(|application, image| application.show_trial(image));
+    }
+
+    /// A time of 2002h; `None` where it is 0.
+    fn seconds(&self, sub: u8) -> Option<Duration> {
+        let dictionary = self.device.application().setup.personality.dictionary();
+        let entry = dictionary.find(PROGRAM_TRIAL, sub).ok()?;
+        let [low, high] = *entry.field().get(self.device.image()).first_chunk()?;
+        let seconds = u64::from(u16::from_le_bytes([low, high]));
+        (seconds > 0).then_some(Duration(seconds * 1_000_000))
+    }
+}
+
+impl NodeApplication {
+    pub(crate) fn show_trial(&self, image: &mut [u8]) {
+        self.show(PROGRAM_TRIAL, 1, &[self.trial.state()], image);
+    }
+
+    /// Whether values have been measured.
+    pub(crate) fn has_measured(&self) -> bool {
+        !matches!(self.snapshot, Snapshot::Nothing)
+    }
+}

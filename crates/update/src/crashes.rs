@@ -1,0 +1,93 @@
+//! How often the application has crashed since it last said that it is well.
+
+/// The count, kept in RAM that survives a reset (region `RETAINED` of memory.x).
+///
+/// The bootloader takes it from RAM at every start, counts the reset, puts it back, and asks [`crate::boot`]. The
+/// application [confirms](Crashes::confirmed) ten seconds after its start if it is on the bus and measures then, else as soon as it does. A
+/// start that is asked for (1F51h = 1) confirms too: it is another try.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Crashes(u8);
+
+/// Why the chip was reset, as far as it matters here.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reset {
+    /// Power came: RAM holds nothing.
+    Power,
+    /// Somebody asked for it: an NMT command, 1F51h, the debugger.
+    #[default]
+    Asked,
+    /// A fault, a panic or the watchdog.
+    Crash,
+}
+
+impl Crashes {
+    /// So many crashes without a confirmation keep the bootloader from starting the application.
+    pub const LIMIT: u8 = 3;
+
+    /// The count in a word of RAM; 0 when the word is none, as after power-up.
+    #[must_use]
+    pub fn from_word(word: u32) -> Crashes {
+        let [count, ..] = word.to_le_bytes();
+        let crashes = Crashes(count);
+        if crashes.word() == word { crashes } else { Crashes(0) }
+    }
+
+    /// The word to keep: the count, and its complement in the other three bytes.
+    #[must_use]
+    pub fn word(self) -> u32 {
+        u32::from_le_bytes([self.0, !self.0, !self.0, !self.0])
+    }
+
+    /// The count after a reset.
+    #[must_use]
+    pub fn after(self, reset: Reset) -> Crashes {
+        match reset {
+            Reset::Power => Crashes(0),
+            Reset::Asked => self,
+            Reset::Crash => Crashes(self.0.saturating_add(1)),
+        }
+    }
+
+    /// The application is well.
+    #[must_use]
+    pub fn confirmed(self) -> Crashes {
+        Crashes(0)
+    }
+
+    /// Crashes since the last confirmation.
+    #[must_use]
+    pub fn count(self) -> u8 {
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ram_holds_after_power_up_counts_nothing() {
+        for word in [0, u32::MAX, 0x5555_5555, 0xFFFF_FF01, 3] {
+            assert_eq!(Crashes::from_word(word).count(), 0);
+        }
+        for count in 0..=u8::MAX {
+            assert_eq!(Crashes::from_word(Crashes(count).word()), Crashes(count));
+        }
+    }
+
+    #[test]
+    fn the_word_is_the_count_and_its_complement_three_times() {
+        assert_eq!(Crashes(0).word(), 0xFFFF_FF00);
+        assert_eq!(Crashes(0x12).word(), 0xEDED_ED12);
+    }
+
+    #[test]
+    fn only_crashes_count_and_only_until_a_confirmation() {
+        let crashes =
+            [Reset::Crash, Reset::Asked, Reset::Crash].into_iter().fold(Crashes::default(), Crashes::after);
+        assert_eq!(crashes.count(), 2);
+        assert_eq!(crashes.confirmed().after(Reset::Crash).count(), 1);
+        assert_eq!(crashes.after(Reset::Power).count(), 0);
+        assert_eq!(Crashes(u8::MAX).after(Reset::Crash).count(), u8::MAX);
+    }
+}
