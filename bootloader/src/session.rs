@@ -146,7 +146,7 @@ impl Session {
     fn start_if_good(&mut self, now: Instant) {
         let updater = self.device.application_mut().updater();
         if updater.phase() == Phase::Installed {
-            // Of another image.
+            // What was counted were the crashes of another image.
             retained::set_crashes(Crashes::default());
         }
         let start = Start { crashes: retained::crashes(), proof: Proof::Waived, ..Start::default() };

@@ -39,20 +39,22 @@ pub(crate) fn decide(loader: &mut Loader) -> Outcome {
     if loader.reset == Reset::Power {
         retained::forget_proof();
     }
-    let stay = note.is_some_and(|note| note.stay);
-    let start = Start { stay, reset: loader.reset, crashes, proof: retained::proof() };
+    let start = Start {
+        stay: note.is_some_and(|note| note.stay),
+        reset: loader.reset,
+        crashes,
+        proof: retained::proof(),
+    };
     let mut seal = 0;
     match update::boot_sealed(&mut loader.flash, &TARGET, start, &mut seal) {
         Decision::Start(_) => {
             retained::set_proof(seal);
-            application::vectors().map_or(self::stay(Stay::Asked, note), Outcome::Application)
+            application::vectors().map_or(stay(Stay::Asked, note), Outcome::Application)
         }
         Decision::Copy => Outcome::Stay(Reason::Copy, note),
         Decision::Revert => Outcome::Stay(Reason::Revert, note),
-        Decision::Stay(why @ Stay::NoProgram(_)) => {
-            unsigned().map_or(self::stay(why, note), Outcome::Application)
-        }
-        Decision::Stay(why) => self::stay(why, note),
+        Decision::Stay(why @ Stay::NoProgram(_)) => unsigned().map_or(stay(why, note), Outcome::Application),
+        Decision::Stay(why) => stay(why, note),
     }
 }
 

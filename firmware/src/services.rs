@@ -105,14 +105,16 @@ impl Services {
         }
         self.report_losses(node);
         let now = Clock::now();
-        let next = self.call(node, |protocol, out| protocol.poll_services(now, out));
+        let is_on_bus = self.can.state() != BusState::Off;
+        let next = self.call(node, |protocol, out| {
+            protocol.judge(now, is_on_bus);
+            protocol.poll_services(now, out)
+        });
         let next = self.settle(next, node);
         let crashes = retained::crashes();
         if now >= CONFIRMATION && crashes != crashes.confirmed() && self.is_well(node) {
             retained::set_crashes(crashes.confirmed());
         }
-        let is_on_bus = self.can.state() != BusState::Off;
-        node.call(|protocol, _| protocol.judge(now, is_on_bus));
         self.led.set(blink(now));
         self.alarm.set(next.services.min(now + PERIOD).min(self.back_off.due()));
         // It tells the watchdog that it is there, whether there is something to store or not.

@@ -19,7 +19,7 @@ const CONFIRMATION: Duration = Duration::from_millis(10_000);
 /// So long the answer to a command has to get on the wire.
 const FAREWELL: Duration = Duration::from_millis(20);
 
-/// What is to be done about a trial.
+/// How a trial ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The program is well: [`Trial::confirm`].
@@ -34,7 +34,7 @@ pub(crate) struct ProgramTrial {
     state: Trial,
     /// A master has spoken to the node.
     is_addressed: bool,
-    /// What a master has written to 2002h:2.
+    /// The command that a master has written to 2002h:2.
     command: Option<Verdict>,
     /// When the command is carried out: the answer to the master goes first.
     due: Option<Instant>,
@@ -110,7 +110,7 @@ impl Protocol {
         }
     }
 
-    /// What is to be done about the trial now, and again until it succeeds.
+    /// How the trial ends now. The verdict stays until it was carried out.
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
         self.device.application().trial.verdict
@@ -124,7 +124,7 @@ impl Protocol {
         trial.command.filter(|_| now >= due)
     }
 
-    /// What follows from the state of the node and the times of 2002h.
+    /// The verdict without a command: by the state of the node and the times of 2002h.
     fn found(&self, now: Instant, is_on_bus: bool) -> Option<Verdict> {
         let is_well = is_on_bus && self.is_at_work();
         let [limit, automatic] = [3, 4].map(|sub| self.seconds(sub));

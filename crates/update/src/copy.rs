@@ -21,7 +21,7 @@ pub(crate) struct Copy {
 }
 
 impl Copy {
-    /// Of the image with this header.
+    /// The copy of the image with this header.
     pub(crate) fn new(header: Header, from: Area, to: Area) -> Copy {
         Copy {
             header,

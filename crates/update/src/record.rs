@@ -30,7 +30,7 @@ pub(crate) enum Commit {
     Torn,
     /// The image is to be copied, or may have to be.
     Pending,
-    /// That is over, and the image still there.
+    /// The image was dealt with, and is still there.
     Done,
 }
 
@@ -39,7 +39,7 @@ pub(crate) enum Commit {
 pub(crate) struct Record(pub(crate) u32);
 
 impl Record {
-    /// What it says. A flash that cannot be read holds nothing.
+    /// What the record says. A flash that cannot be read holds nothing.
     pub(crate) fn read<F: Flash>(self, flash: &mut F) -> Commit {
         let word = flash.word_size();
         let mut bytes = [0; RECORD_LEN];

@@ -40,7 +40,7 @@ pub enum Phase {
     Checking,
     /// It is good, and will be copied whatever happens.
     Committed,
-    /// It is being copied, or the image before it.
+    /// The image is being copied, or the application before it to where it is kept.
     Copying,
     /// It was copied: ask [`crate::boot`].
     Installed,
@@ -68,7 +68,7 @@ enum State {
     Installed,
 }
 
-/// What an image is checked for, and copied.
+/// Why an image is checked, and then copied.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Plan {
     /// The staged image, to be committed.

@@ -62,7 +62,7 @@ impl Flash {
         Ok(())
     }
 
-    /// The same for many bytes, which takes half the time then.
+    /// The same, quicker for many bytes and slower for a few.
     pub(super) fn read_many(&self, area: &FlashArea, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         let address = area.address(offset, bytes.len(), 1)?;
         // SAFETY: all of it lies in flash, which is readable for ever, and nobody programs it meanwhile: that takes this

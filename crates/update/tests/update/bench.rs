@@ -95,6 +95,16 @@ pub(crate) fn noise(seed: u64, len: usize) -> Vec<u8> {
     (0..len).map(|_| random.u8(..)).collect()
 }
 
+/// A number that looks random and is the same each time.
+pub(crate) fn chance(seed: u32) -> u32 {
+    u32::from_le_bytes(noise(u64::from(seed), 4).try_into().unwrap())
+}
+
+/// Whether all is to be tried: `cargo xtask test --thorough` sets THOROUGH=1.
+pub(crate) fn is_thorough() -> bool {
+    std::env::var("THOROUGH").is_ok_and(|value| value == "1")
+}
+
 /// A flash in which `image` was installed by an update.
 pub(crate) fn flash_with(image: &Image, seed: u64) -> MockFlash {
     flash_of_words_with(image, 4, seed)

@@ -1,8 +1,8 @@
 //! The power is cut at every flash operation of whole updates, and again in the recovery.
 
 use crate::bench::{
-    Image, SECTORS, flash_of_words_with, flash_with, holds, image_a, image_b, install, noise, stage, start,
-    update,
+    Image, SECTORS, chance, flash_of_words_with, flash_with, holds, image_a, image_b, install, is_thorough,
+    stage, start, update,
 };
 use update::mock::{MockFlash, Weak};
 use update::{Decision, Refusal, Stay};
@@ -17,11 +17,6 @@ enum Runs {
 
 /// One of so many operations is cut where not all are.
 const SAMPLE: u32 = 3;
-
-/// Whether all is to be tried: `cargo xtask test --thorough` sets THOROUGH=1.
-fn is_thorough() -> bool {
-    std::env::var("THOROUGH").is_ok_and(|value| value == "1")
-}
 
 /// How many of `all` cuts there are at least.
 fn at_least(all: u32) -> u32 {
@@ -178,11 +173,6 @@ fn second_cuts(case: &Case, all: u32) {
     });
     println!("{cuts} second cuts in the recovery");
     assert!(cuts > at_least(all));
-}
-
-/// A number that looks random and is the same each time.
-fn chance(seed: u32) -> u32 {
-    u32::from_le_bytes(noise(u64::from(seed), 4).try_into().unwrap())
 }
 
 #[test]

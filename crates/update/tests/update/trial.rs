@@ -1,8 +1,8 @@
 //! The trial of a new image, and the way back to the one before it.
 
 use crate::bench::{
-    Image, assert_starts, confirm, description, flash_of_words_with, flash_with, holds, image_a, image_b,
-    install, noise, revert, run, stage, start, start_after, target, update,
+    Image, assert_starts, chance, confirm, description, flash_of_words_with, flash_with, holds, image_a,
+    image_b, install, is_thorough, revert, run, stage, start, start_after, target, update,
 };
 use update::mock::{MockFlash, Weak};
 use update::{Crashes, Decision, Proof, Reason, Refusal, Reset, Start, Status, Stay, Trial, Updater, boot};
@@ -247,7 +247,7 @@ fn cut_everywhere(flash: &MockFlash, act: impl Fn(&mut MockFlash) -> bool, check
     assert!(act(&mut whole));
     let operations = whole.operations() - flash.operations();
     let mut cuts = 0;
-    let step = if std::env::var("THOROUGH").is_ok_and(|value| value == "1") { 1 } else { 3 };
+    let step = if is_thorough() { 1 } else { 3 };
     let near_an_end = |at: u32| at < 6 || operations - at < 6;
     for at in (0..operations).filter(|at| at % step == 0 || near_an_end(*at)) {
         for (number, weak) in (0..).zip(Weak::ALL) {
@@ -257,8 +257,7 @@ fn cut_everywhere(flash: &MockFlash, act: impl Fn(&mut MockFlash) -> bool, check
             cut.power_up();
             let mut again = cut.clone();
             check(&mut cut);
-            let chance = u32::from_le_bytes(noise(u64::from(at * 4 + number), 4).try_into().unwrap());
-            again.cut_after(chance % operations, weak);
+            again.cut_after(chance(at * 4 + number) % operations, weak);
             start(&mut again);
             again.power_up();
             check(&mut again);

@@ -4,6 +4,8 @@
 //! B is a program of five words, so that all of its update can be cut at every operation; A is the real application, whose copy to
 //! where it is kept is cut here and there.
 
+use std::ops::Range;
+
 use canbus::Time;
 use host_tests::thorough::{either, is_thorough};
 use sign::image::Image;
@@ -123,23 +125,23 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
 /// Every one of so many operations is cut where not all are.
 const SAMPLE: u64 = 10;
 
-/// Of the operations that keep A, one of so many is cut, and each of so many at either end.
-const KEPT_SAMPLE: [u64; 2] = [2001, 6];
+/// Of the operations that keep A, one of so many is cut, but for those at either end.
+const KEEPING_SAMPLE: u64 = 2001;
+const ENDS: u64 = 6;
 
-/// How far an operation is into those that keep A.
-fn into_keeping(cut: u64, all: u64) -> Option<u64> {
+/// The operations that keep A, but for those at either end, of an update of so many.
+fn keeping(all: u64) -> Range<u64> {
+    let copy = all - COPY;
     let keeping = 4 + 1 + version_a().to_bytes().len() as u64 / 4 + 3;
-    let into = cut.checked_sub(all - COPY - keeping)?;
-    let [_, end] = KEPT_SAMPLE;
-    (end..keeping - end).contains(&into).then_some(into)
+    copy - keeping + ENDS..copy - ENDS
 }
 
 /// Whether the power is to go in this operation.
-fn is_cut(cut: u64, all: u64) -> bool {
-    let [sample, _] = KEPT_SAMPLE;
-    match into_keeping(cut, all) {
-        Some(into) => (into / 2).is_multiple_of(either(sample, sample / 10)),
-        None => is_thorough() || (cut / 2).is_multiple_of(SAMPLE),
+fn is_cut(cut: u64, keeping: &Range<u64>) -> bool {
+    if keeping.contains(&cut) {
+        ((cut - keeping.start) / 2).is_multiple_of(either(KEEPING_SAMPLE, KEEPING_SAMPLE / 10))
+    } else {
+        is_thorough() || (cut / 2).is_multiple_of(SAMPLE)
     }
 }
 
@@ -149,16 +151,17 @@ fn cut_everywhere(rest: u64) {
     let mut victim = Victim::new();
     let all = victim.update(NO_CUT);
     assert_eq!(victim.recover(), Some(Runs::B), "without a cut");
+    let keeping = keeping(all);
     let (mut runs, mut kept, mut twice) = ([0; 2], 0, 0);
     victim.restore();
-    for cut in (1..=all).filter(|cut| cut % 2 == rest && is_cut(*cut, all)) {
+    for cut in (1..=all).filter(|cut| cut % 2 == rest && is_cut(*cut, &keeping)) {
         victim.update(cut);
         let second = 1 + cut * 37 % COPY;
         if cut > all - COPY && cut / 2 % SECOND_CUTS < 2 {
             twice += usize::from(victim.cut_again(second));
         }
         let Some(found) = victim.recover() else { panic!("cut {cut} of {all}, perhaps then {second}") };
-        if into_keeping(cut, all).is_some() {
+        if keeping.contains(&cut) {
             assert_eq!(found, Runs::B, "it was committed: cut {cut} of {all}");
             kept += 1;
         } else {

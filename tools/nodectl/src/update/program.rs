@@ -84,7 +84,7 @@ impl<'n> Program<'n> {
     pub fn is_on_trial(&mut self) -> Result<bool, Error> {
         match self.read(TRIAL_STATE) {
             Ok(state) => Ok(state.first() == Some(&1)),
-            // Of an older program.
+            // A program from before there were trials.
             Err(error) if error.is_absent() => Ok(false),
             Err(error) => Err(error),
         }
