@@ -2,6 +2,7 @@
 
 use canopen::dictionary::{Access, Dictionary, Object, Type};
 use canopen::objects;
+use update::AUTHORISATION_KEY;
 
 /// 'BOOT': what 1000h reads in a bootloader.
 const BOOT: u32 = 0x424F_4F54;
@@ -10,11 +11,24 @@ const fn fixed(index: u16, sub: u8, name: &'static str, kind: Type) -> Object {
     Object::new(index, sub, name, kind, Access::ReadOnly)
 }
 
+/// Who may change the program: in a bootloader with a key for that.
+const AUTHORISATION: &[Object] = if AUTHORISATION_KEY.is_some() {
+    &[
+        Object::highest(0x2003, 3, "Program authorisation"),
+        fixed(0x2003, 1, "State", Type::Unsigned8),
+        fixed(0x2003, 2, "Challenge", Type::Unsigned64),
+        Object::new(0x2003, 3, "Response", Type::Unsigned64, Access::WriteOnly).handled(),
+    ]
+} else {
+    &[]
+};
+
 pub(crate) const ROWS: &[Object] = canopen::rows!(
     [objects::device_type(BOOT), objects::error_register(), objects::device_name("Bootloader")],
     [objects::hardware_version(""), objects::software_version(env!("CARGO_PKG_VERSION"))],
     [objects::heartbeat_producer(1000)],
     objects::identity(0, 0, 0),
+    AUTHORISATION,
     [
         Object::highest(0x1F50, 1, "Program data"),
         Object::new(0x1F50, 1, "Program 1 data", Type::Domain, Access::WriteOnly),

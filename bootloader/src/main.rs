@@ -68,8 +68,9 @@ mod app {
         let lost: &'static Losses = cx.local.lost;
         let (receiver, frames) = Receiver::new(Fifo::Services, cx.local.queue, lost);
         let identity = Identity::read(note);
+        let authorisation = start::authorisation(note);
         let run = Run {
-            session: Session::new(reason, identity, loader.flash, bus.can),
+            session: Session::new(reason, identity, authorisation, loader.flash, bus.can),
             identity,
             frames,
             queue: Outbox::new(),

@@ -4,7 +4,7 @@ use bsp::{ProgramFlash, board, factory};
 use canopen::dictionary::{Entry, Field};
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Part};
-use update::{Proof, Refusal, Status, Updater};
+use update::{AUTHORISATION_KEY, Authorisation, Proof, Refusal, Updater};
 
 use crate::dictionary::DICTIONARY;
 use crate::target::{PRODUCT, REVISION, TARGET, VENDOR};
@@ -24,17 +24,24 @@ const IDENTITY: [Field; 4] = [
 ];
 const PROGRAM_CONTROL: Field = DICTIONARY.field(0x1F51, 1);
 const STATUS: Field = DICTIONARY.field(0x1F57, 1);
+/// State and challenge, in a bootloader with a key.
+const AUTHORISATION: Option<[Field; 2]> = if AUTHORISATION_KEY.is_some() {
+    Some([DICTIONARY.field(0x2003, 1), DICTIONARY.field(0x2003, 2)])
+} else {
+    None
+};
 
 /// The update under way, as the application of the CANopen device.
 pub(crate) struct Program {
     updater: Updater<ProgramFlash>,
+    authorisation: Authorisation,
     /// The program was told to start, and there is one.
     starts: bool,
 }
 
 impl Program {
-    pub(crate) fn new(updater: Updater<ProgramFlash>) -> Program {
-        Program { updater, starts: false }
+    pub(crate) fn new(updater: Updater<ProgramFlash>, authorisation: Authorisation) -> Program {
+        Program { updater, authorisation, starts: false }
     }
 
     pub(crate) fn updater(&mut self) -> &mut Updater<ProgramFlash> {
@@ -46,12 +53,23 @@ impl Program {
         self.starts
     }
 
-    /// What the objects read now.
-    pub(crate) fn readings(&self) -> Readings {
-        Readings { status: self.updater.status() }
+    /// What the objects of the program read now. 1F56h reads 0: no program runs.
+    pub(crate) fn show(&self, image: &mut [u8]) {
+        PROGRAM_CONTROL.store(image, [STOP]);
+        STATUS.store(image, self.updater.status().word().to_le_bytes());
+        if let Some([state, challenge]) = AUTHORISATION {
+            state.store(image, [self.authorisation.state()]);
+            challenge.store(image, self.authorisation.challenge());
+        }
+    }
+
+    /// Refuses whoever has not answered the challenge, where a key is set.
+    fn admit(&self) -> Result<(), Abort> {
+        if AUTHORISATION_KEY.is_none() || self.authorisation.is_open() { Ok(()) } else { Err(Abort::DeviceState) }
     }
 
     fn control(&mut self, command: u8) -> Result<(), Abort> {
+        self.admit()?;
         match command {
             // The program is stopped, and at its beginning.
             STOP | RESET => Ok(()),
@@ -61,6 +79,11 @@ impl Program {
         }
     }
 
+    fn answer(&mut self, response: &[u8]) -> Result<(), Abort> {
+        let is_right = response.try_into().is_ok_and(|response| self.authorisation.answer(response));
+        if is_right { Ok(()) } else { Err(Abort::InvalidValue) }
+    }
+
     fn start(&mut self) -> Result<(), Abort> {
         if self.updater.status().busy {
             return Err(Abort::DeviceState);
@@ -68,18 +91,6 @@ impl Program {
         let found = update::application(self.updater.flash(), &TARGET, Proof::Waived);
         self.starts = found.is_ok() || crate::start::unsigned().is_some();
         if self.starts { Ok(()) } else { Err(Abort::DeviceState) }
-    }
-}
-
-/// What the objects of the program read. 1F56h reads 0: no program runs.
-pub(crate) struct Readings {
-    status: Status,
-}
-
-impl Readings {
-    pub(crate) fn store(&self, image: &mut [u8]) {
-        PROGRAM_CONTROL.store(image, [STOP]);
-        STATUS.store(image, self.status.word().to_le_bytes());
     }
 }
 
@@ -93,19 +104,21 @@ impl Application for Program {
         for (field, value) in IDENTITY.into_iter().zip(identity) {
             field.store(image, value.to_le_bytes());
         }
-        self.readings().store(image);
+        self.show(image);
     }
 
-    /// 1F51h:1 is the one object that is handled.
+    /// 1F51h:1 is handled, and in a bootloader with a key 2003h:3, which has eight bytes.
     fn write(&mut self, _: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
         match bytes {
             &[command] => self.control(command),
+            response if AUTHORISATION_KEY.is_some() => self.answer(response),
             _ => Err(Abort::Access),
         }
     }
 
     /// 1F50h:1 is the one domain.
     fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
+        self.admit()?;
         let updater = &mut self.updater;
         let outcome = match part {
             Part::Begin(size) => updater.begin(size.map(|size| size.try_into().unwrap_or(u32::MAX))),

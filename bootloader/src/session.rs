@@ -11,7 +11,7 @@ use bsp::filters::{self, Banks};
 use bsp::handover::Handover;
 use bsp::{Clock, Received, retained};
 use canopen::{Action, CanId, Duration, Instant, NodeId, ServiceDevice};
-use update::{Crashes, Decision, Next, Phase, Proof, Start, Updater};
+use update::{Authorisation, Crashes, Decision, Next, Phase, Proof, Start, Updater};
 
 use crate::dictionary::{DICTIONARY, ROWS};
 use crate::identity::Identity;
@@ -54,6 +54,7 @@ impl Session {
     pub(crate) fn new(
         reason: Reason,
         identity: Identity,
+        authorisation: Authorisation,
         flash: bsp::ProgramFlash,
         can: Controller,
     ) -> Session {
@@ -66,7 +67,7 @@ impl Session {
             Reason::Revert => updater.revert(),
         };
         Session {
-            device: ServiceDevice::new(&DICTIONARY, identity.node_id, Program::new(updater)),
+            device: ServiceDevice::new(&DICTIONARY, identity.node_id, Program::new(updater, authorisation)),
             can,
             timing: identity.timing.unwrap_or(BitTiming::FASTEST),
             back_off: BackOff::default(),
@@ -157,7 +158,7 @@ impl Session {
     }
 
     fn publish(&mut self) {
-        self.device.show(|program, image| program.readings().store(image));
+        self.device.show(|program, image| program.show(image));
     }
 
     /// Does what a call leaves to the bootloader, until nothing is left; when the next call is due.

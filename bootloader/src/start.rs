@@ -3,8 +3,9 @@
 use bsp::handover::Handover;
 use bsp::loader::Loader;
 use bsp::vectors::Vectors;
-use bsp::{application, retained};
-use update::{Decision, Reset, Start, Status, Stay};
+use bsp::{application, factory, memory, retained};
+use update::key::KEY_LEN;
+use update::{AUTHORISATION_KEY, Authorisation, Decision, Pair, Reset, Start, Status, Stay};
 
 use crate::target::TARGET;
 
@@ -30,6 +31,10 @@ pub(crate) enum Outcome {
 /// Counts the reset, takes the request out of the note in RAM, and decides.
 pub(crate) fn decide(loader: &mut Loader) -> Outcome {
     retained::set_development(cfg!(feature = "development"));
+    match &AUTHORISATION_KEY {
+        Some(key) => retained::set_authorisation(&pair(key)),
+        None => retained::forget_authorisation(),
+    }
     let note = retained::handover();
     if let Some(note) = note {
         retained::hand_over(&Handover { stay: false, ..note });
@@ -56,6 +61,18 @@ pub(crate) fn decide(loader: &mut Loader) -> Outcome {
         Decision::Stay(why @ Stay::NoProgram(_)) => unsigned().map_or(stay(why, note), Outcome::Application),
         Decision::Stay(why) => stay(why, note),
     }
+}
+
+/// Challenge and response of this start. The pair of the start before is part of the noise: without a power cut none comes again.
+#[inline(never)]
+fn pair(key: &[u8; KEY_LEN]) -> Pair {
+    Pair::new(key, &memory::noise::<256>(), factory::serial_number())
+}
+
+/// Who may change the program: whoever the application has sent the node here for, or else who answers.
+pub(crate) fn authorisation(note: Option<Handover>) -> Authorisation {
+    let pair = AUTHORISATION_KEY.and_then(|_| retained::authorisation());
+    Authorisation::new(pair, note.is_some_and(|note| note.stay))
 }
 
 fn stay(why: Stay, note: Option<Handover>) -> Outcome {

@@ -8,7 +8,7 @@ use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
 use node::{BitRate, Fault, Identity, LastingRecord, NodeId, Parameters, Personality, Protocol, Setup};
 use profiles::board::{ChipThermometer, LASTING_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
-use update::Trial;
+use update::{Authorisation, Trial};
 
 use crate::bit_rate::Rate;
 
@@ -62,7 +62,9 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
 /// Not inlined: the stack on which the value is made is free again for what reads the flash.
 #[inline(never)]
 fn make(place: &'static mut MaybeUninit<Protocol>, setup: &Setup) -> &'static mut Protocol {
-    place.write(Protocol::new(setup))
+    let protocol = place.write(Protocol::new(setup));
+    protocol.set_authorisation(Authorisation::new(retained::authorisation(), false));
+    protocol
 }
 
 /// May erase pages: half a second in which the core stands still, so it is done before the node goes on the bus.

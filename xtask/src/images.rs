@@ -95,17 +95,39 @@ pub(crate) fn build_for_owner() -> Result<()> {
 /// Compiles the bootloader as its owner does, with keys that only the tests know, and puts the file beside the one for
 /// development.
 pub(crate) fn compile_owners(toolchain: &Toolchain) -> Result<PathBuf> {
-    let keys = std::fs::read_to_string(root().join("host-tests/tests/board/update/owner-keys.hex"))?;
-    let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
-    command.envs(KEYS.into_iter().zip(keys.lines()));
-    progress::build("bootloader of an owner", &mut command)?;
-    let owners = dir().join("bootloader-owner");
-    std::fs::copy(dir().join("bootloader"), &owners)?;
-    Ok(owners)
+    let mut command = owners(toolchain)?;
+    command.env_remove(AUTHORISATION_KEY);
+    put_beside(&mut command, "bootloader-owner")
 }
 
-/// The same; and without a key, and not for development, there is no bootloader.
+/// The same, for an owner who wants to know who changes the program.
+fn compile_guarded(toolchain: &Toolchain) -> Result<PathBuf> {
+    let mut command = owners(toolchain)?;
+    command.env(AUTHORISATION_KEY, of_tests("authorisation-key.hex")?.trim());
+    put_beside(&mut command, "bootloader-guarded")
+}
+
+/// How an owner builds the bootloader.
+fn owners(toolchain: &Toolchain) -> Result<Command> {
+    let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
+    command.envs(KEYS.into_iter().zip(of_tests("owner-keys.hex")?.lines()));
+    Ok(command)
+}
+
+fn of_tests(name: &str) -> Result<String> {
+    Ok(std::fs::read_to_string(root().join("host-tests/tests/board/update").join(name))?)
+}
+
+fn put_beside(build: &mut Command, name: &str) -> Result<PathBuf> {
+    progress::build("bootloader of an owner", build)?;
+    let place = dir().join(name);
+    std::fs::copy(dir().join("bootloader"), &place)?;
+    Ok(place)
+}
+
+/// Both; and without a key, and not for development, there is no bootloader.
 pub(crate) fn check_owners(toolchain: &Toolchain) -> Result<()> {
+    compile_guarded(toolchain)?;
     compile_owners(toolchain)?;
     let mut keyless = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
     for key in KEYS {
@@ -122,6 +144,8 @@ pub(crate) fn check_owners(toolchain: &Toolchain) -> Result<()> {
 
 /// The variables that the keys come in.
 const KEYS: [&str; 2] = ["UPDATE_PUBLIC_KEY", "UPDATE_PUBLIC_KEY_2"];
+/// The variable of the key that opens a node for an update.
+const AUTHORISATION_KEY: &str = "UPDATE_AUTHORISATION_KEY";
 
 fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {
     let mut command = toolchain.cargo("build", &["--release"]);

@@ -80,15 +80,16 @@ impl Place {
 }
 
 impl Crash {
-    /// The record to leave in RAM.
+    /// The record to leave in RAM. Inlined, as each of the few that call knows which crash it is: the rest is left out.
+    #[inline(always)]
     #[must_use]
     pub fn seal(&self) -> Sealed {
-        let (kind, content) = self.content();
-        let mut words = [0; WORDS];
-        (words[0], words[1]) = (MAGIC, kind);
-        words.iter_mut().skip(2).zip(content).for_each(|(to, from)| *to = from);
-        words[WORDS - 1] = check(&words);
-        words
+        match self {
+            Crash::Fault(f) => sealed(FAULT, &[f.pc, f.lr, f.sp, f.cfsr, f.hfsr, f.address]),
+            Crash::Panic(place) => sealed(PANIC, &place_words(place)),
+            Crash::Clock => sealed(CLOCK, &[]),
+            Crash::Interrupt(number) => sealed(INTERRUPT, &[u32::from(number.cast_unsigned())]),
+        }
     }
 
     /// The crash in `words`; `None` when the mark or the CRC is wrong, as after power-on.
@@ -106,17 +107,14 @@ impl Crash {
             _ => None,
         }
     }
+}
 
-    fn content(&self) -> (u32, Content) {
-        match self {
-            Crash::Fault(f) => (FAULT, [f.pc, f.lr, f.sp, f.cfsr, f.hfsr, f.address, 0, 0, 0]),
-            Crash::Panic(place) => (PANIC, place_words(place)),
-            Crash::Clock => (CLOCK, Content::default()),
-            Crash::Interrupt(number) => {
-                (INTERRUPT, [u32::from(number.cast_unsigned()), 0, 0, 0, 0, 0, 0, 0, 0])
-            }
-        }
-    }
+#[inline(never)]
+fn sealed(kind: u32, details: &[u32]) -> Sealed {
+    let mut words = [0; WORDS];
+    words.iter_mut().zip([MAGIC, kind].iter().chain(details)).for_each(|(to, from)| *to = *from);
+    words[WORDS - 1] = check(&words);
+    words
 }
 
 fn place_words(place: &Place) -> Content {

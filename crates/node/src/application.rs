@@ -5,9 +5,10 @@ use canopen::emcy::Fault;
 use canopen::nmt::State;
 use canopen::sdo::{Abort, Multiplexer};
 use canopen::{Application, Condition, Part, Soundness};
-use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY, PROGRAM_TRIAL};
+use profiles::communication::{LOST_EVENT_KINDS, PERSONALITY, PROGRAM_AUTHORISATION, PROGRAM_TRIAL};
 use profiles::fault::Flags;
 use profiles::{AnyProfile, Snapshot};
+use update::Authorisation;
 
 use crate::Setup;
 use crate::configured::Configured;
@@ -33,6 +34,8 @@ pub(crate) struct NodeApplication {
     /// As counted by the firmware (2001h).
     pub(crate) lost_events: [u32; LOST_EVENTS],
     pub(crate) trial: ProgramTrial,
+    /// Who may change the program (2003h).
+    pub(crate) authorisation: Authorisation,
     buffer: TransferBuffer,
 }
 
@@ -47,6 +50,7 @@ impl NodeApplication {
             stored: Stored::NOTHING,
             lost_events: [0; LOST_EVENTS],
             trial: ProgramTrial::default(),
+            authorisation: Authorisation::default(),
             buffer: TransferBuffer::EMPTY,
         }
     }
@@ -98,15 +102,20 @@ impl Application for NodeApplication {
         self.show_flags(image);
         self.show_lost_events(image);
         self.show_trial(image);
+        self.show_authorisation(image);
         self.show_values(image);
     }
 
     fn write(&mut self, entry: &Entry, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
-        if entry.index() == PROGRAM_TRIAL {
-            let is_at_work = self.has_measured();
-            return self.trial.command(bytes, is_at_work);
+        match entry.index() {
+            PROGRAM_TRIAL => {
+                self.admit()?;
+                let is_at_work = self.has_measured();
+                self.trial.command(bytes, is_at_work)
+            }
+            PROGRAM_AUTHORISATION => self.answer(bytes, image),
+            _ => self.profile.write(entry, bytes, image),
         }
-        self.profile.write(entry, bytes, image)
     }
 
     fn written(&mut self, entry: &Entry, image: &mut [u8]) {
@@ -161,6 +170,10 @@ impl Application for NodeApplication {
 
     fn loaded(&mut self, group: Group, good: bool) {
         self.flags.set(flag_of(group), !good);
+    }
+
+    fn stop_program(&mut self) -> Result<(), Abort> {
+        self.admit()
     }
 
     fn read_domain(&self, _: Multiplexer) -> Result<&[u8], Abort> {

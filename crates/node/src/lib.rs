@@ -8,6 +8,7 @@
 #![warn(clippy::pedantic)]
 
 mod application;
+mod authorisation;
 mod configured;
 pub mod fault;
 mod faults;

@@ -36,7 +36,7 @@ pub const HAS_DEVELOPMENT_KEY: bool = is_same(&FIRST, &DEVELOPMENT_KEY_KNOWN_TO_
 
 /// The key of these digits, for the compiler: anything else than 64 hexadecimal digits ends the build.
 #[allow(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "evaluated by the compiler")]
-const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
+pub(crate) const fn key(digits: &[u8]) -> [u8; KEY_LEN] {
     assert!(digits.len() == 2 * KEY_LEN, "a key is not 64 hexadecimal digits");
     let (mut key, mut at) = ([0; KEY_LEN], 0);
     while at < KEY_LEN {

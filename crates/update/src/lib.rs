@@ -51,6 +51,7 @@
 extern crate std;
 
 mod area;
+mod authorisation;
 mod boot;
 mod copy;
 mod crashes;
@@ -73,6 +74,7 @@ mod trial;
 mod updater;
 
 pub use area::{Area, Layout};
+pub use authorisation::{AUTHORISATION_KEY, Authorisation, Pair, RESPONSE_LEN, response};
 pub use boot::{Decision, Proof, Start, Stay, application, boot, boot_sealed};
 pub use crashes::{Crashes, Reset};
 pub use flash::Flash;

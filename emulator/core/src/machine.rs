@@ -15,13 +15,11 @@ use crate::incident::Incident;
 use crate::loader::{self, Image};
 use crate::mechanism::Mechanism;
 use crate::model::{Error, Model};
+use crate::power_up::PowerUp;
 use crate::profile::Visits;
 use crate::scb::cfsr;
 use crate::stats::Stats;
 use crate::stepping::{self, Stepping};
-
-/// The value of every byte of RAM after power-on: what still has it was never written.
-pub const RAM_PATTERN: u8 = 0xA5;
 
 /// Why [`Machine::run_until`] came back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +43,7 @@ pub enum Stop {
 pub struct Machine<P: Peripherals + 'static> {
     pub(crate) cpu: Cpu<P>,
     model: Model,
+    power_up: PowerUp,
     powered: bool,
     sleeping: bool,
     locked: Option<u32>,
@@ -71,6 +70,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         Ok(Machine {
             cpu,
             model,
+            power_up: PowerUp::new(0),
             powered: false,
             sleeping: false,
             locked: None,
@@ -150,10 +150,20 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
+    /// Has RAM come up otherwise than that of machines with another number. To be called before the power comes.
+    pub fn set_power_up(&mut self, seed: u64) {
+        self.power_up = PowerUp::new(seed);
+    }
+
+    /// What RAM held when the power came: a byte that differs was written since.
+    pub fn ram_at_power_on(&self) -> &[u8] {
+        self.power_up.content()
+    }
+
     /// Switches the supply on at an instant.
     pub fn power_on(&mut self, at: Time) {
-        let pattern = vec![RAM_PATTERN; self.model.ram.len()];
-        let _ = self.write(self.model.ram.start, &pattern);
+        let content = self.power_up.come(self.model.ram.len());
+        let _ = engine::store(&mut self.cpu, self.model.ram.start, content);
         let core = self.cpu.get_data_mut();
         core.now = core.now.max(at);
         core.chip.reset(true, core.now);

@@ -97,6 +97,7 @@ impl Board {
             Programs::Others
         };
         let bootloader_flash = bootloader.map_or(0, |bootloader| bootloader.flash_size);
+        machine.set_power_up(id.into());
         machine.power_on(Time::ZERO);
         Ok(Board {
             id,

@@ -2,7 +2,7 @@
 
 use canbus::Time;
 use chip::Stm32f4;
-use emulator::{Exception, Incident, Machine, RAM_PATTERN};
+use emulator::{Exception, Incident, Machine};
 
 use crate::image::Image;
 use crate::status::{per_second, share};
@@ -49,7 +49,7 @@ pub(crate) fn cpu(machine: &Machine<Stm32f4>) -> Cpu {
 }
 
 /// What the images take. The stack grows down from its start towards the start of RAM, and RAM that was never
-/// written still has the pattern of power-on.
+/// written still has what it came up with.
 pub(crate) fn memory(
     machine: &Machine<Stm32f4>,
     image: &Image,
@@ -66,7 +66,8 @@ fn stack_depth(machine: &Machine<Stm32f4>, start: u32) -> u32 {
     if machine.read(bottom, &mut stack).is_err() {
         return 0;
     }
-    let untouched = stack.iter().take_while(|&&byte| byte == RAM_PATTERN).count();
+    let before = machine.ram_at_power_on();
+    let untouched = stack.iter().zip(before).take_while(|(now, before)| now == before).count();
     (stack.len() - untouched) as u32
 }
 

@@ -9,6 +9,7 @@ use crate::serial_number::serial_number as from_unique_id;
 const UNIQUE_ID: *const [u8; 12] = 0x1FFF_7A10 as *const _;
 
 /// Serial number of the board, from the unique identifier.
+#[inline(never)]
 pub fn serial_number() -> u32 {
     // SAFETY: system memory, readable and constant on every STM32F4.
     from_unique_id(&unsafe { UNIQUE_ID.read() })

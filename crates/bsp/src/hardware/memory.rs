@@ -28,6 +28,18 @@ pub fn stack() -> Range<u32> {
     unsafe { region(&_stack_end, &_stack_start) }
 }
 
+/// The last words of RAM: what the start before has left there, and before it what nobody has written since the power came. Each bit of a
+/// static RAM comes up as it will, some of them differently each time.
+pub fn noise<const WORDS: usize>() -> [u32; WORDS] {
+    let mut words = [0; WORDS];
+    let first = ram().end.saturating_sub(size_of_val(&words) as u32);
+    for (word, address) in words.iter_mut().zip((first..ram().end).step_by(4)) {
+        // SAFETY: RAM that is there (memory.x), of which any content is a word, and nobody else runs while the bootloader decides.
+        *word = unsafe { (address as *const u32).read_volatile() };
+    }
+    words
+}
+
 /// All of RAM.
 pub fn ram() -> Range<u32> {
     // SAFETY: only the addresses are used.

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use update::{Crashes, Proof};
+use update::{Crashes, Pair, Proof};
 
 use crate::crash_record::{self, WORDS};
 use crate::handover::{self, Handover};
@@ -15,6 +15,8 @@ struct Retained {
     crash: [AtomicU32; WORDS],
     proven: [AtomicU32; 2],
     bootloader: AtomicU32,
+    /// A word that says that they are there, challenge and response.
+    authorisation: [AtomicU32; 5],
 }
 
 /// `used` keeps the compiler from taking the initial values for granted: a reset does not write them.
@@ -26,10 +28,13 @@ static RETAINED: Retained = Retained {
     crash: [const { AtomicU32::new(0) }; WORDS],
     proven: [const { AtomicU32::new(0) }; 2],
     bootloader: AtomicU32::new(0),
+    authorisation: [const { AtomicU32::new(0) }; 5],
 };
 
 /// The word by which a bootloader for development says that it is one: 'DEVL'.
 const DEVELOPMENT: u32 = u32::from_be_bytes(*b"DEVL");
+/// The word by which a bootloader says that it has a key for those who change the program: 'GARD'.
+const GUARDED: u32 = u32::from_be_bytes(*b"GARD");
 
 /// The note of the other image; `None` when there is none since power-on.
 #[must_use]
@@ -86,6 +91,24 @@ pub fn set_development(is_for_development: bool) {
 #[must_use]
 pub fn is_development() -> bool {
     RETAINED.bootloader.load(Ordering::Relaxed) == DEVELOPMENT
+}
+
+/// Challenge and response of this start, where the bootloader has a key for them.
+#[must_use]
+pub fn authorisation() -> Option<Pair> {
+    let [mark, a, b, c, d] = load(&RETAINED.authorisation);
+    (mark == GUARDED).then(|| Pair::from_words([a, b, c, d]))
+}
+
+/// Leaves challenge and response for the application.
+pub fn set_authorisation(pair: &Pair) {
+    let [a, b, c, d] = pair.words();
+    store(&RETAINED.authorisation, [GUARDED, a, b, c, d]);
+}
+
+/// Everybody may change the program.
+pub fn forget_authorisation() {
+    store(&RETAINED.authorisation, [0; 5]);
 }
 
 /// The words of the crash record.

@@ -108,6 +108,14 @@ pub trait Application {
     /// defaults.
     fn loaded(&mut self, _group: Group, _good: bool) {}
 
+    /// A client wants to stop or to reset the program (1F51h, CiA 302-3), which ends what the device does.
+    ///
+    /// # Errors
+    /// The reason to refuse the command: an application that wants to know who asks says [`Abort::DeviceState`] until it does.
+    fn stop_program(&mut self) -> Result<(), Abort> {
+        Ok(())
+    }
+
     /// The content of a domain.
     ///
     /// # Errors

@@ -7,8 +7,8 @@ mod pdos;
 mod start_up;
 
 pub use node::{
-    LOST_EVENT_KINDS, LOST_EVENT_ROWS, LOST_EVENTS, PERSONALITY, PROGRAM_TRIAL, PROGRAM_TRIAL_ROWS,
-    TRANSFER_BUFFER, handles, personality,
+    LOST_EVENT_KINDS, LOST_EVENT_ROWS, LOST_EVENTS, PERSONALITY, PROGRAM_AUTHORISATION,
+    PROGRAM_AUTHORISATION_ROWS, PROGRAM_TRIAL, PROGRAM_TRIAL_ROWS, TRANSFER_BUFFER, handles, personality,
 };
 pub use objects::{ERROR_REGISTER, ERRORS_AND_SYNC, SERVICES, device_name, device_type, error_behaviour};
 pub use pdos::{
@@ -27,5 +27,6 @@ pub const COMMON: &[&[Object]] = &[
     START_UP,
     LOST_EVENT_ROWS,
     PROGRAM_TRIAL_ROWS,
+    PROGRAM_AUTHORISATION_ROWS,
     &[TRANSFER_BUFFER],
 ];

@@ -26,7 +26,7 @@ pub const PROGRAM_TRIAL: u16 = 0x2002;
 /// Whether the node handles what is written there.
 #[must_use]
 pub const fn handles(index: u16, sub: u8) -> bool {
-    matches!((index, sub), (PROGRAM_TRIAL, 2))
+    matches!((index, sub), (PROGRAM_TRIAL, 2) | (PROGRAM_AUTHORISATION, 3))
 }
 
 const fn seconds(sub: u8, name: &'static str, default: i64) -> Object {
@@ -43,6 +43,18 @@ pub const PROGRAM_TRIAL_ROWS: &[Object] = &[
     Object::new(PROGRAM_TRIAL, 2, "Command", Type::Unsigned32, Access::WriteOnly).handled(),
     seconds(3, "Time to be confirmed", 600),
     seconds(4, "Time of the automatic confirmation", 0),
+];
+
+/// Index of the object about who may change the program.
+pub const PROGRAM_AUTHORISATION: u16 = 0x2003;
+
+/// 2003h: whether the program may be changed, the challenge of this start, and the place of the response. docs/update.md says how the
+/// response is computed.
+pub const PROGRAM_AUTHORISATION_ROWS: &[Object] = &[
+    Object::highest(PROGRAM_AUTHORISATION, 3, "Program authorisation"),
+    Object::new(PROGRAM_AUTHORISATION, 1, "State", Type::Unsigned8, Access::ReadOnly),
+    Object::new(PROGRAM_AUTHORISATION, 2, "Challenge", Type::Unsigned64, Access::ReadOnly),
+    Object::new(PROGRAM_AUTHORISATION, 3, "Response", Type::Unsigned64, Access::WriteOnly).handled(),
 ];
 
 /// Index of the object that counts lost events.

@@ -21,7 +21,7 @@ pub(super) const STATUS: Multiplexer = Multiplexer { index: 0x1F57, sub: 1 };
 pub(super) const DEVICE_TYPE: Multiplexer = Multiplexer { index: 0x1000, sub: 0 };
 /// 'BOOT'.
 pub(super) const BOOT: [u8; 4] = 0x424F_4F54_u32.to_le_bytes();
-const STOP: u8 = 0;
+pub(super) const STOP: u8 = 0;
 pub(super) const START: u8 = 1;
 pub(super) const CLEAR: u8 = 3;
 /// First address of the application's header, and what the bootloader may erase besides.

@@ -57,27 +57,41 @@ impl Outage {
 
 pub(super) fn boards(count: u8) -> Shared {
     let nodes: String = (1..=count).map(|node| format!(" --node {node}:pressure")).collect();
-    let world = Rc::new(RefCell::new(world(&format!("--bitrate 1000{nodes}"))));
-    world.borrow_mut().run_until(SECOND);
-    world
+    share(world(&format!("--bitrate 1000{nodes}")))
+}
+
+/// A world a second after power-on.
+pub(super) fn share(mut world: World) -> Shared {
+    world.run_until(SECOND);
+    Rc::new(RefCell::new(world))
 }
 
 /// `nodectl update --force`, as A is the older version: what it reports, a line for each node in the order in which they
 /// were done.
 pub(super) fn update(world: &Shared, nodes: &str, image: &Image, outage: Option<Outage>) -> Vec<Value> {
-    let file =
-        Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{nodes}-{:08X}.img", image.header.code_crc()));
+    try_update(world, nodes, image, outage, &[]).unwrap_or_else(|refusal| panic!("{refusal}"))
+}
+
+/// The same with more on the command line, or why it has failed.
+pub(super) fn try_update(
+    world: &Shared,
+    nodes: &str,
+    image: &Image,
+    mut outage: Option<Outage>,
+    more: &[&str],
+) -> Result<Vec<Value>, String> {
+    let name = format!("{nodes}-{:08X}-{}.img", image.header.code_crc(), std::process::id());
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::write(&file, image.to_bytes()).unwrap();
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json", "--node", nodes, "update", "--force"];
-    let cli = Cli::try_parse_from(line.into_iter().chain(file.to_str())).unwrap();
-
-    let mut outage = outage;
+    let cli = Cli::try_parse_from(line.iter().chain(more).copied().chain(file.to_str())).unwrap();
     let (printed, result) = run(world, &cli, move |world| {
         outage.take_if(|outage| outage.is_over(world));
     });
-    result.unwrap_or_else(|failure| panic!("{failure}: {printed}"));
+    std::fs::remove_file(file).unwrap();
+    result.map_err(|failure| format!("{failure}: {printed}"))?;
     println!("{:6.2} s: {printed}", world.borrow().now().as_secs_f64());
-    printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    Ok(printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
 }
 
 /// What is reported of a node.

@@ -1,5 +1,6 @@
 //! The field update with the images as they are: the application, the bootloader, and a master that follows CiA 302-3.
 
+mod authorisation;
 mod bench;
 mod corrupted;
 mod cuts;

@@ -22,7 +22,7 @@ fn bench() -> Bench {
 }
 
 /// The same code in an image that names this key, and is signed with it.
-fn signed_by_owner(image: &Image, key: u8, revokes: u8) -> Image {
+pub(super) fn signed_by_owner(image: &Image, key: u8, revokes: u8) -> Image {
     let about = Description { key, revokes, ..*image.header.description() };
     Image::sign(about, image.code.clone(), &SigningKey::from_bytes(&OWNER[usize::from(key)])).unwrap()
 }

@@ -154,6 +154,7 @@ fn sdo_code(error: &sdo::Error) -> u8 {
 pub(super) fn update_code(error: &update::Error) -> u8 {
     match error {
         update::Error::Sdo(error) => sdo_code(error),
+        update::Error::Closed { .. } => 1,
         update::Error::Bus(_) => 4,
         update::Error::Stuck { .. } | update::Error::Lost { .. } => 3,
         update::Error::Flash { .. } | update::Error::Identification { .. } => 5,

@@ -1,13 +1,16 @@
 //! The options of every command.
 
+use std::fs;
 use std::path::PathBuf;
 
 use canopen::Duration;
 use clap::Args;
 
+use super::Failure;
 use super::node_set::NodeSet;
 use crate::bus::Address;
 use crate::sdo;
+use crate::update::AuthorisationKey;
 
 /// The options of every command.
 #[derive(Clone, Debug, Args)]
@@ -43,6 +46,10 @@ pub struct Options {
     /// How often a transfer without an answer is begun anew.
     #[arg(long, global = true, value_name = "N", default_value_t = 1)]
     pub retries: u8,
+
+    /// File with the key of nodes that change their program only for its holder: 64 hexadecimal digits.
+    #[arg(long, global = true, env = "NODECTL_AUTHORISATION_KEY", value_name = "FILE")]
+    pub authorisation_key: Option<PathBuf>,
 }
 
 impl Options {
@@ -50,6 +57,13 @@ impl Options {
     pub(super) fn sdo(&self) -> sdo::Options {
         let limit = Duration::from_millis(u64::from(self.limit) * 1000);
         sdo::Options { timeout: self.timeout(), limit, retries: self.retries, ..sdo::Options::default() }
+    }
+
+    /// The key for nodes that change their program only for its holder.
+    pub(super) fn authorisation_key(&self) -> Result<Option<AuthorisationKey>, Failure> {
+        let Some(file) = &self.authorisation_key else { return Ok(None) };
+        let text = fs::read_to_string(file).map_err(|error| Failure::file(file, error))?;
+        text.parse().map(Some).map_err(|reason| Failure::file(file, reason))
     }
 
     /// How long to wait for an answer.

@@ -61,6 +61,7 @@ impl Update {
             sdo: session.options.sdo(),
             patience: Duration::from_millis(u64::from(self.patience) * 1000),
             force: self.force,
+            key: session.options.authorisation_key()?,
             confirm: !self.no_confirm,
         };
         let results = update(&mut session.network, &nodes, &image, &options, &mut Bar::new());

@@ -57,6 +57,12 @@ pub enum Error {
         /// Of the node.
         found: u32,
     },
+    /// The node wants to know who changes its program, and there is no key to answer it with. Nothing was changed.
+    #[error("node {}: it changes its program only for the holder of its key: --authorisation-key", .node.get())]
+    Closed {
+        /// The node.
+        node: NodeId,
+    },
     /// The node did not stop, start or finish in time.
     #[error("node {}: it does not {what}", .node.get())]
     Stuck {

@@ -4,7 +4,7 @@ use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
 
 use super::image::version;
-use super::{Command, Error, Image, Program, Status, Step, Watcher};
+use super::{AuthorisationKey, Command, Error, Image, Program, Status, Step, Watcher};
 use crate::bus::BusError;
 use crate::object::at;
 use crate::sdo::{self, Client};
@@ -32,6 +32,8 @@ pub struct Options {
     pub patience: Duration,
     /// Update also where the node runs this program already, or a newer one.
     pub force: bool,
+    /// For nodes that change their program for its holder only.
+    pub key: Option<AuthorisationKey>,
     /// End the trial of the new program once it runs. Else the node does so, or takes the program back.
     pub confirm: bool,
 }
@@ -124,6 +126,7 @@ impl<'a> Job<'a> {
         }
         if !(is_there && now.is_running) {
             self.wait_while_busy(network, watcher)?;
+            self.open(network)?;
             watcher.step(self.node, Step::Start);
             self.program(network).restart(Command::Start)?;
             self.wait_until_running(network, true, "start the new program")?;
@@ -150,6 +153,7 @@ impl<'a> Job<'a> {
             return Ok(is_on_trial);
         }
         watcher.step(self.node, Step::Confirm);
+        self.open(network)?;
         self.program(network).confirm()?;
         let until = network.now() + CONFIRM;
         while self.program(network).is_on_trial()? {
@@ -159,6 +163,16 @@ impl<'a> Job<'a> {
             network.pause(POLL)?;
         }
         Ok(false)
+    }
+
+    /// Answers the challenge of a node that wants to know who changes its program.
+    fn open(&self, network: &mut Network) -> Result<(), Error> {
+        // What other devices have at 2003h is not known here.
+        if self.image.info.is_none() || !self.program(network).is_closed()? {
+            return Ok(());
+        }
+        let key = self.options.key.as_ref().ok_or(Error::Closed { node: self.node })?;
+        Ok(self.program(network).open(key)?)
     }
 
     /// Why the node runs another program than the new one: it says so where it has taken the new one back.
@@ -193,6 +207,7 @@ impl<'a> Job<'a> {
         is_running: bool,
         watcher: &mut dyn Watcher,
     ) -> Result<(), Error> {
+        self.open(network)?;
         if is_running {
             watcher.step(self.node, Step::Stop);
             self.program(network).restart(Command::Stop)?;

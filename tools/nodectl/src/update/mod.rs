@@ -4,6 +4,7 @@
 //! has checked it, compare its identification, start it. Stopping and starting need not be acknowledged: the node
 //! restarts, and answers in its new state.
 
+mod authorisation;
 mod error;
 mod fleet;
 mod image;
@@ -12,6 +13,7 @@ mod program;
 mod watcher;
 
 pub use ::update::{Status, Version};
+pub use authorisation::AuthorisationKey;
 pub use error::Error;
 pub use fleet::update;
 pub(crate) use image::version;

@@ -1,11 +1,11 @@
-//! The objects of the program (CiA 302-3): 1F50h, 1F51h, 1F56h, 1F57h, each at sub-index 1; and 2002h, the trial of a new program,
-//! which only nodes of this project have.
+//! The objects of the program (CiA 302-3): 1F50h, 1F51h, 1F56h, 1F57h, each at sub-index 1; and of nodes of this project alone 2002h,
+//! the trial of a new program, and 2003h, who may change the program.
 
 use canopen::NodeId;
 use canopen::client::sdo;
 use canopen::sdo::Multiplexer;
 
-use super::Status;
+use super::{AuthorisationKey, Status};
 use crate::Network;
 use crate::object::at;
 use crate::sdo::{Cause, Client, Error, Options};
@@ -18,14 +18,22 @@ const STATUS: Multiplexer = at(0x1F57, 1);
 const TRIAL_STATE: Multiplexer = at(0x2002, 1);
 const TRIAL_COMMAND: Multiplexer = at(0x2002, 2);
 
+const SERIAL_NUMBER: Multiplexer = at(0x1018, 4);
+const AUTHORISATION_STATE: Multiplexer = at(0x2003, 1);
+const CHALLENGE: Multiplexer = at(0x2003, 2);
+const RESPONSE: Multiplexer = at(0x2003, 3);
+
 /// Names of the objects, for errors.
-const NAMES: [(Multiplexer, &str); 6] = [
+const NAMES: [(Multiplexer, &str); 9] = [
     (DATA, "Program data"),
     (CONTROL, "Program control"),
     (IDENTIFICATION, "Program software identification"),
     (STATUS, "Flash status identification"),
     (TRIAL_STATE, "Program trial: state"),
     (TRIAL_COMMAND, "Program trial: command"),
+    (AUTHORISATION_STATE, "Program authorisation: state"),
+    (CHALLENGE, "Program authorisation: challenge"),
+    (RESPONSE, "Program authorisation: response"),
 ];
 
 /// What 1F51h takes. More is not portable.
@@ -88,6 +96,31 @@ impl<'n> Program<'n> {
             Err(error) if error.is_absent() => Ok(false),
             Err(error) => Err(error),
         }
+    }
+
+    /// Whether the node wants to know who changes its program, and nobody has told it since its start. Of nodes of this project only.
+    ///
+    /// # Errors
+    /// Those of SDO.
+    pub fn is_closed(&mut self) -> Result<bool, Error> {
+        match self.read(AUTHORISATION_STATE) {
+            Ok(state) => Ok(state.first() == Some(&1)),
+            // A program from before there were challenges, or a bootloader without a key.
+            Err(error) if error.is_absent() => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Answers the challenge of the node: it takes commands until its next start.
+    ///
+    /// # Errors
+    /// Those of SDO: the node refuses the response of another key.
+    pub fn open(&mut self, key: &AuthorisationKey) -> Result<(), Error> {
+        let serial_number = self.word(SERIAL_NUMBER)?.unwrap_or_default();
+        // A challenge of another length has no answer: the node will say so.
+        let challenge = self.read(CHALLENGE)?.try_into().unwrap_or_default();
+        let response = key.response(challenge, serial_number);
+        self.client(self.options).download(RESPONSE, &response, |_| ()).map_err(named)
     }
 
     /// Confirms the program that runs. The node ends the trial a moment later.

@@ -8,6 +8,10 @@ use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Object, Type}
 use canopen::sdo::{Abort, Multiplexer, Response};
 use canopen::{Application, Device, Duration, Frame, Instant, NodeId, Part, Transmit};
 use nodectl::bus::Station;
+use update::{Authorisation, Pair};
+
+/// 1018h:4.
+const SERIAL_NUMBER: u32 = 99;
 
 const fn read_only(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadOnly)
@@ -23,7 +27,7 @@ const ROWS: &[Object] = &[
     read_only(0x1018, 1, Type::Unsigned32).value(7),
     read_only(0x1018, 2, Type::Unsigned32).value(42),
     read_only(0x1018, 3, Type::Unsigned32).value(0x0001_0000),
-    read_only(0x1018, 4, Type::Unsigned32).value(99),
+    read_only(0x1018, 4, Type::Unsigned32).value(SERIAL_NUMBER as i64),
     Object::highest(0x1F50, 1, ""),
     Object::new(0x1F50, 1, "", Type::Domain, Access::ReadWrite),
     Object::highest(0x1F51, 1, ""),
@@ -35,6 +39,10 @@ const ROWS: &[Object] = &[
     Object::highest(0x2002, 2, ""),
     read_only(0x2002, 1, Type::Unsigned8),
     Object::new(0x2002, 2, "", Type::Unsigned32, Access::ReadWrite).handled(),
+    Object::highest(0x2003, 3, ""),
+    read_only(0x2003, 1, Type::Unsigned8),
+    read_only(0x2003, 2, Type::Unsigned64),
+    Object::new(0x2003, 3, "", Type::Unsigned64, Access::WriteOnly).handled(),
 ];
 
 const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
@@ -61,6 +69,9 @@ pub(crate) struct Flash {
     pub(crate) is_on_trial: bool,
     /// The program that comes back when another one is started.
     pub(crate) takes_back: Option<Vec<u8>>,
+    /// The key of whoever may change the program, and what has become of the challenge of this start.
+    key: Option<[u8; 32]>,
+    authorisation: Authorisation,
     /// Commands of 1F51h as they came.
     pub(crate) commands: Vec<u8>,
     status: u32,
@@ -72,7 +83,19 @@ pub(crate) struct Flash {
 }
 
 impl Flash {
+    /// A start, at this time: another challenge.
+    fn challenge(&mut self, is_answered: bool) {
+        let noise = [self.now.0 as u32, self.commands.len() as u32];
+        let pair = self.key.map(|key| Pair::new(&key, &noise, SERIAL_NUMBER));
+        self.authorisation = Authorisation::new(pair, is_answered);
+    }
+
+    fn admit(&self) -> Result<(), Abort> {
+        if self.authorisation.is_open() { Ok(()) } else { Err(Abort::DeviceState) }
+    }
+
     fn command(&mut self, command: u8) -> Result<(), Abort> {
+        self.admit()?;
         self.commands.push(command);
         match (command, self.runs) {
             (0, true) => self.next = Some(false),
@@ -106,6 +129,11 @@ pub(crate) fn identification(program: &[u8]) -> u32 {
 impl Application for Flash {
     fn write(&mut self, entry: &Entry, bytes: &[u8], _: &mut [u8]) -> Result<(), Abort> {
         match (entry.index(), bytes) {
+            (0x2003, _) => {
+                let is_right = self.authorisation.answer(bytes.try_into().expect("eight bytes"));
+                if is_right { Ok(()) } else { Err(Abort::InvalidValue) }
+            }
+            (0x2002, _) if !self.authorisation.is_open() => Err(Abort::DeviceState),
             (0x2002, b"conf") if self.is_on_trial => {
                 self.is_on_trial = false;
                 Ok(())
@@ -120,6 +148,7 @@ impl Application for Flash {
     }
 
     fn write_domain(&mut self, _: Multiplexer, part: Part<'_>) -> Result<(), Abort> {
+        self.admit()?;
         if self.runs || self.now < self.busy_until {
             return Err(Abort::DeviceState);
         }
@@ -153,6 +182,8 @@ impl Loader {
             has_trials: false,
             is_on_trial: false,
             takes_back: None,
+            key: None,
+            authorisation: Authorisation::default(),
             commands: Vec::new(),
             status: 0,
             busy_until: Instant(0),
@@ -174,7 +205,14 @@ impl Loader {
     /// Switches it off until an instant. What was erased or half written stays so.
     pub(crate) fn switch_off(&mut self, until: Instant) {
         let runs = self.flash().runs;
+        self.flash().challenge(false);
         self.restart(runs, until);
+    }
+
+    /// Only whoever has this key may change the program from now on.
+    pub(crate) fn set_key(&mut self, key: [u8; 32]) {
+        self.flash().key = Some(key);
+        self.flash().challenge(false);
     }
 
     fn restart(&mut self, runs: bool, up: Instant) {
@@ -190,11 +228,13 @@ impl Loader {
         let version = if flash.runs { flash.version().to_vec() } else { b"loader 1".to_vec() };
         let status = if now < flash.busy_until { 1 } else { flash.status };
         let identification = if flash.program.is_empty() { 0 } else { identification(&flash.program) };
-        let (runs, is_on_trial) = (flash.runs, flash.is_on_trial);
+        let (runs, is_on_trial, authorisation) = (flash.runs, flash.is_on_trial, flash.authorisation);
         self.device.show(|_, image| {
             DICTIONARY.field(0x1000, 0).set(image, &device_type.to_le_bytes());
             DICTIONARY.field(0x100A, 0).set(image, &version);
             DICTIONARY.field(0x2002, 1).set(image, &[u8::from(is_on_trial)]);
+            DICTIONARY.field(0x2003, 1).set(image, &[authorisation.state()]);
+            DICTIONARY.field(0x2003, 2).set(image, &authorisation.challenge());
             DICTIONARY.field(0x1F51, 1).set(image, &[u8::from(runs)]);
             DICTIONARY.field(0x1F56, 1).set(image, &identification.to_le_bytes());
             DICTIONARY.field(0x1F57, 1).set(image, &status.to_le_bytes());
@@ -228,7 +268,11 @@ impl Station for Loader {
         }
         // A change of the program is not acknowledged.
         match self.flash().next {
-            Some(runs) => self.restart(runs, now + RESTART),
+            Some(runs) => {
+                // The loader is open for whoever has stopped the program.
+                self.flash().challenge(!runs);
+                self.restart(runs, now + RESTART);
+            }
             None => answers.0.into_iter().for_each(|frame| out.send(frame).expect("room")),
         }
     }

@@ -53,7 +53,7 @@ const NEW: Version = Version { major: 1, minor: 1, patch: 0 };
 
 fn options() -> Options {
     let sdo = sdo::Options { timeout: Duration::from_millis(500), ..sdo::Options::default() };
-    Options { sdo, patience: Duration::from_millis(20_000), force: false, confirm: true }
+    Options { sdo, patience: Duration::from_millis(20_000), force: false, key: None, confirm: true }
 }
 
 fn nodes(ids: &[u8]) -> Vec<NodeId> {
@@ -101,6 +101,39 @@ fn the_sequence_of_cia_302() {
             is_on_trial: false,
         }
     );
+}
+
+/// The key of a node that wants to know who changes its program.
+const KEY: [u8; 32] = [0x5A; 32];
+
+fn with_key() -> Options {
+    Options { key: Some("5A".repeat(32).parse().unwrap()), ..options() }
+}
+
+#[test]
+fn the_holder_of_its_key_updates_a_node_that_asks_for_it_and_confirms() {
+    let (wire, mut diary) = (fleet(&[3]), Diary::default());
+    wire.station(|loaders| {
+        loaders[0].set_key(KEY);
+        loaders[0].flash().has_trials = true;
+    });
+    let outcome = one(&wire, &image(NEW), &with_key(), &mut diary).unwrap();
+    assert_eq!(outcome.new_version.as_deref(), Some("1.1.0"));
+    assert!(outcome.is_changed && !outcome.is_on_trial);
+    assert_eq!(commands(&wire), [0, 3, 1]);
+}
+
+#[test]
+fn without_the_key_of_a_node_nothing_is_changed() {
+    let (wire, mut diary) = (fleet(&[3]), Diary::default());
+    wire.station(|loaders| loaders[0].set_key(KEY));
+    let error = one(&wire, &image(NEW), &options(), &mut diary).unwrap_err();
+    assert!(matches!(error, Error::Closed { .. }), "{error}");
+    let other = Options { key: Some("5B".repeat(32).parse().unwrap()), ..options() };
+    let error = one(&wire, &image(NEW), &other, &mut diary).unwrap_err();
+    assert!(error.to_string().contains("Program authorisation: response"), "{error}");
+    assert!(commands(&wire).is_empty());
+    assert!(!diary.steps_of(3).contains(&Step::Stop));
 }
 
 #[test]
@@ -282,6 +315,19 @@ fn four_nodes_of_which_one_is_switched_off_halfway_and_gone_on_with() {
     let steps = diary.steps_of(4);
     assert_eq!(steps.iter().filter(|step| **step == Step::Download).count(), 2);
     assert!(steps.ends_with(&[Step::Clear, Step::Download, Step::Verify, Step::Start]), "{steps:?}");
+}
+
+/// Its challenge is another one after that.
+#[test]
+fn a_guarded_node_that_is_switched_off_halfway_is_gone_on_with() {
+    let wire = fleet(&[3]);
+    wire.station(|loaders| loaders[0].set_key(KEY));
+    let until = Instant(20_000_000);
+    let mut switch = Switch { wire: &wire, diary: Diary::default(), node: 3, until, is_done: false };
+    let results = update(&mut wire.network(), &nodes(&[3]), &image(NEW), &with_key(), &mut switch);
+    let [(_, result)] = results.try_into().expect("one result");
+    assert_eq!(result.unwrap().new_version.as_deref(), Some("1.1.0"));
+    assert!(switch.diary.steps_of(3).contains(&Step::Back));
 }
 
 #[test]

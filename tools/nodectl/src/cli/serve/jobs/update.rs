@@ -93,8 +93,8 @@ fn version_check(new: Version, running: Option<&str>, check: impl Fn(&str, bool,
 pub(super) fn start(node: NodeId, bytes: Vec<u8>, force: bool) -> Result<Job, String> {
     let image = parse(bytes)?;
     let work = move |context: &mut Context| {
-        let options =
-            Options { sdo: context.session.options.sdo(), patience: PATIENCE, force, confirm: true };
+        let (sdo, key) = (context.session.options.sdo(), context.session.options.authorisation_key()?);
+        let options = Options { sdo, patience: PATIENCE, force, key, confirm: true };
         let mut teller = Teller { orders: context.teller(), told: 0, step: Step::Identify };
         let results = update(&mut context.session.network, &[node], &image, &options, &mut teller);
         let (_, result) = results.into_iter().next().ok_or_else(|| Failure::Usage("no node".to_owned()))?;

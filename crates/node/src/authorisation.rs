@@ -1,0 +1,38 @@
+//! 2003h: who may change the program (docs/update.md): whoever answers the challenge of this start, where the bootloader has a key.
+
+use canopen::sdo::Abort;
+use profiles::communication::PROGRAM_AUTHORISATION;
+use update::Authorisation;
+
+use crate::Protocol;
+use crate::application::NodeApplication;
+
+impl Protocol {
+    /// What the bootloader has left. To be called before the start.
+    pub fn set_authorisation(&mut self, authorisation: Authorisation) {
+        self.device.application_mut().authorisation = authorisation;
+    }
+}
+
+impl NodeApplication {
+    /// Refuses whoever has not answered the challenge.
+    pub(crate) fn admit(&self) -> Result<(), Abort> {
+        if self.authorisation.is_open() { Ok(()) } else { Err(Abort::DeviceState) }
+    }
+
+    /// 2003h:3 is written.
+    pub(crate) fn answer(&mut self, bytes: &[u8], image: &mut [u8]) -> Result<(), Abort> {
+        if !self.authorisation.asks() {
+            return Err(Abort::DeviceState);
+        }
+        let is_right = bytes.try_into().is_ok_and(|response| self.authorisation.answer(response));
+        self.show_authorisation(image);
+        if is_right { Ok(()) } else { Err(Abort::InvalidValue) }
+    }
+
+    pub(crate) fn show_authorisation(&self, image: &mut [u8]) {
+        let authorisation = &self.authorisation;
+        self.show(PROGRAM_AUTHORISATION, 1, &[authorisation.state()], image);
+        self.show(PROGRAM_AUTHORISATION, 2, &authorisation.challenge(), image);
+    }
+}

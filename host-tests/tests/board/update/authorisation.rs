@@ -1,0 +1,182 @@
+//! The bootloader of an owner who wants to know who changes the program (2003h), with the real images.
+
+use canopen::sdo::{Abort, Multiplexer};
+use host_tests::sdo::{Client, Failure};
+use nodectl::update::AuthorisationKey;
+
+use super::bench::{BOOT, Bench, CLEAR, DEVICE_TYPE, HEADER, START, STOP, version_a, version_b};
+use super::fleet;
+use super::owner::signed_by_owner;
+use crate::support::{SECOND, world_of};
+
+/// The key that `cargo xtask` builds this bootloader with.
+const KEY: &str = include_str!("authorisation-key.hex");
+
+const fn authorisation(sub: u8) -> Multiplexer {
+    Multiplexer { index: 0x2003, sub }
+}
+
+const STATE: Multiplexer = authorisation(1);
+const CHALLENGE: Multiplexer = authorisation(2);
+const RESPONSE: Multiplexer = authorisation(3);
+const SERIAL_NUMBER: Multiplexer = Multiplexer { index: 0x1018, sub: 4 };
+const TRIAL_COMMAND: Multiplexer = Multiplexer { index: 0x2002, sub: 2 };
+/// NMT reset node.
+const RESET: u8 = 0x81;
+
+/// What 2003h:1 reads.
+const NO_KEY: u8 = 0;
+const CLOSED: u8 = 1;
+const OPEN: u8 = 2;
+
+fn refused(abort: Abort) -> Failure {
+    Failure::Refused(abort.code())
+}
+
+/// A node in its bootloader: there is no program that may be started.
+fn empty() -> Bench {
+    let mut bench = Bench::with(world_of("bootloader-guarded", "--bitrate 1000"), 1_000_000, 1);
+    bench.run(SECOND);
+    assert_eq!(bench.read(DEVICE_TYPE).unwrap(), BOOT);
+    bench
+}
+
+/// A node that runs what its owner has signed.
+fn running() -> Bench {
+    let mut bench = empty();
+    let image = signed_by_owner(&version_a(), 0, 0);
+    bench.machine().write(HEADER, &image.to_bytes()).unwrap();
+    bench.power_cycle();
+    assert_eq!(bench.identification_of_running(), image.header.code_crc());
+    bench
+}
+
+fn state(bench: &mut Bench) -> u8 {
+    bench.read(STATE).unwrap()[0]
+}
+
+fn challenge(bench: &mut Bench) -> [u8; 8] {
+    bench.read(CHALLENGE).unwrap().try_into().unwrap()
+}
+
+/// What the holder of the key says to the challenge that the node has now.
+fn response(bench: &mut Bench) -> [u8; 8] {
+    let key: AuthorisationKey = KEY.parse().unwrap();
+    key.response(challenge(bench), bench.word(SERIAL_NUMBER))
+}
+
+fn answer(bench: &mut Bench, response: [u8; 8]) -> Result<(), Failure> {
+    Client::new(bench).write(RESPONSE, &response)
+}
+
+#[test]
+fn a_node_without_a_program_takes_one_from_the_holder_of_its_key_alone() {
+    let mut bench = empty();
+    let image = signed_by_owner(&version_a(), 0, 0);
+    assert_eq!(state(&mut bench), CLOSED);
+    for command in [STOP, START, CLEAR] {
+        assert_eq!(bench.command(command), Err(refused(Abort::DeviceState)));
+    }
+    assert_eq!(bench.download(&image.to_bytes()), Err(refused(Abort::DeviceState)));
+    let right = response(&mut bench);
+    let mut wrong = right;
+    wrong[7] ^= 0x80;
+    assert_eq!(answer(&mut bench, wrong), Err(refused(Abort::InvalidValue)));
+    assert_eq!(bench.command(CLEAR), Err(refused(Abort::DeviceState)));
+    answer(&mut bench, right).unwrap();
+    assert_eq!(state(&mut bench), OPEN);
+    bench.clear();
+    bench.download(&image.to_bytes()).unwrap();
+    bench.wait_for_flash();
+    assert_eq!(bench.start(), image.header.code_crc());
+    assert_eq!(state(&mut bench), CLOSED, "the program has a challenge of its own");
+}
+
+#[test]
+fn a_machine_is_stopped_by_the_holder_of_the_key_alone_and_its_bootloader_is_open_then() {
+    let mut bench = running();
+    assert_eq!(state(&mut bench), CLOSED);
+    for command in [STOP, 2] {
+        assert_eq!(bench.command(command), Err(refused(Abort::DeviceState)));
+    }
+    assert_eq!(Client::new(&mut bench).write(TRIAL_COMMAND, b"back"), Err(refused(Abort::DeviceState)));
+    assert!(bench.is_running());
+    let right = response(&mut bench);
+    answer(&mut bench, right).unwrap();
+    bench.stop();
+    assert_eq!(state(&mut bench), OPEN);
+    bench.clear();
+    // A reset closes it: the program is as it was, and starts.
+    bench.tell(0, &[RESET, 1]);
+    bench.identification_of_running();
+    assert_eq!(state(&mut bench), CLOSED);
+}
+
+/// What somebody has recorded does not open the node again: not now, not after a reset, not after the power was off.
+#[test]
+fn what_was_heard_on_the_bus_opens_nothing_later() {
+    let mut bench = running();
+    let mut heard = Vec::new();
+    for round in 0..6 {
+        assert!(!heard.contains(&challenge(&mut bench)), "the challenge of start {round} was there before");
+        heard.push(challenge(&mut bench));
+        let right = response(&mut bench);
+        answer(&mut bench, right).unwrap();
+        if round % 2 == 0 {
+            bench.tell(0, &[RESET, 1]);
+        } else {
+            bench.power_cycle();
+        }
+        bench.identification_of_running();
+        assert_eq!(answer(&mut bench, right), Err(refused(Abort::InvalidValue)));
+        assert_eq!(bench.command(STOP), Err(refused(Abort::DeviceState)));
+        assert_old_answers_open_no_bootloader(&mut bench, right);
+    }
+}
+
+/// The node is stopped by the holder of the key, and reset.
+fn assert_old_answers_open_no_bootloader(bench: &mut Bench, old: [u8; 8]) {
+    let right = response(bench);
+    answer(bench, right).unwrap();
+    bench.stop();
+    for stale in [old, right] {
+        assert_eq!(answer(bench, stale), Err(refused(Abort::InvalidValue)));
+    }
+    bench.tell(0, &[RESET, 1]);
+    bench.identification_of_running();
+}
+
+#[test]
+fn two_nodes_with_one_key_have_challenges_of_their_own() {
+    let flags = "--bitrate 1000 --node 1:pressure --node 2:pressure";
+    let mut bench = Bench::with(world_of("bootloader-guarded", flags), 1_000_000, 1);
+    bench.run(SECOND);
+    let (first, of_first) = (challenge(&mut bench), response(&mut bench));
+    bench.node = 2;
+    assert_ne!(challenge(&mut bench), first);
+    assert_eq!(answer(&mut bench, of_first), Err(refused(Abort::InvalidValue)));
+}
+
+#[test]
+fn nodectl_updates_with_the_key_and_not_without() {
+    let world = fleet::share(world_of("bootloader-guarded", "--bitrate 1000"));
+    let image = signed_by_owner(&version_a(), 0, 0);
+    let key = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/board/update/authorisation-key.hex");
+    let refusal = fleet::try_update(&world, "1", &image, None, &[]).unwrap_err();
+    assert!(refusal.contains("--authorisation-key"), "{refusal}");
+    for image in [image, signed_by_owner(&version_b(0), 0, 0)] {
+        let reports = fleet::try_update(&world, "1", &image, None, &["--authorisation-key", key]).unwrap();
+        assert_eq!(reports[0]["new_identification"], image.header.code_crc());
+        assert_eq!(reports[0]["on_trial"], false);
+    }
+}
+
+#[test]
+fn a_bootloader_without_a_key_asks_nobody() {
+    let mut bench = Bench::running();
+    assert_eq!((state(&mut bench), challenge(&mut bench)), (NO_KEY, [0; 8]));
+    assert_eq!(answer(&mut bench, [0; 8]), Err(refused(Abort::DeviceState)));
+    bench.stop();
+    let absent = bench.read(STATE).unwrap_err();
+    assert_eq!(absent, refused(Abort::NoObject));
+}

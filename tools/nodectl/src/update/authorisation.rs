@@ -1,0 +1,48 @@
+//! Answers nodes that want to know who changes their program (2003h of nodes of this project).
+
+use std::str::FromStr;
+
+use ::update::response;
+
+/// The key that the bootloader of the node was built with (`UPDATE_AUTHORISATION_KEY`).
+#[derive(Clone, Copy)]
+pub struct AuthorisationKey([u8; 32]);
+
+impl AuthorisationKey {
+    /// What a node with this serial number wants to hear.
+    #[must_use]
+    pub fn response(&self, challenge: [u8; 8], serial_number: u32) -> [u8; 8] {
+        response(&self.0, challenge, serial_number)
+    }
+}
+
+impl FromStr for AuthorisationKey {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<AuthorisationKey, &'static str> {
+        let mut key = [0; 32];
+        let is_key = hex::decode_to_slice(text.trim(), &mut key).is_ok();
+        is_key.then_some(AuthorisationKey(key)).ok_or("the key is not 64 hexadecimal digits")
+    }
+}
+
+/// The key is not for a log.
+impl std::fmt::Debug for AuthorisationKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("AuthorisationKey")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_64_digits_and_what_an_editor_leaves_around_them() {
+        let digits = "0F".repeat(32);
+        assert_eq!(format!("{digits}\n").parse::<AuthorisationKey>().unwrap().0, [0x0F; 32]);
+        for wrong in ["", &digits[1..], &format!("{digits}00"), &digits.replace('F', "G"), "\u{fc}"] {
+            assert!(wrong.parse::<AuthorisationKey>().is_err(), "{wrong}");
+        }
+    }
+}
