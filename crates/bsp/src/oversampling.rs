@@ -13,17 +13,23 @@ pub const WORDS: usize = SCANS * CHANNELS / 2;
 const FULL_SCALE: usize = 4095;
 const _: () = {
     assert!(FULL_SCALE * SCANS / 2 < 1 << 16, "the sum of a lower half must not reach into the upper one");
-    assert!(SCANS.is_multiple_of(2), "a channel has its conversions in both halves");
+    assert!(SCANS.is_multiple_of(4), "a channel has its conversions in both halves, and four scans are added at once");
 };
 
-/// The sum of each channel. Two scans are a whole number of words, and both halves of a word are added at once. The five words of two
+/// The sum of each channel. Two scans are a whole number of words, and both halves of a word are added at once. The ten words of four
 /// scans are written out: the firmware is compiled for size, and inner loops would take three times as long.
-#[allow(clippy::many_single_char_names)] // The five words of two scans.
+#[allow(clippy::many_single_char_names)] // The ten words of four scans.
 pub fn sums(words: &[AtomicU32; WORDS]) -> [u32; CHANNELS] {
     let load = |word: &AtomicU32| word.load(Ordering::Relaxed);
     let [a, b, c, d, e] =
-        words.as_chunks().0.iter().fold([0; CHANNELS], |[a, b, c, d, e], [v, w, x, y, z]| {
-            [a + load(v), b + load(w), c + load(x), d + load(y), e + load(z)]
+        words.as_chunks().0.iter().fold([0; CHANNELS], |[a, b, c, d, e], [v, w, x, y, z, p, q, r, s, t]| {
+            [
+                a + load(v) + load(p),
+                b + load(w) + load(q),
+                c + load(x) + load(r),
+                d + load(y) + load(s),
+                e + load(z) + load(t),
+            ]
         });
     let (low, high) = (|sum: u32| sum & 0xFFFF, |sum: u32| sum >> 16);
     [low(a) + high(c), high(a) + low(d), low(b) + high(d), high(b) + low(e), low(c) + high(e)]
