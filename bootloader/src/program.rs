@@ -65,7 +65,11 @@ impl Program {
 
     /// Refuses whoever has not answered the challenge, where a key is set.
     fn admit(&self) -> Result<(), Abort> {
-        if AUTHORISATION_KEY.is_none() || self.authorisation.is_open() { Ok(()) } else { Err(Abort::DeviceState) }
+        if AUTHORISATION_KEY.is_none() || self.authorisation.is_open() {
+            Ok(())
+        } else {
+            Err(Abort::DeviceState)
+        }
     }
 
     fn control(&mut self, command: u8) -> Result<(), Abort> {

@@ -13,7 +13,10 @@ pub const WORDS: usize = SCANS * CHANNELS / 2;
 const FULL_SCALE: usize = 4095;
 const _: () = {
     assert!(FULL_SCALE * SCANS / 2 < 1 << 16, "the sum of a lower half must not reach into the upper one");
-    assert!(SCANS.is_multiple_of(4), "a channel has its conversions in both halves, and four scans are added at once");
+    assert!(
+        SCANS.is_multiple_of(4),
+        "a channel has its conversions in both halves, and four scans are added at once"
+    );
 };
 
 /// The sum of each channel. Two scans are a whole number of words, and both halves of a word are added at once. The ten words of four

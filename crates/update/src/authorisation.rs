@@ -22,7 +22,11 @@ pub const AUTHORISATION_KEY: Option<[u8; KEY_LEN]> = match option_env!("UPDATE_A
 /// The response that the holder of the key gives to the challenge of the node with this serial number (1018h:4): the first eight bytes
 /// of HMAC-SHA-512 (RFC 2104) over the challenge and the serial number, both as an SDO has them, low byte first.
 #[must_use]
-pub fn response(key: &[u8; KEY_LEN], challenge: [u8; RESPONSE_LEN], serial_number: u32) -> [u8; RESPONSE_LEN] {
+pub fn response(
+    key: &[u8; KEY_LEN],
+    challenge: [u8; RESPONSE_LEN],
+    serial_number: u32,
+) -> [u8; RESPONSE_LEN] {
     let [a, b] = words(challenge);
     bytes(code(key, &[a, b, serial_number]))
 }

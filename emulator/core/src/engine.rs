@@ -297,6 +297,12 @@ fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
         let word = if size == 4 { Some(value) } else { merged(core, address, size, value) };
         let result = word.and_then(|word| core.ppb_write(address & !3, word));
         finish(core, address, result);
+        if (ppb::MPU..=ppb::MPU_END).contains(&(address & !3)) {
+            // Pages are asked for anew, and what was translated is forgotten before the next block.
+            core.memory.protection_is_new = true;
+            core.stop_for(Halt::Attention);
+            let _ = cpu.ctl_flush_tlb();
+        }
     };
     cpu.mmio_map(ppb::BASE.into(), ppb::SIZE.into(), Some(read), Some(write))?;
     Ok(())
@@ -320,12 +326,16 @@ fn merged<P: Peripherals>(core: &mut Core<P>, address: u32, size: usize, value: 
 
 /// What may be done with a page, when the library asks. Stores into a page from which code may run are several times dearer,
 /// because the library looks whether they change code: so a page of RAM has code only once code was fetched from it.
-fn on_page<P>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType) -> Option<TlbEntry> {
+fn on_page<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType) -> Option<TlbEntry> {
     if !matches!(kind, MemType::FETCH) {
         close_it_block(cpu);
     }
-    let memory = &mut cpu.get_data_mut().memory;
+    let core = cpu.get_data_mut();
     let address = page as u32;
+    if !core.scb.mpu.allows_code(address) && !core.lacks(Mechanism::ExecuteNever) {
+        return Some(TlbEntry { paddr: page, perms: Prot::READ | Prot::WRITE });
+    }
+    let memory = &mut core.memory;
     let has_code = !memory.ram.range.contains(&address) || memory.code_in_ram.contains(&address);
     let fetched = matches!(kind, MemType::FETCH);
     if fetched && !has_code {
@@ -362,6 +372,22 @@ pub(crate) fn forget_code_in_ram<P: Peripherals>(cpu: &mut Cpu<P>, pc: u32) {
         let _ = cpu.ctl_flush_tlb();
         cpu.get_data_mut().costs.forget(ram.start, ram.end);
     }
+}
+
+/// Another protection holds: what was translated from RAM may be data from now on, of which nobody looks whether it changes.
+pub(crate) fn follow_protection<P: Peripherals>(cpu: &mut Cpu<P>) {
+    let core = cpu.get_data_mut();
+    if !std::mem::take(&mut core.memory.protection_is_new) {
+        return;
+    }
+    // To look for code is to fetch, for the library.
+    let mpu = std::mem::take(&mut core.scb.mpu);
+    let ram = core.memory.ram.range.clone();
+    let _ = cpu.ctl_remove_cache(ram.start.into(), ram.end.into());
+    let core = cpu.get_data_mut();
+    core.scb.mpu = mpu;
+    core.memory.code_in_ram.clear();
+    let _ = cpu.ctl_flush_tlb();
 }
 
 /// Clears the exclusive monitor, as exception entry and return do (ARMv7-M, A3.4). Where no exclusive access has begun there

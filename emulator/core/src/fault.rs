@@ -43,6 +43,11 @@ impl Fault {
         Fault::new(pc, cfsr::IBUSERR)
     }
 
+    /// The memory protection unit lets no code run from there.
+    pub(crate) fn execution(pc: u32) -> Fault {
+        Fault::new(pc, cfsr::IACCVIOL)
+    }
+
     /// A usage fault with this status.
     pub(crate) fn usage(pc: u32, status: u32) -> Fault {
         Fault::new(pc, status)

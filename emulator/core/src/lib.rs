@@ -11,7 +11,7 @@
 //! | `engine`, `memory` | the CPU library: memory map, hooks, registers; flash and RAM |
 //! | `core` | what hooks and run loop share |
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
-//! | `nvic`, `systick`, `scb`, `ppb` | the registers of the core |
+//! | `nvic`, `systick`, `scb`, `mpu`, `ppb` | the registers of the core |
 //! | `stepping`, `alignment` | the mode in which interrupts come between any two instructions; what only that mode notices |
 //! | `watch` | stopping before an instruction, skipping it, flipping a bit of a register, going back |
 //! | `cost`, `floats`, `estimate`, `accelerator` | cycles: of a block, of the floating-point unit, their range, of the flash |
@@ -27,7 +27,8 @@
 //! * A refused load from a peripheral is a precise bus fault with the right address, but with the program counter of
 //!   the next block. Loads from unmapped memory have the exact one. A refused store is an imprecise fault at the next block.
 //! * Flash becomes busy with the end of the block that has stored to it. A load from busy flash in an IT block is done once more from the start of the block.
-//! * WFE is a hint that never sleeps; there is no MPU, no bit-band alias of RAM and no alias of flash at address 0.
+//! * The MPU says from where code runs, page by page of a kilobyte, in handlers of faults too; a region that protects data is refused.
+//! * WFE is a hint that never sleeps; there is no bit-band alias of RAM and no alias of flash at address 0.
 //! * Where CPACR does not allow the floating-point unit, the fault comes at the start of the block that uses it.
 //! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and what CCR traps, a division by zero and unaligned accesses, fault after
 //!   [`Machine::interleave`] only, and not in an IT block; without it a program that sets the traps is reported ([`chip::Breach`]).
@@ -50,9 +51,10 @@ mod machine;
 mod mechanism;
 mod memory;
 mod model;
+mod mpu;
 mod nvic;
-mod ppb;
 mod power_up;
+mod ppb;
 mod profile;
 mod scb;
 mod seed;

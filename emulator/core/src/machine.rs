@@ -397,6 +397,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         engine::close_flash(&mut self.cpu, &self.model, closed);
         let pc = self.pc();
         engine::forget_code_in_ram(&mut self.cpu, pc);
+        engine::follow_protection(&mut self.cpu);
         let core = self.cpu.get_data_mut();
         core.halt = None;
         core.look_again();
@@ -437,6 +438,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         match self.cpu.get_data().unmapped {
             Some(access) if access.fetch => Fault::fetch(pc),
             Some(access) => Fault::data(pc, access.address),
+            None if !self.cpu.get_data().scb.mpu.allows_code(pc) => Fault::execution(pc),
             None if matches!(error, uc_error::FETCH_PROT | uc_error::FETCH_UNMAPPED) => Fault::fetch(pc),
             None if self.register(RegisterARM::XPSR) & THUMB == 0 => Fault::usage(pc, cfsr::INVSTATE),
             None => Fault::undefined(pc),
@@ -473,6 +475,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// The core after any reset: stack pointer and program counter from the start of flash.
     fn restart(&mut self) {
         self.cpu.get_data_mut().reset();
+        self.cpu.get_data_mut().memory.protection_is_new = true;
         self.cpu.get_data_mut().memory.code_is_old = true;
         self.sleeping = false;
         self.locked = None;

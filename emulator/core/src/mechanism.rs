@@ -19,6 +19,8 @@ pub enum Mechanism {
     TailChain,
     /// A fault that cannot be taken becomes a HardFault.
     Escalation,
+    /// The memory protection unit keeps code from running.
+    ExecuteNever,
     /// Loads from a busy flash wait.
     FlashLoads,
     /// WFI sleeps until something is pending.

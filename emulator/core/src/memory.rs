@@ -16,12 +16,14 @@ pub(crate) struct Memory {
     pub(crate) code_in_ram: Vec<u32>,
     /// Another program has begun: what ran from RAM has probably ended.
     pub(crate) code_is_old: bool,
+    /// The memory protection unit says something else since code was translated.
+    pub(crate) protection_is_new: bool,
 }
 
 impl Memory {
     pub(crate) fn new(model: &Model) -> Memory {
         let (flash, ram) = (Block::new(model.flash.clone()), Block::new(model.ram.clone()));
-        Memory { flash, ram, code_in_ram: Vec::new(), code_is_old: false }
+        Memory { flash, ram, code_in_ram: Vec::new(), code_is_old: false, protection_is_new: false }
     }
 
     /// Reads bytes; `None` where there is no memory.

@@ -15,6 +15,10 @@ pub(crate) const SIZE: u32 = 0x0010_0000;
 const DBGMCU: u32 = 0xE004_2000;
 const DBGMCU_END: u32 = 0xE004_23FF;
 
+/// The memory protection unit: MPU_TYPE to the last alias of MPU_RASR.
+pub(crate) const MPU: u32 = 0xE000_ED90;
+pub(crate) const MPU_END: u32 = 0xE000_EDB8;
+
 const CPUID: u32 = 0x410F_C241;
 const AIRCR_KEY: u32 = 0x05FA;
 const SYSRESETREQ: u32 = 1 << 2;
@@ -62,8 +66,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_ED34 => self.scb.mmfar,
             0xE000_ED38 => self.scb.bfar,
             0xE000_ED88 => self.scb.cpacr,
-            // MPU_TYPE: no regions.
-            0xE000_ED90 => 0,
+            MPU..=MPU_END => self.scb.mpu.read(address - MPU)?,
             0xE000_EDF0 => 0,
             0xE000_EDFC => self.scb.demcr,
             0xE000_EF34 => self.scb.fpccr,
@@ -104,6 +107,7 @@ impl<P: Peripherals> Core<P> {
             0xE000_ED34 => self.scb.mmfar = value,
             0xE000_ED38 => self.scb.bfar = value,
             0xE000_ED88 => self.scb.cpacr = value,
+            MPU..=MPU_END => self.scb.mpu.write(address - MPU, value)?,
             0xE000_EDFC => self.set_demcr(value),
             0xE000_EF00 => self.pend_irqs((value >> 5) & 3, 1 << (value & 31)),
             0xE000_EF34 => self.scb.fpccr = value,

@@ -1,10 +1,12 @@
 //! The system control block's own registers (ARMv7-M, B3.2): vector table, fault status, sleep, configuration.
 
 use crate::exception::Exception;
+use crate::mpu::Mpu;
 use crate::ppb;
 
 /// Fault status bits of CFSR.
 pub(crate) mod cfsr {
+    pub(crate) const IACCVIOL: u32 = 1 << 0;
     pub(crate) const IBUSERR: u32 = 1 << 8;
     pub(crate) const PRECISERR: u32 = 1 << 9;
     pub(crate) const IMPRECISERR: u32 = 1 << 10;
@@ -39,6 +41,7 @@ pub(crate) struct Scb {
     pub(crate) fpccr: u32,
     pub(crate) demcr: u32,
     pub(crate) actlr: u32,
+    pub(crate) mpu: Mpu,
 }
 
 impl Default for Scb {
@@ -56,6 +59,7 @@ impl Default for Scb {
             fpccr: 0xC000_0000,
             demcr: 0,
             actlr: 0,
+            mpu: Mpu::default(),
         }
     }
 }

@@ -158,6 +158,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
         self.set_state(moment.machine);
         self.cpu.get_data_mut().go_back(&moment.core);
+        self.cpu.get_data_mut().memory.protection_is_new = true;
         self.cpu.context_restore(&moment.registers)?;
         Ok(())
     }

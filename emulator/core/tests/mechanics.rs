@@ -51,6 +51,11 @@ fn an_interrupt_breaks_exclusive_access() {
 }
 
 #[test]
+fn code_runs_where_the_protection_unit_allows_it() {
+    shows("execute_never", Mechanism::ExecuteNever);
+}
+
+#[test]
 fn code_programmed_into_flash_runs() {
     shows("self_modified", Mechanism::Retranslation);
 }

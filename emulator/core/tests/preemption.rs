@@ -75,6 +75,7 @@ fn programs_without_races_pass_with_every_seed() {
         "it_block",
         "exclusive",
         "self_modified",
+        "execute_never",
         "escalation",
         "hints",
     ] {

@@ -9,7 +9,7 @@ use ed25519_dalek::SigningKey;
 use sign::image::Image;
 use update::mock::MockFlash;
 use update::{
-    Decision, Description, Flash, HEADER_LEN, Next, Phase, Start, Status, Target, Updater, Version,
+    Decision, Description, Flash, HEADER_LEN, Next, Phase, Start, Status, Target, Trial, Updater, Version,
 };
 
 use crate::program::{BAD, GOOD, code};
@@ -76,6 +76,11 @@ impl Scene {
                 "waiting",
                 "an image that nobody has signed and that waits to be copied",
                 waiting(&unsigned)?,
+            ),
+            staged(
+                "returning",
+                "an image that nobody has signed in the place of the one before a trial that is lost",
+                returning(&unsigned)?,
             ),
         ])
     }
@@ -145,6 +150,28 @@ fn put(flash: &mut [u8], at: u32, bytes: &[u8]) {
 /// A flash in which an image waits to be copied over the good application, which has run. The record that says so was made for an
 /// image that was good: whoever can write the flash writes the record too.
 fn waiting(image: &[u8]) -> Result<Vec<u8>> {
+    let mut flash = downloaded()?.bytes().to_vec();
+    put(&mut flash, LAYOUT.staging().start(), image);
+    Ok(flash)
+}
+
+/// A flash in which the good application has lost its trial. The image before it, which was good, is another one now.
+fn returning(image: &[u8]) -> Result<Vec<u8>> {
+    let mut flash = downloaded()?;
+    let mut updater = Updater::new(&mut flash, target(), Status::GOOD);
+    updater.install()?;
+    while updater.poll() != Next::Nothing {}
+    ensure!(updater.phase() == Phase::Installed, "the image is good: {}", updater.status());
+    let is_withdrawn = Trial::withdraw(&mut flash, &LAYOUT).is_ok();
+    let decision = update::boot(&mut flash, &target(), Start::default());
+    ensure!(is_withdrawn && decision == Decision::Revert, "the trial is lost: {decision:?}");
+    let mut flash = flash.bytes().to_vec();
+    put(&mut flash, LAYOUT.kept().start(), image);
+    Ok(flash)
+}
+
+/// A flash with the good application, which has run, and the same once more in staging, checked.
+fn downloaded() -> Result<MockFlash> {
     let mut flash = MockFlash::new(&sizes(), 1);
     let erased = flash.program(LAYOUT.application().start(), &newer()?.to_bytes());
     ensure!(erased.is_ok(), "the power of a mock is cut when a test says so");
@@ -158,8 +185,6 @@ fn waiting(image: &[u8]) -> Result<Vec<u8>> {
     updater.finish()?;
     while updater.poll() != Next::Nothing {}
     ensure!(updater.phase() == Phase::Committed, "the image is good: {}", updater.status());
-    let mut flash = flash.bytes().to_vec();
-    put(&mut flash, LAYOUT.staging().start(), image);
     Ok(flash)
 }
 

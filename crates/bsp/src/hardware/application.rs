@@ -1,6 +1,6 @@
 //! The application slot as the bootloader sees it.
 
-use super::{memory, retained};
+use super::{confinement, memory, retained};
 use crate::vectors::Vectors;
 
 /// The vectors of the application; `None` when the slot holds nothing that could be started.
@@ -42,7 +42,7 @@ pub fn start(core: &cortex_m::Peripherals, vectors: Vectors) -> ! {
             pending.write(u32::MAX);
         }
         core.SCB.vtor.write(table);
-        cortex_m::asm::dsb();
+        confinement::end();
         cortex_m::interrupt::enable();
         cortex_m::asm::bootstrap(vectors.stack() as *const u32, (vectors.reset() ^ wrong) as *const u32)
     }

@@ -10,7 +10,7 @@ use super::flash::Flash;
 use super::led::Led;
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
-use super::{ProgramFlash, StartUpWatchdog, board, clock_tree, crash};
+use super::{ProgramFlash, StartUpWatchdog, board, clock_tree, confinement, crash};
 use crate::reset_cause::ResetCause;
 
 /// Clock, watchdog and flash.
@@ -48,11 +48,13 @@ pub struct Bus {
 }
 
 impl Loader {
-    /// The watchdog comes first: a crystal that does not start ends in a reset too. The clock is raised for the CRC of the
+    /// The watchdog comes first: a crystal that does not start ends in a reset too. Before anything is looked at, all that is not code of
+    /// the bootloader becomes data. The clock is raised for the CRC of the
     /// application, which takes nine times as long at the 16 MHz of a reset.
     #[must_use]
     pub fn start(device: Peripherals) -> Loader {
         let watchdog = StartUpWatchdog::new(device.IWDG, &device.DBGMCU);
+        confinement::begin();
         board::keep_debugger(&device.DBGMCU);
         let reset = reset(&device.RCC);
         clock_tree::raise(&device.RCC, &device.FLASH);

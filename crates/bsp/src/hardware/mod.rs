@@ -5,6 +5,7 @@ mod backup;
 pub mod board;
 pub mod can;
 mod clock_tree;
+mod confinement;
 pub mod crash;
 mod digital;
 mod encoder;

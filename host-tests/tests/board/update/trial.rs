@@ -152,6 +152,32 @@ fn a_master_confirms_a_program_or_takes_it_back_and_nothing_is_stored_before() {
     assert_eq!(write(&mut bench, COMMAND, b"back"), Err(Failure::Refused(0x0800_0022)), "there is no trial");
 }
 
+/// One is confirmed, the other taken back, and neither knows of the other. What runs is another personality at each.
+#[test]
+fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
+    let flags = "--bitrate 250 --node 1:pressure --node 2:encoder";
+    let mut bench = Bench::new(flags, 250_000, 1);
+    bench.run(SECOND);
+    for node in [1, 2] {
+        bench.node = node;
+        put(&mut bench, &version_b(0));
+    }
+    for node in [1, 2] {
+        bench.node = node;
+        assert_eq!(bench.identification_of_running(), version_b(0).header.code_crc());
+        assert_eq!(state(&mut bench), OPEN);
+    }
+    write(&mut bench, COMMAND, b"back").unwrap();
+    bench.node = 1;
+    write(&mut bench, COMMAND, b"conf").unwrap();
+    bench.run(SECOND * 4);
+    assert_eq!((state(&mut bench), bench.status()), (NONE, Status::GOOD));
+    assert_eq!(bench.identification_of_running(), version_b(0).header.code_crc());
+    bench.node = 2;
+    assert_a_is_back(&mut bench, BACK, 2);
+    assert_eq!(bench.world.summary(1.0, 0).bus.errors, 0);
+}
+
 /// The power goes in the way back, here and there: A comes back whenever it is there again.
 #[test]
 fn the_power_goes_on_the_way_back() {

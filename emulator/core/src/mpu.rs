@@ -1,0 +1,136 @@
+//! The memory protection unit (ARMv7-M, B3.5), as far as it says from where code may run. Data may go everywhere: a region that wants
+//! anything else is refused, so that no program counts on a protection that is not there.
+
+/// Regions that the unit has.
+const REGIONS: usize = 8;
+
+/// RBAR: the write is for the region of its lowest bits.
+const VALID: u32 = 1 << 4;
+/// MPU_CTRL.
+const ENABLE: u32 = 1;
+const PRIVDEFENA: u32 = 1 << 2;
+/// RASR.
+const XN: u32 = 1 << 28;
+const ACCESS: u32 = 0b111 << 24;
+const FULL_ACCESS: u32 = 0b011 << 24;
+/// The smallest region that has sub-regions, 256 bytes, by the exponent.
+const LEAST_DIVIDED: u32 = 8;
+
+/// The registers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Mpu {
+    control: u32,
+    number: u32,
+    regions: [Region; REGIONS],
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Region {
+    base: u32,
+    attributes: u32,
+}
+
+impl Region {
+    /// Whether it says something about an address.
+    fn covers(self, address: u32) -> bool {
+        let exponent = (self.attributes >> 1 & 0x1F) + 1;
+        let mask = 1_u64.checked_shl(exponent).map_or(u64::MAX, |size| size - 1);
+        let offset = u64::from(address) & mask;
+        let is_inside = u64::from(address) & !mask == u64::from(self.base) & !mask;
+        let is_off = exponent >= LEAST_DIVIDED && self.attributes >> 8 & 1 << (offset >> (exponent - 3)) != 0;
+        self.attributes & 1 != 0 && is_inside && !is_off
+    }
+}
+
+impl Mpu {
+    /// A register, by its distance from MPU_TYPE; `None` where there is none.
+    pub(crate) fn read(&self, offset: u32) -> Option<u32> {
+        let region = self.regions[self.number as usize];
+        Some(match offset {
+            0x00 => (REGIONS as u32) << 8,
+            0x04 => self.control,
+            0x08 => self.number,
+            0x0C | 0x14 | 0x1C | 0x24 => region.base | self.number,
+            0x10 | 0x18 | 0x20 | 0x28 => region.attributes,
+            _ => return None,
+        })
+    }
+
+    /// `None` for what is not modelled.
+    pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
+        match offset {
+            0x00 => {}
+            // HFNMIENA makes a difference to data and to handlers that lie in a region without code.
+            0x04 => self.control = value & (ENABLE | PRIVDEFENA),
+            0x08 => self.number = value & 7,
+            0x0C | 0x14 | 0x1C | 0x24 => {
+                if value & VALID != 0 {
+                    self.number = value & 7;
+                }
+                self.regions[self.number as usize].base = value & !0x1F;
+            }
+            0x10 | 0x18 | 0x20 | 0x28 => {
+                if value & 1 != 0 && value & ACCESS != FULL_ACCESS {
+                    return None;
+                }
+                self.regions[self.number as usize].attributes = value;
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+
+    /// Whether an instruction may be fetched from there: the region with the highest number that covers the address decides, else
+    /// the default map, in which flash and RAM have code, where the program keeps that map (B3.5.1).
+    pub(crate) fn allows_code(&self, address: u32) -> bool {
+        if self.control & ENABLE == 0 {
+            return true;
+        }
+        let region = self.regions.iter().rev().find(|region| region.covers(address));
+        region.map_or(self.control & PRIVDEFENA != 0, |region| region.attributes & XN == 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No code in a gigabyte but in the middle of 64 KiB of RAM.
+    fn confined() -> Mpu {
+        let mut mpu = Mpu::default();
+        mpu.write(0x0C, VALID).unwrap();
+        mpu.write(0x10, XN | FULL_ACCESS | 29 << 1 | 1).unwrap();
+        mpu.write(0x0C, 0x2000_0000 | VALID | 1).unwrap();
+        mpu.write(0x10, FULL_ACCESS | 0b1000_0111 << 8 | 15 << 1 | 1).unwrap();
+        mpu
+    }
+
+    #[test]
+    fn the_region_with_the_highest_number_decides() {
+        let mut mpu = confined();
+        assert!(mpu.allows_code(0x0800_0000), "the unit is off");
+        mpu.write(0x04, ENABLE | PRIVDEFENA).unwrap();
+        let allowed = [0x2000_6000, 0x2000_DFFF, 0x4000_0000];
+        let refused = [0, 0x0800_0000, 0x1FFF_FFFF, 0x2000_0000, 0x2000_5FFF, 0x2000_E000, 0x2001_0000];
+        assert!(allowed.into_iter().all(|address| mpu.allows_code(address)));
+        assert!(!refused.into_iter().any(|address| mpu.allows_code(address)));
+    }
+
+    #[test]
+    fn without_the_default_map_there_is_code_in_regions_only() {
+        let mut mpu = confined();
+        mpu.write(0x04, ENABLE).unwrap();
+        assert!(mpu.allows_code(0x2000_6000) && !mpu.allows_code(0x4000_0000));
+    }
+
+    #[test]
+    fn registers_read_back_and_what_is_not_modelled_is_refused() {
+        let mut mpu = confined();
+        assert_eq!(mpu.read(0x00), Some(0x800));
+        assert_eq!((mpu.read(0x08), mpu.read(0x0C)), (Some(1), Some(0x2000_0001)));
+        mpu.write(0x08, 0).unwrap();
+        assert_eq!(mpu.read(0x10), Some(XN | FULL_ACCESS | 29 << 1 | 1));
+        assert_eq!(mpu.write(0x10, 0b110 << 24 | 1), None, "read only");
+        assert_eq!((mpu.write(0x2C, 0), mpu.read(0x2C)), (None, None));
+    }
+}
