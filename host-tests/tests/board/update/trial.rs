@@ -46,12 +46,17 @@ fn broken(instruction: [u8; 2]) -> Image {
     signed(code, |_| ())
 }
 
-/// Everything of an update but the talk with the new program.
-fn put(bench: &mut Bench, image: &Image) {
+/// Everything of an update before the start of the new program.
+fn bring(bench: &mut Bench, image: &Image) {
     bench.stop();
     bench.clear();
     bench.download(&image.to_bytes()).unwrap();
     assert_eq!(bench.wait_for_flash(), Status::GOOD);
+}
+
+/// Everything of an update but the talk with the new program.
+fn put(bench: &mut Bench, image: &Image) {
+    bring(bench, image);
     bench.command(START).unwrap();
 }
 
@@ -160,7 +165,11 @@ fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
     bench.run(SECOND);
     for node in [1, 2] {
         bench.node = node;
-        put(&mut bench, &version_b(0));
+        bring(&mut bench, &version_b(0));
+    }
+    for node in [1, 2] {
+        bench.node = node;
+        bench.command(START).unwrap();
     }
     for node in [1, 2] {
         bench.node = node;
