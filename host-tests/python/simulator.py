@@ -29,11 +29,11 @@ class Simulator:
     #: Those that have been started; the end of the session stops the ones that a failed test has left.
     started: list["Simulator"] = []
 
-    def __init__(self, *flags: str, speed: str = "max"):
+    def __init__(self, *flags: str, speed: str = "max", bootloader: str = "bootloader"):
         images = Path(os.environ["NODE_IMAGES"])
-        for name in ("bootloader", "firmware"):
+        for name in (bootloader, "firmware"):
             assert (images / name).exists(), f"no {name} in {images}; `cargo xtask images --development` builds it"
-        command = [os.environ["SIM_COMMAND"], "--bootloader", images / "bootloader", "--firmware", images / "firmware"]
+        command = [os.environ["SIM_COMMAND"], "--bootloader", images / bootloader, "--firmware", images / "firmware"]
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         Simulator.started.append(self)

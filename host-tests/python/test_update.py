@@ -2,6 +2,7 @@
 sequence of CiA 302-3, back to A by `nodectl update`.
 """
 
+import hmac
 import json
 import os
 import subprocess
@@ -13,6 +14,8 @@ import pytest
 from simulator import PATIENCE, Master, Simulator
 
 STOP, START, CLEAR = 0, 1, 3
+AUTHORISATION = 0x2003
+CLOSED, OPEN = 1, 2
 BUSY = 1
 BOOT = int.from_bytes(b"TOOB", "little")
 DATA, CONTROL, IDENTIFICATION, STATUS = 0x1F50, 0x1F51, 0x1F56, 0x1F57
@@ -101,3 +104,24 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
     assert report["result"] == "updated"
     assert (report["old_identification"], report["new_identification"]) == (identification(b), identification(a))
     assert simulator.quit()["bus"]["errors"] == 0
+
+
+def test_the_holder_of_its_key_opens_a_node_with_the_standard_library():
+    """The bootloader has a key, and no program that its owner has signed: as docs/update.md says it in Python."""
+    simulator = Simulator("--bitrate", "1000", bootloader="bootloader-guarded")
+    master = Master(simulator)
+    assert master.read(0x1000) == BOOT
+    assert master.read(AUTHORISATION, 1) == CLOSED
+    with pytest.raises(canopen.SdoAbortedError) as refused:
+        master.write(CONTROL, 1, CLEAR, 1)
+    assert refused.value.code == 0x0800_0022
+
+    digits = Path(__file__).parent.parent / "tests" / "board" / "update" / "authorisation-key.hex"
+    key = bytes.fromhex(digits.read_text())
+    node = master.node
+    message = node.sdo.upload(AUTHORISATION, 2) + node.sdo.upload(0x1018, 4)
+    node.sdo.download(AUTHORISATION, 3, hmac.new(key, message, "sha512").digest()[:8])
+    assert master.read(AUTHORISATION, 1) == OPEN
+    master.write(CONTROL, 1, CLEAR, 1)
+    master.close()
+    simulator.quit()

@@ -112,7 +112,9 @@ impl Crash {
 #[inline(never)]
 fn sealed(kind: u32, details: &[u32]) -> Sealed {
     let mut words = [0; WORDS];
-    words.iter_mut().zip([MAGIC, kind].iter().chain(details)).for_each(|(to, from)| *to = *from);
+    let [magic, of_crash, content @ ..] = &mut words;
+    (*magic, *of_crash) = (MAGIC, kind);
+    content.iter_mut().zip(details).for_each(|(to, from)| *to = *from);
     words[WORDS - 1] = check(&words);
     words
 }

@@ -51,6 +51,7 @@ fn keyed(key: &[u8; KEY_LEN], pad: u8) -> Sha512 {
     Sha512::new_with_prefix(block)
 }
 
+#[allow(clippy::many_single_char_names)] // Eight bytes.
 fn words([a, b, c, d, e, f, g, h]: [u8; RESPONSE_LEN]) -> [u32; 2] {
     [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
 }

@@ -175,7 +175,7 @@ fn sealed<F: Flash>(flash: &mut F, target: &Target, proof: Proof, seal: &mut u32
         if let Some(header) = check.step(flash, target)? {
             *seal = if let Proof::Of(word) = proof { word } else { 0 };
             if !is_proven {
-                *seal = check.seal();
+                *seal = check.seal(target);
             }
             return Ok(header);
         }

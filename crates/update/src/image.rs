@@ -8,6 +8,7 @@ use crate::area::Area;
 use crate::flash::{Flash, read_step};
 use crate::header::{HEADER, HEADER_LEN, Header};
 use crate::refusal::Refusal;
+use crate::seal::seal;
 use crate::signature::{CONTEXT, HASH_LEN, Message, Verification};
 use crate::target::{Target, image_len};
 
@@ -118,9 +119,11 @@ impl FullCheck {
     }
 
     /// The CRC of the header once both looks have found the signature to be good; another word before, and with any other signature.
-    pub(crate) fn seal(&self) -> u32 {
+    /// The key of the look is compared with the one that is looked up here, as the two looks may have had the same wrong one.
+    pub(crate) fn seal(&self, target: &Target) -> u32 {
         let (Some(signature), Some(first)) = (&self.signature, self.first) else { return 0 };
-        signature.seal(first)
+        let Some(key) = target.key_of(&self.header) else { return 0 };
+        seal(signature.seal(first), signature.key(), key)
     }
 
     fn read<F: Flash>(&mut self, flash: &mut F, target: &Target) -> Result<Option<Header>, Refusal> {
@@ -135,8 +138,8 @@ impl FullCheck {
 
     /// Begins a look at the signature.
     fn verify(&mut self, target: &Target) -> Result<Option<Header>, Refusal> {
-        let (signature, key) = (self.header.signature(), target.key_of(&self.header)?);
-        self.signature = Verification::new(&self.hash, CONTEXT, signature, key);
+        let (signature, key) = (self.header.signature(), target.key_of(&self.header));
+        self.signature = key.and_then(|key| Verification::new(&self.hash, CONTEXT, signature, key));
         if self.signature.is_some() { Ok(None) } else { Err(Refusal::Signature) }
     }
 }

@@ -54,6 +54,7 @@ pub(crate) struct Verification {
     r: [u8; LEN],
     s: [u8; LEN],
     k: [u8; HASH_LEN],
+    key: [u8; KEY_LEN],
     /// -A.
     minus_key: EdwardsPoint,
     /// Of the bits that were gone through, the highest first.
@@ -82,8 +83,16 @@ impl Verification {
             k.update(part);
         }
         let sum = EdwardsPoint::neutral_element();
-        let new =
-            Verification { r, s, k: k.finalize().into(), minus_key, sum, rest: HASH_LEN, found: [0; LEN] };
+        let new = Verification {
+            r,
+            s,
+            k: k.finalize().into(),
+            key: *key,
+            minus_key,
+            sum,
+            rest: HASH_LEN,
+            found: [0; LEN],
+        };
         is_reduced(&s).then_some(new)
     }
 
@@ -102,6 +111,11 @@ impl Verification {
     /// After the last step, the same verdict as a word: see [`seal`].
     pub(crate) fn seal(&self, crc: u32) -> u32 {
         seal(crc, &self.found, &self.r)
+    }
+
+    /// The key that this is about.
+    pub(crate) fn key(&self) -> &[u8; KEY_LEN] {
+        &self.key
     }
 
     /// Doubles and adds. S has no bits beyond its 32 bytes.

@@ -22,8 +22,8 @@ pub struct Target {
 
 impl Target {
     /// The key of an image.
-    pub(crate) fn key_of(&self, header: &Header) -> Result<&'static [u8; KEY_LEN], Refusal> {
-        self.keys.get(usize::from(header.description().key)).ok_or(Refusal::Signature)
+    pub(crate) fn key_of(&self, header: &Header) -> Option<&'static [u8; KEY_LEN]> {
+        self.keys.get(usize::from(header.description().key))
     }
 
     /// The counter and the revoked keys.

@@ -382,8 +382,12 @@ pub(crate) fn follow_protection<P: Peripherals>(cpu: &mut Cpu<P>) {
     }
     // To look for code is to fetch, for the library.
     let mpu = std::mem::take(&mut core.scb.mpu);
-    let ram = core.memory.ram.range.clone();
-    let _ = cpu.ctl_remove_cache(ram.start.into(), ram.end.into());
+    let (flash, ram) = (core.memory.flash.range.clone(), core.memory.ram.range.clone());
+    let is_stale = std::mem::take(&mut core.memory.code_is_stale) && !core.lacks(Mechanism::Retranslation);
+    for range in [ram].into_iter().chain(is_stale.then_some(flash)) {
+        let _ = cpu.ctl_remove_cache(range.start.into(), range.end.into());
+        cpu.get_data_mut().costs.forget(range.start, range.end);
+    }
     let core = cpu.get_data_mut();
     core.scb.mpu = mpu;
     core.memory.code_in_ram.clear();
@@ -409,7 +413,10 @@ pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]
     core.memory.write(address, bytes).ok_or(uc_error::WRITE_UNMAPPED)?;
     core.flash_changes += u64::from(address < RAM);
     let has_code = address < RAM || !core.memory.code_in_ram.is_empty();
-    if has_code && !core.lacks(Mechanism::Retranslation) {
+    // Where no code may run the library finds none to forget: it does so when the protection changes.
+    let is_protected = !core.scb.mpu.allows_code(address);
+    core.memory.code_is_stale |= has_code && is_protected;
+    if has_code && !is_protected && !core.lacks(Mechanism::Retranslation) {
         if address < RAM {
             core.costs.forget(address, address + bytes.len() as u32);
         }

@@ -18,12 +18,21 @@ pub(crate) struct Memory {
     pub(crate) code_is_old: bool,
     /// The memory protection unit says something else since code was translated.
     pub(crate) protection_is_new: bool,
+    /// Memory was written from which no code may run at present: what was translated from there is old.
+    pub(crate) code_is_stale: bool,
 }
 
 impl Memory {
     pub(crate) fn new(model: &Model) -> Memory {
         let (flash, ram) = (Block::new(model.flash.clone()), Block::new(model.ram.clone()));
-        Memory { flash, ram, code_in_ram: Vec::new(), code_is_old: false, protection_is_new: false }
+        Memory {
+            flash,
+            ram,
+            code_in_ram: Vec::new(),
+            code_is_old: false,
+            protection_is_new: false,
+            code_is_stale: false,
+        }
     }
 
     /// Reads bytes; `None` where there is no memory.

@@ -17,7 +17,7 @@ const ENABLE: u32 = 0b101;
 const REGIONS: [[u32; 2]; 2] = [
     // Flash and RAM, all of the first gigabyte.
     [VALID, XN | NORMAL | 29 << 1],
-    // Where the code of the bootloader is (memory.x, RAM): 32 KiB behind the stack, the parts 3 to 6 of eight in 64 KiB.
+    // Where the code of the bootloader is (bootloader.x asserts it): 32 KiB behind the stack, the parts 3 to 6 of eight in 64 KiB.
     [0x2000_0000 | VALID | 1, NORMAL | 0b1000_0111 << 8 | 15 << 1],
 ];
 

@@ -56,12 +56,13 @@ struct Report {
 impl Update {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let nodes = session.options.node.list()?;
+        let key = session.options.authorisation_key()?;
         let image = self.image()?;
         let options = Options {
             sdo: session.options.sdo(),
             patience: Duration::from_millis(u64::from(self.patience) * 1000),
             force: self.force,
-            key: session.options.authorisation_key()?,
+            key,
             confirm: !self.no_confirm,
         };
         let results = update(&mut session.network, &nodes, &image, &options, &mut Bar::new());

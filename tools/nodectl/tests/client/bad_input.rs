@@ -54,7 +54,7 @@ const REFUSED: [&[&str]; 31] = [
 ];
 
 /// Lines that the node, the data sheet or the command itself refuses.
-const FAILED: [&[&str]; 38] = [
+const FAILED: [&[&str]; 40] = [
     &["read", "no such thing"],
     &["read", "heartbet"],
     &["read", "event timer"],
@@ -92,6 +92,8 @@ const FAILED: [&[&str]; 38] = [
     &["info", "--node", "all"],
     &["update", "/nowhere.img"],
     &["update", "Cargo.toml"],
+    &["update", "/nowhere.img", "--authorisation-key", "/nowhere"],
+    &["update", "/nowhere.img", "--authorisation-key", "Cargo.toml"],
     &["record", "--csv", "/nowhere/x.csv"],
 ];
 
