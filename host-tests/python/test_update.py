@@ -108,7 +108,7 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
 
 def test_the_holder_of_its_key_opens_a_node_with_the_standard_library():
     """The bootloader has a key, and no program that its owner has signed: as docs/update.md says it in Python."""
-    simulator = Simulator("--bitrate", "1000", bootloader="bootloader-guarded")
+    simulator = Simulator("--bitrate", "1000", speed="real", bootloader="bootloader-guarded")
     master = Master(simulator)
     assert master.read(0x1000) == BOOT
     assert master.read(AUTHORISATION, 1) == CLOSED

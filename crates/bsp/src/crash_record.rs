@@ -81,6 +81,7 @@ impl Place {
 
 impl Crash {
     /// The record to leave in RAM. Inlined, as each of the few that call knows which crash it is: the rest is left out.
+    #[allow(clippy::inline_always)]
     #[inline(always)]
     #[must_use]
     pub fn seal(&self) -> Sealed {

@@ -18,6 +18,7 @@ pub(super) fn is_recorded() -> bool {
 }
 
 /// Writes the record and restarts.
+#[allow(clippy::inline_always)]
 #[inline(always)]
 pub(crate) fn restart(crash: &Crash) -> ! {
     cortex_m::interrupt::disable();
