@@ -1,8 +1,9 @@
-//! Budgets of what a compiler decides: sizes, stacks, instructions, panics.
+//! Budgets of values that depend on the compiler: sizes, stacks, instructions, panics.
 //!
-//! The project takes whatever `stable` is, because a pinned version would make rustup download. So a budget names the compiler
-//! that it was measured with. With that compiler the budget holds as it stands; with another one within a stated width,
-//! because code that nobody changed takes more or less room then. What is said tells which compiler was seen.
+//! The project takes whatever `stable` is, because a pinned version would make rustup download. So the crate names the
+//! compiler that the budgets were measured with. With this compiler a budget holds exactly. With another compiler a
+//! budget holds within a stated width, because unchanged code takes more or less room then. The printed line names the
+//! compiler of the image.
 #![forbid(unsafe_code)]
 
 use std::path::Path;
@@ -13,15 +14,15 @@ use object::{File, Object, ObjectSection};
 /// The compiler that all budgets were measured with, as the image names it.
 pub const MEASURED_WITH: &str = "1.96.0";
 
-/// The largest value of something, in a unit of its own.
+/// The largest permitted value of one quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
-    /// What is limited, with its unit.
+    /// The quantity that is limited, with its unit.
     pub what: &'static str,
     /// The largest value with [`MEASURED_WITH`].
     pub limit: u64,
-    /// How much more another compiler may make of it, in per cent. 0 where the limit does not depend on the compiler, as with
-    /// the size of a flash.
+    /// How far the value may exceed the limit with another compiler, in per cent. 0 where the limit does not depend on
+    /// the compiler, for example the size of a flash.
     pub width: u64,
 }
 
@@ -35,7 +36,7 @@ impl Budget {
     /// Whether a value is within the budget. The line tells the value, the budget and the compiler.
     ///
     /// # Errors
-    /// The same line, when the value is over the budget or 0: what was not measured is within no budget.
+    /// The same line, when the value is over the budget. Also when the value is 0: then nothing was measured.
     pub fn check(&self, value: u64, compiler: &Compiler) -> Result<String> {
         let limit = self.limit_with(compiler);
         let line = format!("{}: {value}, budget {limit} with rustc {compiler}", self.what);
@@ -58,7 +59,7 @@ impl Compiler {
         Compiler { version: version.to_owned(), is_measured: version == MEASURED_WITH }
     }
 
-    /// The compiler that has made an ELF file: it leaves its name and version in each.
+    /// The compiler that has made an ELF file. Compilers leave their name and version in the file.
     ///
     /// # Errors
     /// The file cannot be read, or names no compiler.
@@ -71,13 +72,13 @@ impl Compiler {
         Ok(Compiler::new(version))
     }
 
-    /// Its version.
+    /// The version of the compiler.
     #[must_use]
     pub fn version(&self) -> &str {
         &self.version
     }
 
-    /// Whether the budgets were measured with this one.
+    /// Whether the budgets were measured with this compiler.
     #[must_use]
     pub const fn is_measured(&self) -> bool {
         self.is_measured

@@ -19,13 +19,13 @@ pub(crate) struct Way {
     pub(crate) to: u32,
 }
 
-/// What a function does.
+/// The calls and the stack use of a function.
 #[derive(Debug, Default)]
 pub(crate) struct Body {
     pub(crate) ways: Vec<Way>,
-    /// What its instructions take of the stack, all together.
+    /// Bytes that all instructions together take of the stack.
     pub(crate) stack: u32,
-    /// And one of them what a register says.
+    /// Whether one of the instructions takes a number of bytes that a register holds.
     pub(crate) is_variable: bool,
 }
 
@@ -86,21 +86,21 @@ impl Decoder {
 /// One instruction.
 struct Step<'a> {
     at: u32,
-    /// Without the suffix of a wide encoding.
+    /// The mnemonic without the suffix of a wide encoding.
     mnemonic: &'a str,
     operands: &'a [ArmOperand],
     is_branch: bool,
     writes_back: bool,
 }
 
-/// Where a branch goes.
+/// The target of a branch.
 enum Target {
     Address(u32),
     Register(RegId),
 }
 
 impl Step<'_> {
-    /// Not those that return, nor the jumps through a table of the function itself.
+    /// The target of a branch; `None` for a return and for a jump through a table of the function itself.
     fn target(&self) -> Option<Target> {
         if !self.is_branch {
             return None;
@@ -114,7 +114,7 @@ impl Step<'_> {
         }
     }
 
-    /// Bytes that it takes of the stack; `None` when a register says how many.
+    /// Bytes that the instruction takes of the stack; `None` when a register holds their number.
     fn stack(&self) -> Option<u32> {
         let count = |operands: &[ArmOperand]| operands.iter().map(size).sum();
         match (self.mnemonic, self.operands) {
@@ -134,7 +134,8 @@ impl Step<'_> {
         }
     }
 
-    /// Whether it goes where a word of memory says. A word that was pushed is a return.
+    /// Whether the instruction jumps to an address from memory. A word that was pushed is a return address and does not
+    /// count.
     fn loads_pc(&self) -> bool {
         match (self.mnemonic, self.operands) {
             ("ldr", [to, from]) if is(to, PC) => {
@@ -158,11 +159,11 @@ fn size(operand: &ArmOperand) -> u32 {
     }
 }
 
-/// Goes through a function.
+/// Reads the instructions of a function one after the other.
 struct Reader<'a> {
     image: &'a Image<'a>,
     function: &'a Function,
-    /// Registers that hold the address of something: a compiler that wants small code calls through one.
+    /// Registers that hold a constant address. A compiler that optimises for size calls through such a register.
     constants: BTreeMap<RegId, u32>,
     body: Body,
 }
@@ -196,7 +197,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Takes the instructions in the order of their addresses: the constant is loaded in front of the calls.
+    /// Notes the constants in registers. Instructions come in the order of their addresses, so that a constant is known
+    /// before the calls through its register.
     fn learn(&mut self, step: &Step<'_>) -> Result<()> {
         let known = match (step.mnemonic, step.operands) {
             ("movw", [_, from]) => immediate(from),

@@ -1,4 +1,4 @@
-//! Which function can call which.
+//! The graph of calls between functions.
 
 use std::collections::BTreeMap;
 
@@ -10,11 +10,11 @@ use crate::image::Image;
 /// The functions of an image, by their start.
 pub(crate) struct Graph(BTreeMap<u32, Body>);
 
-/// The deepest that the stack gets below a function, and through which functions.
+/// The largest use of the stack below a function, and the functions on the way there.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Depth {
     pub(crate) bytes: u32,
-    /// From the outermost: start and bytes of each.
+    /// Start and bytes of each function, the outermost function first.
     pub(crate) path: Vec<(u32, u32)>,
 }
 
@@ -29,17 +29,17 @@ impl Graph {
         self.0.iter().map(|(&start, body)| (start, body))
     }
 
-    /// Out of this function.
+    /// The ways out of this function.
     pub(crate) fn ways(&self, start: u32) -> impl Iterator<Item = &Way> {
         self.0.get(&start).into_iter().flat_map(|body| &body.ways)
     }
 
-    /// The deepest use of the stack from this function on. A function that calls itself, by whatever way, has none.
+    /// The largest use of the stack from this function on. A function that calls itself, directly or not, has none.
     pub(crate) fn depth(&self, image: &Image<'_>, start: u32) -> Result<Depth> {
         self.search(image, start, &mut BTreeMap::new())
     }
 
-    /// `None` in `known` stands for a function whose search has not ended.
+    /// The search behind [`depth`](Graph::depth). `None` in `known` stands for a function whose search has not ended.
     fn search(
         &self,
         image: &Image<'_>,
@@ -63,8 +63,9 @@ impl Graph {
         Ok(depth)
     }
 
-    /// What the compiler has noted, or what the instructions take: that is more where the compiler has moved a part of the
-    /// function out of it afterwards and saves a register around the call.
+    /// The bytes of stack that a function takes: the larger one of the compiler's note and the sum over the
+    /// instructions. The sum is larger where the compiler has later moved a part of the function out of it and saves a
+    /// register around the call.
     pub(crate) fn frame(&self, image: &Image<'_>, start: u32) -> Result<u32> {
         let function = image.function_at(start).context("not in the image")?;
         let body = self.0.get(&start).with_context(|| format!("nothing is known of {}", function.name))?;

@@ -13,21 +13,21 @@ const THUMB: u32 = 1;
 /// A function of the image.
 #[derive(Debug)]
 pub(crate) struct Function {
-    /// Its path in the source; several that were merged have the first of them.
+    /// The path in the source; functions that were merged have the path of the first of them.
     pub(crate) name: String,
     pub(crate) start: u32,
     pub(crate) end: u32,
-    /// What it takes of the stack, if the compiler has noted it.
+    /// The bytes of stack that the compiler has noted, if it has.
     pub(crate) noted: Option<u32>,
 }
 
-/// What is looked up in the file.
+/// An ELF file, prepared for look-ups.
 pub(crate) struct Image<'a> {
     file: File<'a>,
-    /// By start address.
+    /// The functions by their start address.
     functions: BTreeMap<u32, Function>,
     symbols: BTreeMap<&'a str, (u32, u32)>,
-    /// Where data begins in code (`$d`) and where code goes on (`$t`), as the ABI has it (ELF for the Arm Architecture, 5.5.5).
+    /// The addresses where code (`$t`) and data within code (`$d`) begin (ELF for the Arm Architecture, 5.5.5).
     is_code: BTreeMap<u32, bool>,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Image<'a> {
             marks.insert(address & !THUMB);
             self.symbols.insert(name, (address, size));
         }
-        // What is written in assembler has no size: it ends where the next thing begins.
+        // A function in assembler has no size: it ends where the next symbol begins.
         for function in self.functions.values_mut().filter(|function| function.end == function.start) {
             let next = marks.range(function.start + 1..).next();
             function.end = *next.with_context(|| format!("{} has no end", function.name))?;
@@ -76,7 +76,7 @@ impl<'a> Image<'a> {
         function.end = function.end.max(end);
     }
 
-    /// Pairs of an address and a ULEB128 (LLVM, "Emitting function stack size information").
+    /// Notes the stack sizes: pairs of an address and a ULEB128 (LLVM, "Emitting function stack size information").
     fn take_stack_sizes(&mut self, file: &File<'a>) -> Result<()> {
         let Some(section) = file.section_by_name(".stack_sizes") else { return Ok(()) };
         let mut rest = section.data()?;
@@ -96,7 +96,7 @@ impl<'a> Image<'a> {
         self.functions.values()
     }
 
-    /// The function that this address, with or without its bit 0, lies in.
+    /// The function that contains this address, with or without bit 0.
     pub(crate) fn function_at(&self, address: u32) -> Option<&Function> {
         let (_, function) = self.functions.range(..=address & !THUMB).next_back()?;
         (function.end > address & !THUMB).then_some(function)
@@ -108,7 +108,7 @@ impl<'a> Image<'a> {
         found.ok_or_else(|| anyhow!("the image has no function {name}"))
     }
 
-    /// The bytes of what is loaded to this place.
+    /// The bytes that are loaded to these addresses.
     pub(crate) fn bytes(&self, start: u32, end: u32) -> Result<&'a [u8]> {
         let mut found = self
             .file
@@ -138,7 +138,7 @@ impl<'a> Image<'a> {
         parts
     }
 
-    /// Everything that an exception or an interrupt starts: the tables of vectors, without the reset.
+    /// The functions that exceptions and interrupts start: the tables of vectors, without the reset.
     pub(crate) fn handlers(&self) -> Result<BTreeSet<u32>> {
         let mut handlers = BTreeSet::new();
         for (start, size) in [self.table("__EXCEPTIONS")?, self.interrupts()?] {
@@ -151,7 +151,8 @@ impl<'a> Image<'a> {
         Ok(handlers)
     }
 
-    /// The vectors of the interrupts: the table of the device crate, or a shorter one that the bootloader's linker script makes.
+    /// The address and size of the table of interrupt vectors: the table of the device crate, or a shorter table that
+    /// the bootloader's linker script makes.
     fn interrupts(&self) -> Result<(u32, u32)> {
         self.table("__INTERRUPTS").or_else(|_| {
             let start = self.symbol("__eexceptions")?;

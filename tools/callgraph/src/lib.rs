@@ -1,8 +1,8 @@
 //! Reads the images as they are flashed: which calls lead to a panic, and how deep the stack can get.
 //!
-//! Both come from one graph: the instructions are decoded (capstone), and every branch out of a function is a way into
-//! another one. A call through a register counts as one of the constant that was put into it; a call through memory is
-//! refused, as is recursion, so nothing is left out of the graph unseen.
+//! Both answers come from one graph. The instructions are decoded (capstone), and every branch out of a function is a
+//! way into another function. A call through a register counts as a call of the constant that was put into the
+//! register. A call through memory is refused, as is recursion, so that the graph is never incomplete without notice.
 #![forbid(unsafe_code)]
 
 mod code;
@@ -23,8 +23,8 @@ pub use stack::{Bound, Level};
 /// The images, as cargo names them.
 pub const IMAGES: [&str; 2] = ["firmware", "bootloader"];
 
-/// Prints the known calls that lead to a panic; an error names the others. What is known of a function whose path contains
-/// `forget` is forgotten, to show that the check can fail.
+/// Prints the known calls that lead to a panic; an error names the others. Entries for functions whose path contains
+/// `forget` are ignored, to show that the check can fail.
 pub fn check_panics(images: &Path, forget: Option<&str>) -> Result<()> {
     println!("| image | what can panic | calls | why |\n|---|---|---|---|");
     let known: Vec<_> = lists::KNOWN
@@ -41,7 +41,7 @@ pub fn check_panics(images: &Path, forget: Option<&str>) -> Result<()> {
     Ok(())
 }
 
-/// How deep the stack of an image can get.
+/// The bound of the stack of an image.
 pub fn stack_bound(images: &Path, name: &str) -> Result<Bound> {
     let bytes = image::read(&images.join(name))?;
     let image = image::Image::parse(&bytes)?;

@@ -1,4 +1,4 @@
-//! Which calls lead to a panic, and whether each of them is known.
+//! The calls that lead to a panic, compared with the list of known calls.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -14,27 +14,27 @@ use crate::lists::{Known, WIDTH};
 
 /// The sources of the core library, wherever they lie.
 const CORE: &str = "/library/core/src/";
-/// What the compiler has moved out of several functions, to have it once.
+/// Name prefix of functions that the compiler has made of code that several functions share.
 const OUTLINED: &str = "OUTLINED_FUNCTION_";
 /// The panic handler.
 const HANDLER: &str = "__rustc::rust_begin_unwind";
 
-/// A function of the source and a place in it; several are inlined into each other.
+/// A function of the source and a place in it. An address has several frames where functions are inlined.
 struct Frame {
     function: String,
     file: String,
     line: u32,
 }
 
-/// A call that leads to a panic, in code that is not of the core library.
+/// A call that leads to a panic, in code outside of the core library.
 pub(crate) struct Site {
     at: u32,
-    /// The innermost first.
+    /// The frames of the call, the innermost first.
     frames: Vec<Frame>,
 }
 
 impl Site {
-    /// The innermost function that is not of the core library.
+    /// The innermost function outside of the core library.
     pub(crate) fn function(&self) -> &str {
         let own = self.frames.iter().find(|frame| !frame.file.contains(CORE)).or(self.frames.first());
         own.map_or("?", |frame| frame.function.trim_start_matches(['<', '&']))
@@ -54,7 +54,8 @@ impl fmt::Display for Site {
     }
 }
 
-/// Every such call of an image. The linker leaves out a panic handler that nothing calls.
+/// Every such call of an image. There are none where nothing can panic: the linker leaves out a panic handler that is
+/// not called.
 pub(crate) fn sites(path: &Path, image: &Image<'_>, graph: &Graph) -> Result<Vec<Site>> {
     let loader = Loader::new(path).map_err(|error| anyhow!("{}: {error}", path.display()))?;
     let panics = panics(image, graph, &loader)?;
@@ -67,7 +68,8 @@ pub(crate) fn sites(path: &Path, image: &Image<'_>, graph: &Graph) -> Result<Vec
     Ok(sites)
 }
 
-/// Everything between the code that can panic and the handler: functions of the core library that call it, and so on.
+/// All functions between the code that can panic and the handler: functions of the core library that call the handler,
+/// directly or not.
 fn panics(image: &Image<'_>, graph: &Graph, loader: &Loader) -> Result<BTreeSet<u32>> {
     let mut between = BTreeSet::new();
     let mut panics = BTreeSet::new();
@@ -107,8 +109,8 @@ fn frames(loader: &Loader, address: u32) -> Result<Vec<Frame>> {
     Ok(frames)
 }
 
-/// Prints what is known, with the number of calls, which another compiler may have brought to none. An error names every
-/// call that is not known; another compiler than that of the list may leave a few.
+/// Prints the known calls and their number, which may be 0 with another compiler. An error names every call that is not
+/// known. Another compiler than the one of the list may leave a few unknown calls.
 pub(crate) fn compare(name: &str, sites: &[Site], known: &[Known], compiler: &Compiler) -> Result<()> {
     let known: Vec<&Known> = known.iter().filter(|known| known.image == name).collect();
     let mut counts: BTreeMap<&str, usize> = known.iter().map(|known| (known.function, 0)).collect();

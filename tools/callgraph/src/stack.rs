@@ -1,5 +1,5 @@
-//! The bound of the stack: the start-up or the idle task, below it one task of each priority at its deepest, and between them
-//! what the core pushes at an interrupt.
+//! The bound of the stack. The bound is the sum of the start-up or the idle task, the deepest task of each priority,
+//! and the bytes that the core pushes at each interrupt.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -9,9 +9,10 @@ use anyhow::{Context, Result, ensure};
 use crate::graph::{Depth, Graph};
 use crate::image::Image;
 
-/// What the core pushes at an exception: 26 words with the floating-point registers, and one to align it (PM0214, 2.3.7).
+/// Bytes that the core pushes at an exception: 26 words with the floating-point registers, and one to align the stack
+/// (PM0214, 2.3.7).
 const EXCEPTION: u32 = 4 * 26 + 4;
-/// It has a stack of its own (`bsp::hardware::fault`).
+/// A handler that does not count, because it has a stack of its own (`bsp::hardware::fault`).
 const HARD_FAULT: &str = "HardFault";
 /// RTIC's `main` masks the interrupts, runs `init` in this function, whose last act is to enable them, and calls `idle`
 /// (rtic-macros, codegen/main.rs).
@@ -20,27 +21,27 @@ const START_UP: &str = "__rtic_init_resources";
 /// A part of the bound.
 #[derive(Clone, Debug)]
 pub struct Level {
-    /// What runs.
+    /// The name of the code that runs.
     pub name: String,
-    /// What it takes, with what the core pushes before it.
+    /// Bytes that the code takes, with the bytes that the core pushes before.
     pub bytes: u32,
-    /// The functions of the deepest way and what each takes, the outermost first.
+    /// The functions of the deepest way and the bytes of each, the outermost first.
     pub path: Vec<(String, u32)>,
 }
 
-/// How deep the stack can get.
+/// The bound of the stack of an image.
 #[derive(Clone, Debug)]
 pub struct Bound {
-    /// While the interrupts are masked.
+    /// The start-up, with the interrupts masked.
     pub start_up: Level,
-    /// Where the interrupts are not masked: the lowest first, all of them on top of each other.
+    /// The levels once the interrupts are enabled, the lowest first. All levels can be on the stack at the same time.
     pub levels: Vec<Level>,
-    /// What the linker keeps for it.
+    /// Bytes that the linker reserves for the stack.
     pub reserved: u32,
 }
 
 impl Bound {
-    /// Bytes.
+    /// The bound in bytes.
     #[must_use]
     pub fn bytes(&self) -> u32 {
         self.levels.iter().map(|level| level.bytes).sum::<u32>().max(self.start_up.bytes)
@@ -56,7 +57,7 @@ impl fmt::Display for Bound {
     }
 }
 
-/// Adds it up.
+/// Computes the bound.
 pub(crate) fn bound(image: &Image<'_>, graph: &Graph, tasks: &BTreeMap<&str, u8>) -> Result<Bound> {
     let analysis = Analysis { image, graph };
     let mut levels = vec![analysis.thread()?];
@@ -103,13 +104,13 @@ impl Analysis<'_> {
         ))
     }
 
-    /// A function that calls nothing at that moment.
+    /// The frame of a function alone, without the functions that it calls.
     fn alone(&self, start: u32) -> Result<Depth> {
         let bytes = self.graph.frame(self.image, start)?;
         Ok(Depth { bytes, path: vec![(start, bytes)] })
     }
 
-    /// Of each priority the deepest task, the lowest priority first; then whatever else is in the vectors.
+    /// The deepest task of each priority, the lowest priority first; then all other handlers in the vectors.
     fn handlers(&self, tasks: &BTreeMap<&str, u8>) -> Result<Vec<Level>> {
         let starts = |name: &&str| Ok(self.image.function(name)?.start);
         let known: BTreeSet<u32> = tasks.keys().chain([&HARD_FAULT]).map(starts).collect::<Result<_>>()?;

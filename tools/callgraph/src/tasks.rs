@@ -1,4 +1,4 @@
-//! The tasks of the images and their priorities, from the source: the ELF file does not tell them.
+//! The tasks of the images and their priorities. They come from the source, because the ELF file does not tell them.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 const FIRMWARE: &str = include_str!("../../../firmware/src/main.rs");
 const BOOTLOADER: &str = include_str!("../../../bootloader/src/main.rs");
 
-/// Interrupt handlers with RTIC's priorities, of which a higher number interrupts a lower one.
+/// Interrupt handlers with RTIC's priorities. A higher number interrupts a lower one.
 pub(crate) fn of(image: &str) -> Result<BTreeMap<&'static str, u8>> {
     match image {
         "firmware" => parse(FIRMWARE),

@@ -6,8 +6,8 @@ use crate::ini::{Ini, Section};
 use crate::read::value;
 use crate::{Access, DataType, Entry, Error, Formula, Value};
 
-/// The entries of an object that has `count` of them, each like `pattern`. Sections `[1003Name]` and `[1003Value]`
-/// hold the names and defaults of those that differ.
+/// The entries of an object that has `count` of them, each like `pattern`. Sections `[1003Name]` and `[1003Value]` hold
+/// the names and defaults of the entries that differ.
 pub(crate) fn entries(ini: &Ini, pattern: &Entry, count: u8) -> Result<BTreeMap<u8, Entry>, Error> {
     let mut entries = BTreeMap::from([(0, number_of_entries(pattern.index, count))]);
     entries.extend((1..=count).map(|sub| (sub, like(pattern, sub))));

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::Eds;
 use crate::write::{Sections, device_info, write_lists};
 
-/// Section `[DeviceComissioning]`: which device the values are for. The section is spelled so.
+/// Section `[DeviceComissioning]` (with this spelling): the device that the values are for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Commissioning {
     /// The node-ID.
@@ -21,7 +21,7 @@ impl Eds {
     #[must_use]
     pub fn to_dcf(&self, file_name: &str) -> String {
         let mut text = String::new();
-        // A string takes everything.
+        // Writing to a string cannot fail.
         let _ = self.write_dcf(file_name, &mut Sections { out: &mut text });
         text
     }

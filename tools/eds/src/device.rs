@@ -3,16 +3,16 @@
 use canopen::dictionary::Object as Row;
 use profiles::Personality;
 
-/// A device: what its data sheet is made from.
+/// A device and the source of its data sheet.
 #[derive(Clone, Copy, Debug)]
 pub struct Device {
     /// File name of its data sheet.
     pub file_name: &'static str,
-    /// What it is, in one line.
+    /// A description of the device in one line.
     pub description: &'static str,
-    /// What the node is told to be.
+    /// The personality that the node is set to.
     pub personality: Personality,
-    /// Its dictionary.
+    /// The dictionary of the device.
     pub rows: &'static [Row],
 }
 
@@ -29,7 +29,7 @@ impl Device {
     }
 }
 
-/// All of them, in the order of the list of personalities.
+/// All devices, in the order of the list of personalities.
 pub static DEVICES: [Device; Personality::ALL.len()] = {
     let mut devices = [Device::of(Personality::ALL[0]); Personality::ALL.len()];
     let mut i = 0;

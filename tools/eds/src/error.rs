@@ -1,8 +1,8 @@
-//! What can be wrong with a data sheet.
+//! Errors of a data sheet.
 
 use thiserror::Error;
 
-/// What is wrong, and where.
+/// An error of a data sheet and its place.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{}{problem}", self.place())]
 pub struct Error {
@@ -12,17 +12,17 @@ pub struct Error {
     pub key: &'static str,
     /// The line, from 1, where it is known.
     pub line: Option<usize>,
-    /// What is wrong.
+    /// The kind of error.
     pub problem: Problem,
 }
 
-/// What is wrong.
+/// A kind of error in a data sheet.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Problem {
     /// The text is not made of sections and keys.
     #[error("{0}")]
     Syntax(String),
-    /// A key that must be there is not.
+    /// A required key is missing.
     #[error("is missing")]
     Missing,
     /// A value that is not of its type.
@@ -30,7 +30,7 @@ pub enum Problem {
     Value {
         /// The value.
         text: String,
-        /// What it should be.
+        /// The kind of value that is expected.
         expected: String,
     },
     /// A sub-index whose index has no section.

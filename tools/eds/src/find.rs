@@ -1,11 +1,11 @@
-//! Finding an entry by what a person types.
+//! Look-up of an entry by a text that a person types.
 
 use canopen::sdo::Multiplexer;
 use thiserror::Error;
 
 use crate::{Eds, Entry};
 
-/// Why nothing, or not one thing, was found.
+/// Why a look-up has not found exactly one entry.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LookupError {
     /// No entry has this address.
@@ -14,24 +14,24 @@ pub enum LookupError {
     /// No entry has this name.
     #[error("the data sheet has no object called \"{name}\"{}", list(" (it has ", similar, ")"))]
     Name {
-        /// What was looked for.
+        /// The name that was looked for.
         name: String,
-        /// Names that contain it.
+        /// Names that contain the name, else names that are like it.
         similar: Vec<String>,
     },
     /// Several entries have this name.
     #[error("\"{name}\" is the name of several objects{}", list(": ", candidates, ""))]
     Ambiguous {
-        /// What was looked for.
+        /// The name that was looked for.
         name: String,
-        /// All that have it.
+        /// All entries that have the name.
         candidates: Vec<String>,
     },
 }
 
 /// How many names an error lists.
 const LISTED: usize = 16;
-/// Names that are less alike than this are no suggestion.
+/// Names with a lower nearness are not suggested.
 const NEAR: f64 = 0.7;
 
 fn list(before: &str, names: &[String], after: &str) -> String {
@@ -44,7 +44,7 @@ impl Eds {
     /// array is its sub-index 0. Case does not matter.
     ///
     /// # Errors
-    /// When there is none, or more than one.
+    /// When no entry fits, or more than one.
     pub fn find(&self, query: &str) -> Result<&Entry, LookupError> {
         let name = query.trim().to_lowercase();
         let by_path =
@@ -76,7 +76,7 @@ impl Eds {
         self.entries().filter(|entry| is_meant(entry)).collect()
     }
 
-    /// Whether it is sub-index 0 of an object of this name.
+    /// Whether an entry is sub-index 0 of an object of this name.
     fn is_head(&self, entry: &Entry, name: &str) -> bool {
         let object = self.objects.get(&entry.index);
         entry.sub == 0 && object.is_some_and(|object| object.name.to_lowercase() == name)
@@ -93,7 +93,7 @@ impl Eds {
         if wanted.len() < 2 { Vec::new() } else { self.named(has_all) }
     }
 
-    /// Paths that contain a text, and where there is none those that look like it; nearest first.
+    /// Paths that contain a text; where no path does, paths that are like it. The nearest come first.
     fn similar(&self, text: &str) -> Vec<String> {
         let near: Vec<(f64, String)> =
             self.entries().map(|entry| (self.nearness(entry, text), self.path(entry))).collect();
@@ -102,7 +102,7 @@ impl Eds {
         if found.is_empty() {
             found = near.into_iter().filter(|(nearness, _)| *nearness >= NEAR).collect();
         }
-        // Of names that are equally near, the shorter one has less that was not asked for.
+        // Of equally near names the shortest comes first: the text makes up a larger part of it.
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.len().cmp(&b.1.len())));
         listed(found.into_iter().map(|(_, path)| path))
     }
@@ -114,11 +114,11 @@ impl Eds {
             [name.as_str(), path.as_str()].map(|own| strsim::normalized_damerau_levenshtein(own, text));
         let word =
             words(&path).map(|word| strsim::normalized_damerau_levenshtein(word, text)).fold(0.0, f64::max);
-        // A word alone is less than the whole name.
+        // A match of one word counts less than a match of the whole name.
         whole.into_iter().fold(0.95 * word, f64::max)
     }
 
-    /// All of them, nearest to the query first.
+    /// The addresses and paths of the entries, the nearest to the query first.
     fn addresses(&self, entries: &[&Entry], query: &str) -> Vec<String> {
         let line = |entry: &&Entry| format!("{:04X}h:{} {}", entry.index, entry.sub, self.path(entry));
         let text = query.trim().to_lowercase();
@@ -128,7 +128,7 @@ impl Eds {
     }
 }
 
-/// The first names, and how many more there are.
+/// The first names of a list, and the number of the others.
 fn listed(names: impl Iterator<Item = String>) -> Vec<String> {
     let mut names: Vec<String> = names.collect();
     let more = names.len().saturating_sub(LISTED);
@@ -139,13 +139,13 @@ fn listed(names: impl Iterator<Item = String>) -> Vec<String> {
     names
 }
 
-/// Words: letters and digits without what is between them.
+/// The words of a text: runs of letters and digits.
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|char: char| !char.is_alphanumeric()).filter(|word| !word.is_empty())
 }
 
 /// An index and a sub-index: `1018`, `0x1018`, `1018h`, each with `:1` (decimal, or `:0x1`) or `sub1` (hexadecimal, as
-/// in a data sheet). Without sub-index it is 0.
+/// in a data sheet). Without a sub-index the sub-index is 0.
 #[must_use]
 pub fn address(text: &str) -> Option<Multiplexer> {
     let text = text.trim().to_ascii_lowercase();

@@ -1,4 +1,4 @@
-//! What the project keeps of this crate's output in its tree.
+//! The generated files that the project keeps in its tree.
 
 use std::path::{Path, PathBuf};
 
@@ -7,9 +7,9 @@ use crate::{DEVICES, page};
 /// A file that is generated.
 #[derive(Clone, Debug)]
 pub struct File {
-    /// Where it lies.
+    /// The path of the file.
     pub path: PathBuf,
-    /// All of it.
+    /// The whole text of the file.
     pub text: String,
 }
 

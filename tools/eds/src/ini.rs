@@ -1,11 +1,11 @@
-//! The text as sections of keys, and where in the text they are.
+//! Sections and keys of a text, with their lines.
 
 use configparser::ini::{Ini as Parser, IniDefault};
 
 use crate::value::number;
 use crate::{Error, Problem};
 
-/// A parsed text. Names of sections and keys do not depend on case.
+/// A parsed text. Names of sections and keys are compared without case.
 pub(crate) struct Ini<'a> {
     text: &'a str,
     parser: Parser,
@@ -34,7 +34,7 @@ impl<'a> Ini<'a> {
         Some(Section { ini: self, name })
     }
 
-    /// The line of a key, else that of its section. What is there twice counts the last time.
+    /// The line of a key; without such a key, the line of the section. Of repeated keys the last one counts.
     fn line(&self, section: &str, key: &str) -> Option<usize> {
         let (mut inside, mut header, mut value) = (false, None, None);
         for (number, line) in (1..).zip(self.text.lines()) {
@@ -50,7 +50,7 @@ impl<'a> Ini<'a> {
     }
 }
 
-/// A comment is a line of its own; what follows a value is for [`without_comment`].
+/// A comment has a line of its own. [`without_comment`] removes comments behind values.
 fn syntax() -> IniDefault {
     let mut syntax = IniDefault::default();
     syntax.comment_symbols = vec![';'];
@@ -59,7 +59,7 @@ fn syntax() -> IniDefault {
     syntax
 }
 
-/// One section.
+/// A section of the text.
 #[derive(Clone, Copy)]
 pub(crate) struct Section<'a> {
     ini: &'a Ini<'a>,
@@ -67,24 +67,24 @@ pub(crate) struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// Its name, in lower case.
+    /// The name in lower case.
     pub(crate) fn name(self) -> &'a str {
         self.name
     }
 
-    /// All keys, in lower case, that have a value.
+    /// All keys that have a value, in lower case, with their values.
     pub(crate) fn keys(self) -> impl Iterator<Item = (&'a str, &'a str)> {
         let keys = self.ini.parser.get_map_ref().get(self.name).into_iter().flatten();
         keys.filter_map(|(key, value)| Some((key.as_str(), without_comment(value.as_deref()?)?)))
     }
 
-    /// The value of a key; an empty one is none.
+    /// The value of a key; `None` where the value is empty.
     pub(crate) fn get(self, key: &str) -> Option<&'a str> {
         let keys = self.ini.parser.get_map_ref().get(self.name)?;
         without_comment(keys.get(&key.to_ascii_lowercase())?.as_deref()?)
     }
 
-    /// The value of a key that must be there.
+    /// The value of a key, or an error where the key is missing.
     pub(crate) fn required(self, key: &'static str) -> Result<&'a str, Error> {
         self.get(key).ok_or_else(|| self.error(key, Problem::Missing))
     }
@@ -98,19 +98,19 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// A key whose value is not what it should be.
+    /// The error of a key with a wrong value.
     pub(crate) fn wrong(self, key: &'static str, text: &str, expected: impl Into<String>) -> Error {
         self.error(key, Problem::Value { text: text.into(), expected: expected.into() })
     }
 
-    /// Something wrong with a key, or with the section where the key is empty.
+    /// An error of a key; with an empty key, an error of the section.
     pub(crate) fn error(self, key: &'static str, problem: Problem) -> Error {
         let line = self.ini.line(self.name, &key.to_ascii_lowercase());
         Error { section: self.name.into(), key, line, problem }
     }
 }
 
-/// Cuts off what vendors write after a value, `0 ; off`. A semicolon inside a word is part of the word.
+/// Removes the comment that vendors write after a value, `0 ; off`. A semicolon inside a word is part of the word.
 fn without_comment(value: &str) -> Option<&str> {
     let at =
         value.match_indices(';').map(|(at, _)| at).find(|&at| value[..at].ends_with([' ', '\t']) || at == 0);

@@ -1,8 +1,8 @@
 //! Electronic data sheets (CiA 306).
 //!
-//! [`Eds`] is a data sheet as a value. [`Device::eds`] makes one from the dictionary table of a personality and
-//! [`Device::sheet`] its text; [`Eds::parse`] reads the text of any vendor. [`files`] is everything the project
-//! keeps in its tree of this: the data sheets and the reference page, written by `cargo xtask eds`.
+//! [`Eds`] is a data sheet as a value. [`Device::eds`] makes a data sheet from the dictionary table of a personality,
+//! and [`Device::sheet`] makes the text. [`Eds::parse`] reads the text of any vendor. [`files`] is all generated text
+//! in the tree of the project: the data sheets and the reference page. `cargo xtask eds` writes these files.
 #![forbid(unsafe_code)]
 
 mod compact;

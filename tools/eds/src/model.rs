@@ -4,14 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{Access, Commissioning, DataType, Formula, ObjectType};
 
-/// A data sheet: the device, and every object it has.
+/// A data sheet: the device and all its objects.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Eds {
     /// The device.
     pub device: DeviceInfo,
     /// The objects by index.
     pub objects: BTreeMap<u16, Object>,
-    /// Which device the values are for; `None` for a data sheet, which has no values.
+    /// The device that the values are for; `None` for a data sheet, which has no values.
     pub commissioning: Option<Commissioning>,
 }
 
@@ -28,7 +28,7 @@ impl Eds {
     }
 }
 
-/// Section `[DeviceInfo]`. What a file does not say is 0, empty or false.
+/// Section `[DeviceInfo]`. Values that a file leaves out are 0, empty or false.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceInfo {
     /// Name of the vendor.
@@ -43,21 +43,21 @@ pub struct DeviceInfo {
     pub revision_number: u32,
     /// Order code.
     pub order_code: String,
-    /// Bit rates it runs at, in kbit/s.
+    /// Supported bit rates in kbit/s.
     pub bit_rates: BTreeSet<u16>,
     /// Smallest mappable part of a PDO in bits; 0 where the mapping is fixed.
     pub granularity: u8,
-    /// Whether it has multiplexed PDOs.
+    /// Whether the device has multiplexed PDOs.
     pub group_messaging: bool,
     /// Number of RPDOs.
     pub rpdos: u16,
     /// Number of TPDOs.
     pub tpdos: u16,
-    /// Whether it is an LSS slave.
+    /// Whether the device is an LSS slave.
     pub lss: bool,
 }
 
-/// What is at one index.
+/// An object: all entries of one index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     /// Index.
@@ -70,14 +70,14 @@ pub struct Object {
     pub entries: BTreeMap<u8, Entry>,
 }
 
-/// What is at one sub-index: all there is to know for a transfer.
+/// An entry: an index and a sub-index, with all data that a transfer needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// Index.
     pub index: u16,
     /// Sub-index.
     pub sub: u8,
-    /// Name; that of the object where it is a variable.
+    /// Name of the entry; for a variable, the name of the object.
     pub name: String,
     /// Data type.
     pub data_type: DataType,
@@ -85,32 +85,32 @@ pub struct Entry {
     pub access: Access,
     /// Value after a reset with nothing saved.
     pub default: Option<Formula>,
-    /// The value in a device (`ParameterValue`); only a configuration file has one.
+    /// The value in a device (`ParameterValue`). Only a configuration file has values.
     pub value: Option<Formula>,
     /// Smallest value accepted, where narrower than the type.
     pub low: Option<Formula>,
     /// Largest value accepted, where narrower than the type.
     pub high: Option<Formula>,
-    /// Whether a PDO can carry it.
+    /// Whether a PDO can carry the entry.
     pub mappable: bool,
-    /// Physical unit. CiA 306 has no place for it: it is written as a comment and never read.
+    /// Physical unit. CiA 306 has no place for units: they are written as a comment and never read.
     pub unit: String,
 }
 
 impl Entry {
-    /// Its own object type: a sub-index of an array or a record is a variable or a domain.
+    /// The object type of the entry alone: a sub-index of an array or a record is a variable or a domain.
     #[must_use]
     pub fn object_type(&self) -> ObjectType {
         if self.data_type == DataType::DOMAIN { ObjectType::Domain } else { ObjectType::Var }
     }
 
-    /// Whether a TPDO can carry it.
+    /// Whether a TPDO can carry the entry.
     #[must_use]
     pub fn is_tpdo_mappable(&self) -> bool {
         self.mappable && !matches!(self.access, Access::WriteOnly | Access::ReadWriteOutput)
     }
 
-    /// Whether an RPDO can carry it.
+    /// Whether an RPDO can carry the entry.
     #[must_use]
     pub fn is_rpdo_mappable(&self) -> bool {
         self.mappable

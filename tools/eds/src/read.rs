@@ -1,4 +1,4 @@
-//! From text to [`Eds`], as CiA 306 says and as vendors write.
+//! Reader of data sheets: from text to [`Eds`], by CiA 306 and with the deviations of vendors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use crate::{
     compact,
 };
 
-/// The bit rates that a data sheet has a key for, in kbit/s.
+/// The bit rates in kbit/s and their keys in a data sheet.
 pub(crate) const BIT_RATES: [(u16, &str); 8] = [
     (10, "BaudRate_10"),
     (20, "BaudRate_20"),
@@ -20,13 +20,13 @@ pub(crate) const BIT_RATES: [(u16, &str); 8] = [
     (1000, "BaudRate_1000"),
 ];
 
-/// Below are the data types, which some editors write as objects.
+/// Smaller indices are data types, which some editors write as objects.
 const FIRST_OBJECT: u16 = 0x1000;
 
 impl Eds {
     /// Reads a data sheet (EDS) or a configuration file (DCF) of any vendor.
     ///
-    /// What an object needs must be there and right; sections and keys that are not known are passed over.
+    /// A missing required key of an object or a wrong value is an error. Unknown sections and keys are ignored.
     ///
     /// # Errors
     /// The first thing in the file that is wrong, with its section, its key and its line.
@@ -45,15 +45,15 @@ impl Eds {
                 object.entries.insert(sub, entry(section, index, sub)?);
             }
         }
-        // CiA 306 spells it with one m; not everybody does.
+        // CiA 306 spells this name with one m; some vendors write two.
         let commissioning = ini.section("devicecomissioning").or_else(|| ini.section("devicecommissioning"));
         Ok(Eds { device, objects, commissioning: commissioning.map(self::commissioning).transpose()? })
     }
 
-    /// [`Eds::parse`] of a file whose characters may be UTF-8 or, as older editors write, Latin-1.
+    /// Calls [`Eds::parse`] for a file in UTF-8 or in Latin-1, which older editors write.
     ///
     /// # Errors
-    /// Those of [`Eds::parse`].
+    /// The errors of [`Eds::parse`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Eds, Error> {
         match std::str::from_utf8(bytes) {
             Ok(text) => Eds::parse(text),
@@ -62,7 +62,7 @@ impl Eds {
     }
 }
 
-/// The index of `[1018]`, the index and sub-index of `[1018sub1]`.
+/// The index of `[1018]`; the index and sub-index of `[1018sub1]`.
 fn address(section: &str) -> Option<(u16, Option<u8>)> {
     let hex = |text: &str| text.bytes().all(|byte| byte.is_ascii_hexdigit());
     let (index, sub) = section.split_once("sub").map_or((section, None), |(index, sub)| (index, Some(sub)));
@@ -123,7 +123,7 @@ fn object(ini: &Ini, section: Section, index: u16) -> Result<Object, Error> {
     Ok(Object { index, name, object_type, entries })
 }
 
-/// CiA 306: an object without object type is a variable. One that counts sub-indices cannot be.
+/// An object without an object type is a variable (CiA 306), unless it counts sub-indices.
 fn object_type(section: Section) -> Result<ObjectType, Error> {
     let Some(text) = section.get("ObjectType") else {
         let has_subs = section.number::<u8>("SubNumber")? != 0;
@@ -156,7 +156,7 @@ fn entry(section: Section, index: u16, sub: u8) -> Result<Entry, Error> {
     })
 }
 
-/// A domain needs no data type.
+/// The data type of a section. A domain may leave it out.
 fn data_type(section: Section) -> Result<DataType, Error> {
     if section.get("DataType").is_none() && object_type(section)? == ObjectType::Domain {
         return Ok(DataType::DOMAIN);
@@ -175,7 +175,7 @@ fn formula(section: Section, key: &'static str, data_type: DataType) -> Result<O
     section.get(key).map(|text| value(section, key, text, data_type)).transpose()
 }
 
-/// A value of a type that a key, or a numbered line under its name, has.
+/// The value of a key, or of a numbered line, by its data type.
 pub(crate) fn value(
     section: Section,
     key: &'static str,

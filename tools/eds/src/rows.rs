@@ -1,4 +1,4 @@
-//! From the dictionary table of a device to the objects of its data sheet.
+//! Data sheets from dictionary tables.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use product::{REVISION, VENDOR_ID};
 use crate::read::BIT_RATES;
 use crate::{Access, DataType, Device, DeviceInfo, Eds, Entry, Formula, Object, ObjectType, Value};
 
-/// Vendor and order code: CiA has assigned no vendor-ID to the project, and an entry must not be empty.
+/// Vendor and order code. CiA has assigned no vendor-ID to the project, and the keys must not be empty.
 const NONE: &str = "none";
 
 /// Every data type of the dictionary is made of whole bytes.
@@ -77,8 +77,8 @@ impl Device {
         }
     }
 
-    /// The default of a row. The node itself fills in the identity, which is not in the table; the serial number is
-    /// another one in each device, and the identification of the program another one in each version.
+    /// The default of a row. The table has no identity, because the node itself fills it in. The serial number differs
+    /// in each device, and the identification of the program in each version.
     fn default(&self, row: &Row) -> Option<Formula> {
         let number = |value: u32| Some(Formula::Constant(Value::Integer(value.into())));
         match (row.index, row.sub) {
@@ -91,13 +91,14 @@ impl Device {
     }
 }
 
-/// A mapping parameter whose number of objects stands for a multiplexed PDO (CiA 301, 7.5.2.36 and 7.5.2.38).
+/// Whether a row belongs to a multiplexed PDO: its number of mapped objects has a special value (CiA 301, 7.5.2.36 and
+/// 7.5.2.38).
 fn is_mpdo(row: &Row) -> bool {
     let is_count = row.sub == 0 && matches!(row.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF);
     is_count && matches!(row.default, DefaultValue::Integer(254..=255))
 }
 
-/// A string that is empty in the table is filled in by the node, too.
+/// A default of the table. The node also fills in the strings that are empty in the table.
 fn default(value: DefaultValue) -> Option<Formula> {
     Some(match value {
         DefaultValue::Integer(value) => Formula::Constant(Value::Integer(value.into())),
@@ -108,7 +109,8 @@ fn default(value: DefaultValue) -> Option<Formula> {
     })
 }
 
-/// A parameter that a PDO carries has its direction in the access type, as CiA 306 has no other place for it.
+/// The access type of a row. For a parameter that a PDO carries, the access type tells the direction of the PDO,
+/// because CiA 306 has no other place for the direction.
 fn access(row: &Row) -> Access {
     match (row.access, row.mapping) {
         (RowAccess::Const, _) => Access::Const,
@@ -120,9 +122,9 @@ fn access(row: &Row) -> Access {
     }
 }
 
-/// An object of one row is a variable or a domain. Of several, it is an array when all rows beyond sub-index 0 have
-/// the same type. What CiA 301 calls a record is one: also the mapping of a multiplexed PDO, which has nothing but its
-/// number of entries.
+/// The type of an object. An object of one row is a variable or a domain. An object of several rows is an array when
+/// all rows beyond sub-index 0 have the same type. Objects that CiA 301 calls a record are records in any case, also
+/// the mapping of a multiplexed PDO, whose only entry is the number of entries.
 pub(crate) fn object_type(rows: &[Row]) -> ObjectType {
     let type_of = |row: &Row| DataType(row.kind.code());
     match rows {
@@ -141,8 +143,8 @@ fn is_record(index: u16) -> bool {
     matches!(index, 0x1018 | 0x1023 | 0x1025 | 0x1200..=0x12FF | 0x1400..=0x1BFF)
 }
 
-/// The table gives an object and its sub-index 0 one name. Sub-index 0 that can be written counts what is in use
-/// (1003h, 1600h, 1A00h), any other is fixed. Sub-indices of the same name are told apart by their number.
+/// The name of an entry. The table gives one name to an object and its sub-index 0. A writable sub-index 0 counts the
+/// entries in use (1003h, 1600h, 1A00h); any other sub-index 0 is fixed. Sub-indices of the same name get their number.
 fn entry_name(row: &Row, rows: &[Row], object_type: ObjectType) -> String {
     let is_repeated = rows.iter().filter(|other| other.sub != 0 && other.name == row.name).count() > 1;
     match row.sub {

@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-/// Object type (CiA 301, 7.4.3): what an index holds.
+/// Object type (CiA 301, 7.4.3): the kind of object at an index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ObjectType {
     /// A large block of data.
     Domain,
-    /// One value.
+    /// A single value.
     Var,
     /// Values of one type, and their number at sub-index 0.
     Array,
@@ -39,14 +39,14 @@ impl ObjectType {
         })
     }
 
-    /// Whether it has sub-indices of its own.
+    /// Whether such an object has sub-indices beyond 0.
     #[must_use]
     pub const fn has_subs(self) -> bool {
         matches!(self, ObjectType::Array | ObjectType::Record)
     }
 }
 
-/// Access type. The last two are of objects whose mapping direction is not that of their access.
+/// Access type. The last two are for objects whose PDO direction does not follow from the access by SDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// `const`: never changes.
@@ -86,7 +86,7 @@ impl Access {
         }
     }
 
-    /// The access of such a text, in any case.
+    /// The access type of a text in any case.
     #[must_use]
     pub fn from_text(text: &str) -> Option<Access> {
         Access::ALL.into_iter().find(|access| access.text().eq_ignore_ascii_case(text))
@@ -105,7 +105,7 @@ impl Access {
     }
 }
 
-/// How the values of a data type look.
+/// The form of the values of a data type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// Integer of this many bits, two's complement.
@@ -116,7 +116,7 @@ pub enum Class {
     Real(u8),
     /// Characters.
     Text,
-    /// Anything else: bytes.
+    /// Any other type: bytes.
     Bytes,
 }
 
@@ -160,7 +160,7 @@ impl DataType {
     /// DOMAIN
     pub const DOMAIN: DataType = DataType(0x0F);
 
-    /// How its values look; a type that CiA 301 does not define is bytes.
+    /// The form of the values of this type. Types that CiA 301 does not define are bytes.
     #[must_use]
     pub fn class(self) -> Class {
         self.row().map_or(Class::Bytes, |row| row.2)
@@ -171,7 +171,7 @@ impl DataType {
     }
 }
 
-/// The name that CiA 301 gives it, else its number.
+/// The name in CiA 301, else the number of the type.
 impl fmt::Display for DataType {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self.row() {

@@ -1,4 +1,4 @@
-//! Values as a data sheet writes them: numbers, text, and formulas with the node-ID.
+//! Values of a data sheet: numbers, text, and formulas with the node-ID.
 
 use canopen::NodeId;
 
@@ -7,20 +7,20 @@ use crate::{Class, DataType};
 /// A value of any data type.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Of an integer type or BOOLEAN.
+    /// A value of an integer type or BOOLEAN.
     Integer(i128),
-    /// Of REAL32 or REAL64.
+    /// A value of REAL32 or REAL64.
     Real(f64),
-    /// Of any other type, as the file writes it.
+    /// A value of any other type, as the file writes it.
     Text(String),
 }
 
-/// A value that may count from the node-ID (CiA 306, `$NODEID`).
+/// A value that may depend on the node-ID (CiA 306, `$NODEID`).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Formula {
-    /// The same for every node-ID.
+    /// A value that is equal for every node-ID.
     Constant(Value),
-    /// This plus the node-ID.
+    /// This number plus the node-ID.
     NodeId(i128),
 }
 
@@ -34,7 +34,7 @@ impl Formula {
         }
     }
 
-    /// Reads a value of a type; `None` for what is no such value.
+    /// Reads a value of a data type; `None` where the text is no such value.
     pub(crate) fn parse(text: &str, data_type: DataType) -> Option<Formula> {
         match data_type.class() {
             Class::Signed(bits) => integer(text, |value| signed(value, bits)),
@@ -44,16 +44,16 @@ impl Formula {
         }
     }
 
-    /// The text of a value of a type. A real number is written by its bits, as Lely's tools demand, which refuse the whole
-    /// file otherwise. All others read such a file: python-canopen has no default then for what is not 0, and the package
-    /// canopen of npm takes the bits for an integer.
+    /// The text of a value of a data type. A real number is written as its bits, because Lely's tools refuse the whole
+    /// file otherwise. All other readers accept the bits: python-canopen then has no default for numbers other than 0,
+    /// and the package canopen of npm reads the bits as an integer.
     pub(crate) fn text(&self, data_type: DataType) -> String {
         match (self, data_type.class()) {
             (Formula::NodeId(base), _) => format!("$NODEID+0x{base:X}"),
             (Formula::Constant(Value::Text(text)), _) => text.clone(),
             (Formula::Constant(Value::Real(value)), Class::Real(32)) => bits((*value as f32).to_bits(), 8),
             (Formula::Constant(Value::Real(value)), _) => bits(value.to_bits(), 16),
-            // Identifiers, mapped objects and units are read digit by digit, short numbers as a whole.
+            // Identifiers, mapped objects and units have all their digits, because people read them digit by digit.
             (Formula::Constant(Value::Integer(value)), Class::Unsigned(bits @ 32..)) => {
                 format!("0x{value:0width$X}", width = usize::from(bits / 4))
             }
@@ -62,7 +62,7 @@ impl Formula {
     }
 }
 
-/// Bits of a real number. Those of 0 are 0 for every reader.
+/// The bits of a real number. 0 is written as `0`, which every reader understands.
 fn bits(bits: impl Into<u64>, digits: usize) -> String {
     match bits.into() {
         0 => "0".to_owned(),
@@ -70,7 +70,7 @@ fn bits(bits: impl Into<u64>, digits: usize) -> String {
     }
 }
 
-/// A sum of numbers, with `$NODEID` at most once, in any order: CiA 306 puts it first, vendors do not.
+/// A sum of numbers with `$NODEID` at most once, in any order. CiA 306 puts `$NODEID` first, vendors do not.
 fn integer(text: &str, fit: impl Fn(i128) -> Option<i128>) -> Option<Formula> {
     let (mut sum, mut is_relative) = (0_i128, false);
     for term in text.split('+').map(str::trim) {
@@ -93,13 +93,13 @@ pub(crate) fn number(text: &str) -> Option<i128> {
         None if lower.len() > 1 && lower.starts_with('0') => (lower.as_str(), 8),
         None => (lower.as_str(), 10),
     };
-    // `from_str_radix` takes a sign of its own.
+    // `from_str_radix` accepts a second sign.
     let is_plain = digits.bytes().all(|byte| byte.is_ascii_alphanumeric());
     let value = if is_plain { i128::from_str_radix(digits, radix).ok()? } else { return None };
     Some(sign * value)
 }
 
-/// Vendors write negative numbers as what they look like in memory, too.
+/// A number of a signed type. Vendors also write negative numbers as the unsigned number with the same bits.
 fn signed(value: i128, bits: u8) -> Option<i128> {
     let half = 1_i128 << (bits - 1);
     match value {
@@ -109,7 +109,7 @@ fn signed(value: i128, bits: u8) -> Option<i128> {
     }
 }
 
-/// Vendors write the largest number as -1, too.
+/// A number of an unsigned type. Vendors also write the largest number as -1.
 fn unsigned(value: i128, bits: u8) -> Option<i128> {
     let end = 1_i128 << bits;
     match value {
@@ -119,10 +119,10 @@ fn unsigned(value: i128, bits: u8) -> Option<i128> {
     }
 }
 
-/// A number with a point, or after `0x` its bits.
+/// A real number: a decimal number, or the bits after `0x`.
 fn real(text: &str, bits: u8) -> Option<f64> {
     if !text.to_ascii_lowercase().starts_with("0x") {
-        // Each width is rounded once.
+        // Each width needs its own parser, so that the number is rounded once.
         return if bits == 32 { text.parse::<f32>().ok().map(f64::from) } else { text.parse().ok() };
     }
     let value = number(text)?;

@@ -1,4 +1,4 @@
-//! From [`Eds`] to text (CiA 306), the same on every run.
+//! Writer of data sheets: from [`Eds`] to text (CiA 306). The text is the same on every run.
 
 use std::fmt::{self, Display, Write};
 
@@ -7,7 +7,8 @@ use product::REVISION;
 use crate::read::BIT_RATES;
 use crate::{Device, DeviceInfo, Eds, Entry, Object, ObjectType};
 
-/// Day of the release, month first as CiA 306 asks. A constant, so that every run writes the same; it moves with `REVISION`.
+/// Day of the release, month first (CiA 306). A constant, so that every run writes the same text; it changes with
+/// `REVISION`.
 const RELEASE_DATE: &str = "11-21-2026";
 const RELEASE_TIME: &str = "12:00AM";
 const AUTHOR: &str = "cargo xtask eds";
@@ -17,7 +18,7 @@ const COMMENTS: [&str; 2] = [
     "The comment above a section is the physical unit; an index there is the object that selects the unit.",
 ];
 
-/// What an RPDO skips: the integer types (CiA 301, 7.4.7.1). BOOLEAN is no whole byte.
+/// Data types that an RPDO can skip: the integer types (CiA 301, 7.4.7.1). BOOLEAN is no whole byte.
 const DUMMIES: [(&str, u8); 7] = [
     ("Dummy0001", 0),
     ("Dummy0002", 1),
@@ -33,7 +34,7 @@ impl Device {
     #[must_use]
     pub fn sheet(&self) -> String {
         let mut text = String::new();
-        // A string takes everything.
+        // Writing to a string cannot fail.
         let _ = self.write(&mut Sections { out: &mut text });
         text
     }
@@ -84,7 +85,7 @@ pub(crate) fn device_info(device: &DeviceInfo, out: &mut Sections) -> fmt::Resul
     out.key("LSS_Supported", u8::from(device.lss))
 }
 
-/// What a configuration file has of the data sheet besides the device.
+/// The sections behind the device that data sheets and configuration files share.
 pub(crate) fn write_lists(eds: &Eds, out: &mut Sections) -> fmt::Result {
     dummies(out)?;
     object_lists(eds, out)
@@ -107,7 +108,7 @@ fn comments(out: &mut Sections) -> fmt::Result {
     (1..).zip(COMMENTS).try_for_each(|(i, line)| out.key(&format!("Line{i}"), line))
 }
 
-/// What CiA 301 asks of every device.
+/// Whether an object is mandatory for every device (CiA 301).
 fn is_mandatory(index: u16) -> bool {
     matches!(index, 0x1000 | 0x1001 | 0x1018)
 }
@@ -165,21 +166,22 @@ fn write_entry(entry: &Entry, section: &str, out: &mut Sections) -> fmt::Result 
             out.key(key, value.text(entry.data_type))?;
         }
     }
-    // CiA 306 has no such key for a domain, which no PDO carries, and the package canopen of npm refuses one.
+    // CiA 306 has no such key for a domain, because no PDO carries one. The package canopen of npm refuses the key
+    // there.
     if entry.object_type() == ObjectType::Domain {
         return Ok(());
     }
     out.key("PDOMapping", u8::from(entry.mappable))
 }
 
-/// Sections of keys, with the line ends that CiA 306 asks for.
+/// Sections of keys, with the line ends of CiA 306.
 pub(crate) struct Sections<'a> {
     pub(crate) out: &'a mut String,
 }
 
 impl Sections<'_> {
-    /// Begins a section. The unit stands above it: there every reader takes a comment. A key `Unit`, which python-canopen
-    /// would read, makes Lely's tools refuse the whole file.
+    /// Begins a section. The unit is a comment above the section, because every reader accepts a comment there. A key
+    /// `Unit`, which python-canopen reads, makes Lely's tools refuse the whole file.
     pub(crate) fn section(&mut self, name: &str, unit: &str) -> fmt::Result {
         if !self.out.is_empty() {
             self.out.write_str("\r\n")?;

@@ -1,4 +1,4 @@
-//! No text makes the reader panic.
+//! Tests that no text makes the reader panic.
 
 use std::sync::LazyLock;
 
@@ -16,7 +16,7 @@ fn repeatable() -> ProptestConfig {
     ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
 }
 
-/// The start of a section that is right so far.
+/// The start of a section without errors so far.
 fn section() -> impl Strategy<Value = String> {
     let name = "DeviceInfo|[12][0-9a-fA-F]{3}|2000|2000sub[0-9a-f]{1,2}|2000(Name|Value)|[ -~]{0,8}";
     string_regex(name)
@@ -24,7 +24,7 @@ fn section() -> impl Strategy<Value = String> {
         .prop_map(|name| format!("[{name}]\nParameterName=A\nDataType=5\nAccessType=rw"))
 }
 
-/// A line that reaches deep into the reader, with anything as value.
+/// A line that reaches deep into the reader, with any text as the value.
 fn line() -> impl Strategy<Value = String> {
     let key = "(ObjectType|DataType|AccessType|DefaultValue|LowLimit|PDOMapping|CompactSubObj|SubNumber|[0-9]{1,3})";
     let value = r"([789]|rw|0x[0-9A-F]{1,4}|-?[0-9]{1,45}|\$NODEID( ?\+ ?0x[0-9a-f]{1,4})?|\PC{0,12})";

@@ -1,4 +1,4 @@
-//! The generated files in the tree are what the tables say now.
+//! Tests that the generated files in the tree agree with the tables.
 
 use eds::{DEVICES, files};
 

@@ -1,4 +1,4 @@
-//! Finding an entry by what a person types.
+//! Tests of the look-up by a text that a person types.
 
 use eds::{DEVICES, Eds, LookupError, address};
 

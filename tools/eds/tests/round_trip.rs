@@ -1,4 +1,4 @@
-//! What is written is read again, and it is what the table says.
+//! Tests that a written data sheet, read again, agrees with its table.
 
 use canopen::NodeId;
 use eds::{Access, DEVICES, Eds, Formula, ObjectType, Value};
@@ -18,7 +18,7 @@ fn default(eds: &Eds, index: u16, sub: u8) -> Value {
 fn every_device_is_read_as_it_was_written() {
     for device in &DEVICES {
         let mut written = device.eds();
-        // A unit is a comment.
+        // Units are comments, which the reader skips.
         for entry in written.objects.values_mut().flat_map(|object| object.entries.values_mut()) {
             entry.unit.clear();
         }

@@ -1,9 +1,9 @@
-//! Data sheets as vendors write them.
+//! Tests with data sheets of vendors.
 
 use canopen::NodeId;
 use eds::{Access, DataType, Eds, Entry, Error, Formula, ObjectType, Problem, Value};
 
-/// Everything odd that the reader takes.
+/// A sheet with all deviations that the reader accepts.
 const ODD: &str = "\u{FEFF}; a comment\r
 [deviceinfo]\r
 VendorNumber = 0x0000abcd ; lower case, spaces, a comment behind\r

@@ -11,18 +11,18 @@ use object::{Endianness, elf};
 use sign::image::Image;
 use sign::{key, product};
 
-/// Bytes that are written at an address.
+/// Bytes and the address that they are written to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// What they are.
+    /// The name of the part.
     pub what: &'static str,
-    /// The address of the first.
+    /// The address of the first byte.
     pub address: u32,
     /// The bytes.
     pub bytes: Vec<u8>,
 }
 
-/// Everything that is written.
+/// The whole content that is written to the flash.
 #[derive(Clone, Debug)]
 pub struct Content {
     bootloader: Vec<Part>,
@@ -31,10 +31,10 @@ pub struct Content {
 }
 
 impl Content {
-    /// Of the ELF files of both programs. The application is signed with this key.
+    /// Makes the content from the ELF files of both programs. The application is signed with this key.
     ///
     /// # Errors
-    /// A file is none for the board, or the bootloader would not start what is signed with this key.
+    /// One of the files is not for this board, or the bootloader does not trust this key.
     pub fn new(bootloader: &[u8], application: &[u8], key: SigningKey) -> Result<Content> {
         let bootloader = segments(bootloader).context("the bootloader")?;
         let image = product::image(application, &key).context("the application")?;
@@ -56,14 +56,14 @@ impl Content {
         &self.image
     }
 
-    /// A bootloader holds the public keys that it trusts.
+    /// Whether the bootloader trusts the key: the bootloader contains the public keys that it trusts.
     fn is_trusted(&self) -> bool {
         let key = self.key.verifying_key().to_bytes();
         self.bootloader.iter().any(|part| part.bytes.windows(key.len()).any(|bytes| bytes == key))
     }
 }
 
-/// What `--dry-run` prints: a line for each part, with its range, its size and its CRC-32 (ISO HDLC), then the image.
+/// The output of `--dry-run`: a line for each part with its range, its size and its CRC-32 (ISO HDLC), then the image.
 impl fmt::Display for Content {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for Part { what, address, bytes } in self.parts() {
@@ -80,7 +80,7 @@ impl fmt::Display for Content {
     }
 }
 
-/// What of an ELF file is loaded into the flash.
+/// The parts of an ELF file that are loaded into the flash.
 fn segments(file: &[u8]) -> Result<Vec<Part>> {
     let elf = ElfFile32::<Endianness>::parse(file).context("a damaged ELF file, or none of 32 bits")?;
     let mut parts = Vec::new();

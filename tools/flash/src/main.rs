@@ -1,4 +1,4 @@
-//! The program behind `cargo xtask flash`, which builds both programs first.
+//! The program behind `cargo xtask flash`. The xtask builds bootloader and application before.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -67,7 +67,7 @@ fn show(call: &Command) -> Result<()> {
     Ok(())
 }
 
-/// probe-rs says on its standard error output what is wrong.
+/// Runs a call of probe-rs, which prints errors on its standard error output.
 fn make(mut call: Command) -> Result<()> {
     let status = call.status().with_context(|| format!("cannot start `{}`", line(&call)))?;
     ensure!(status.success(), "`{}` failed ({status})", line(&call));

@@ -12,11 +12,12 @@ pub struct Files<'a> {
     pub bootloader: &'a Path,
     /// The signed image: header and code.
     pub image: &'a Path,
-    /// The address of its header.
+    /// The address of the header of the image.
     pub address: u32,
 }
 
-/// What writes the files and starts the chip. Pages that are not written keep what they hold: the parameters stay.
+/// The calls that write the files and start the chip. Pages that are not written keep their content, so that the
+/// parameters stay.
 #[must_use]
 pub fn write(board: &Board, files: Files<'_>) -> Vec<Command> {
     let mut bootloader = board.call("download");
@@ -27,7 +28,7 @@ pub fn write(board: &Board, files: Files<'_>) -> Vec<Command> {
     vec![bootloader, image, board.call("reset")]
 }
 
-/// What prints the log of the application until Ctrl-C, by the format strings of its ELF file.
+/// The call that prints the log of the application until Ctrl-C. The ELF file has the format strings.
 #[must_use]
 pub fn log(board: &Board, application: &Path) -> Command {
     let mut log = board.call("attach");

@@ -1,4 +1,4 @@
-//! Live values of a node: from its TPDOs where they are in one, else by reading them now and then.
+//! Live values of a node: from TPDOs where a TPDO carries the object, else by periodic SDO reads.
 
 use std::collections::VecDeque;
 
@@ -18,61 +18,61 @@ use crate::tpdo::{self, Tpdo};
 use crate::value::{Value, guess};
 use crate::{Catalogue, Network, meaning, nmt};
 
-/// Something whose value is followed.
+/// An object whose value is followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Signal {
     /// The object.
     pub at: Multiplexer,
-    /// Its name; empty where none is known.
+    /// The name of the object; empty where none is known.
     pub name: String,
-    /// Its name with that of its record; `None` where none is known.
+    /// The name of the object with the name of its record; `None` where none is known.
     pub path: Option<String>,
-    /// Its unit; empty where none is known.
+    /// The unit; empty where none is known.
     pub unit: String,
-    /// The TPDO that has it, from 1; `None` for one that is read.
+    /// The number of the TPDO that carries the object, from 1; `None` for an object that is read by SDO.
     pub tpdo: Option<u16>,
     data_type: Option<DataType>,
     quantity: Quantity,
 }
 
-/// A value at a time.
+/// A value and its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// When it was on the bus, by the clock of the adapter where it has one. Only differences mean something.
+    /// Time of the frame on the bus, by the clock of the adapter where it has one. Only differences have a meaning.
     pub at: Instant,
-    /// Which signal, by its place in [`Acquisition::signals`].
+    /// The position of the signal in [`Acquisition::signals`].
     pub signal: usize,
     /// The value.
     pub value: Value,
 }
 
-/// What the values of a signal are.
+/// The kind of values of a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Integers of up to 64 bits with a sign.
     Signed,
-    /// The same without a sign; BOOLEAN is 0 or 1.
+    /// Integers of up to 64 bits without a sign; BOOLEAN is 0 or 1.
     Unsigned,
     /// Numbers with a fraction: of a REAL type, or integers with decimal digits or a measuring step.
     Number,
-    /// Texts, bytes, and all that has no type that is known.
+    /// Texts, bytes, and values of an unknown type.
     Text,
 }
 
-/// How values are acquired.
+/// Settings of an acquisition.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup {
-    /// Whose.
+    /// The node whose values are acquired.
     pub node: NodeId,
-    /// How patient the transfers are.
+    /// Time-outs and retries of the transfers.
     pub options: Options,
-    /// How often what is in no TPDO is read.
+    /// Period of reading the objects that no TPDO carries.
     pub period: Duration,
-    /// Whether to start the node once it is known what it sends: TPDOs come in the state operational only.
+    /// Whether to start the node after its PDO parameters are read: TPDOs are sent in the state Operational only.
     pub start: bool,
 }
 
-/// Why there are no more values.
+/// Why an acquisition ends.
 #[derive(Debug, Error)]
 pub enum Interruption {
     /// A value could not be read.
@@ -92,19 +92,19 @@ pub struct Acquisition<'n> {
     ready: VecDeque<Sample>,
     /// When the polled signals are read next.
     due: Instant,
-    /// Of the node, once a heartbeat has told it.
+    /// The NMT state of the node, once a heartbeat has told it.
     state: Option<State>,
     /// The newest emergency of the node, in words.
     emergency: Option<String>,
-    /// Of anybody.
+    /// The number of frames of all nodes.
     frames: u64,
 }
 
 impl<'n> Acquisition<'n> {
-    /// Follows these objects; all that are in TPDOs when there are none.
+    /// Follows these objects; without objects, all objects in TPDOs.
     ///
     /// # Errors
-    /// Those of SDO, and a bus that is lost.
+    /// SDO errors, and a bus that is lost.
     pub fn open(
         network: &'n mut Network,
         setup: Setup,
@@ -132,13 +132,13 @@ impl<'n> Acquisition<'n> {
         })
     }
 
-    /// What is followed.
+    /// The signals that are followed.
     #[must_use]
     pub fn signals(&self) -> &[Signal] {
         &self.signals
     }
 
-    /// Why there may be no values: the node sends no TPDOs in its state. `None` where nothing speaks against them.
+    /// A reason why values are missing: the node sends no TPDOs in its state. `None` where no reason is known.
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         let state = self.state.filter(|state| !state.has_pdos())?;
@@ -165,28 +165,28 @@ impl<'n> Acquisition<'n> {
         self.emergency.as_deref()
     }
 
-    /// How many frames of anybody have been heard.
+    /// The number of frames heard from all nodes.
     #[must_use]
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// The time of this side, for [`next`](Acquisition::next).
+    /// The time of this computer, for [`next`](Acquisition::next).
     #[must_use]
     pub fn now(&self) -> Instant {
         self.network.now()
     }
 
-    /// The time on the bus, as samples have it. `None` before the first frame.
+    /// The time on the bus, the same as in samples. `None` before the first frame.
     #[must_use]
     pub fn bus_time(&self) -> Option<Instant> {
         self.network.bus_time()
     }
 
-    /// The next sample; `None` when there was none until then.
+    /// The next sample; `None` when none has come until then.
     ///
     /// # Errors
-    /// Those of SDO, and a bus that is lost.
+    /// SDO errors, and a bus that is lost.
     pub fn next(&mut self, until: Instant) -> Result<Option<Sample>, Interruption> {
         let has_polled = self.signals.iter().any(|signal| signal.tpdo.is_none());
         while self.ready.is_empty() {
@@ -204,7 +204,7 @@ impl<'n> Acquisition<'n> {
         Ok(self.ready.pop_front())
     }
 
-    /// Takes the values that a frame has.
+    /// Takes the values out of a frame.
     fn take(&mut self, received: &Received) {
         let frame = &received.frame;
         self.frames += 1;
@@ -226,9 +226,9 @@ impl<'n> Acquisition<'n> {
         }
     }
 
-    /// Reads all that are in no TPDO.
+    /// Reads all signals that no TPDO carries.
     fn poll(&mut self) -> Result<(), sdo::Error> {
-        // Behind a slow bus the readings become fewer; they do not pile up.
+        // On a slow bus the period becomes longer; readings do not pile up.
         self.due = self.network.now().max(self.due) + self.setup.period;
         for number in 0..self.signals.len() {
             let signal = &self.signals[number];
@@ -237,7 +237,7 @@ impl<'n> Acquisition<'n> {
             }
             let bytes = Client::new(self.network, self.setup.node, self.setup.options).upload(signal.at)?;
             let value = signal.decode(&bytes);
-            // The answer was the newest frame; what came before it goes first, so that times do not go backwards.
+            // The answer is the newest frame. The frames before it are taken first, so that times do not go backwards.
             let at = self.network.newest_stamp().unwrap_or(self.network.now());
             while let Some(received) = self.network.take_kept() {
                 self.take(&received);
@@ -249,7 +249,7 @@ impl<'n> Acquisition<'n> {
 }
 
 impl Signal {
-    /// A signal that is read and not in a TPDO.
+    /// A signal that is read by SDO.
     #[must_use]
     pub fn polled(at: Multiplexer, name: &str, unit: &str) -> Signal {
         let quantity = Quantity::plain(unit);
@@ -265,20 +265,20 @@ impl Signal {
         }
     }
 
-    /// A signal that is read, by what its data sheet says.
+    /// A signal that is read by SDO, with the name of its data sheet.
     pub(crate) fn read(at: Multiplexer, catalogue: &Catalogue) -> Signal {
         let name = catalogue.entry(at).map(|entry| entry.name.clone()).unwrap_or_default();
         let signal = Signal::polled(at, &name, catalogue.unit(at));
         Signal { path: catalogue.name(at), data_type: catalogue.data_type(at), ..signal }
     }
 
-    /// The name of its data type; empty where none is known.
+    /// The name of the data type; empty where none is known.
     #[must_use]
     pub fn type_name(&self) -> String {
         self.data_type.map(|data_type| data_type.to_string()).unwrap_or_default()
     }
 
-    /// The name of its data type; that of the bytes of a value where none is known.
+    /// The name of the data type; where none is known, a name for the bytes of the value.
     #[must_use]
     pub fn data_type(&self, value: &Value) -> String {
         let guessed = || match value {
@@ -288,7 +288,7 @@ impl Signal {
         self.data_type.unwrap_or_else(guessed).to_string()
     }
 
-    /// What its values are.
+    /// The kind of values.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self.data_type.map(DataType::class) {
@@ -306,10 +306,10 @@ impl Signal {
     }
 }
 
-/// What a node sends in its TPDOs, and these objects as signals; all that are in TPDOs when there are none.
+/// The TPDOs of a node, and these objects as signals. Without objects, all objects in TPDOs become signals.
 ///
 /// # Errors
-/// Those of SDO.
+/// SDO errors.
 pub fn survey(
     client: &mut Client,
     catalogue: &Catalogue,
@@ -324,7 +324,7 @@ pub fn survey(
     Ok((tpdos, signals))
 }
 
-/// What the TPDOs carry, each object once. Below the communication profile are the data types: they stand for a gap.
+/// The objects in TPDOs, each once. Indices below 1000h are data types: they fill a gap in a PDO.
 fn mapped(tpdos: &[Tpdo]) -> Vec<Multiplexer> {
     let mut objects = Vec::new();
     for mapped in tpdos.iter().flat_map(|tpdo| &tpdo.mapping).filter(|mapped| mapped.index >= 0x1000) {

@@ -1,4 +1,4 @@
-//! What is known about the objects of a node: names, types and units, from a data sheet.
+//! Names, types and units of the objects of a node, from a data sheet.
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
@@ -6,10 +6,11 @@ use eds::{DEVICES, DataType, DeviceInfo, Eds, Entry, LookupError};
 
 use crate::value::Value;
 
-/// The first index that is not of the communication profile, which is the same in all devices (CiA 301).
+/// The first index after the communication profile. The communication profile is equal in all devices (CiA 301).
 const FIRST_OF_VENDOR: u16 = 0x2000;
 
-/// The data sheet of a device, and the communication profile for what it leaves out or where there is none.
+/// The data sheet of a device, and the communication profile. The profile serves for objects that the data sheet lacks,
+/// and for devices without a data sheet.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     sheet: Eds,
@@ -17,8 +18,8 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Of a device with a data sheet. A file has no place for units (CiA 306): those of a device of this project come from the data
-    /// sheet that is built in.
+    /// The catalogue of a device with a data sheet. A data sheet file has no place for units (CiA 306): the units of a
+    /// device of this project come from the built-in data sheet.
     #[must_use]
     pub fn new(mut sheet: Eds) -> Catalogue {
         let DeviceInfo { vendor_number, product_number, .. } = sheet.device;
@@ -31,7 +32,7 @@ impl Catalogue {
         Catalogue { sheet, common: common() }
     }
 
-    /// Of a device that nothing is known about.
+    /// The catalogue of an unknown device.
     #[must_use]
     pub fn unknown() -> Catalogue {
         Catalogue::new(common())
@@ -49,7 +50,7 @@ impl Catalogue {
         DEVICES.iter().find(|device| device.file_name == name).map(|device| Catalogue::new(device.eds()))
     }
 
-    /// The object that a person means, by address or by name. An address that no data sheet has is one all the same.
+    /// The object that a person means, by address or by name. Any address is accepted, also one that no data sheet has.
     ///
     /// # Errors
     /// When no object has the name, or more than one.
@@ -61,13 +62,13 @@ impl Catalogue {
         }
     }
 
-    /// Whether there is a data sheet of the device, not only what all devices have in common.
+    /// Whether there is a data sheet of the device, not only the communication profile.
     #[must_use]
     pub fn is_of_a_device(&self) -> bool {
         self.sheet.device != DeviceInfo::default()
     }
 
-    /// The objects of the data sheet; none where there is none of the device.
+    /// The objects of the data sheet; none without a data sheet of the device.
     pub fn indices(&self) -> impl Iterator<Item = u16> {
         self.sheet.objects.keys().copied().filter(|_| self.is_of_a_device())
     }
@@ -78,20 +79,20 @@ impl Catalogue {
         &self.sheet
     }
 
-    /// What is known about an object.
+    /// The entry of an object.
     #[must_use]
     pub fn entry(&self, at: Multiplexer) -> Option<&Entry> {
         self.sheet.get(at.index, at.sub).or_else(|| self.common.get(at.index, at.sub))
     }
 
-    /// Its name with that of its record: `Identity/Vendor-ID`.
+    /// The name of an object with the name of its record: `Identity/Vendor-ID`.
     #[must_use]
     pub fn name(&self, at: Multiplexer) -> Option<String> {
         let of = |eds: &Eds| eds.get(at.index, at.sub).map(|entry| eds.path(entry));
         of(&self.sheet).or_else(|| of(&self.common))
     }
 
-    /// The values that a write of an object accepts, where the data sheet narrows its type: `0 to 240`.
+    /// The values that an object accepts, where the data sheet narrows the range of the type: `0 to 240`.
     #[must_use]
     pub fn range(&self, at: Multiplexer, node: NodeId) -> Option<String> {
         let entry = self.entry(at)?;
@@ -108,12 +109,12 @@ impl Catalogue {
         }
     }
 
-    /// Whether a write of an object accepts a value, as far as the data sheet says.
+    /// Whether an object accepts a value, by the limits of the data sheet.
     #[must_use]
     pub fn allows(&self, at: Multiplexer, node: NodeId, value: &Value) -> bool {
         let Some((entry, value)) = self.entry(at).zip(value.as_f64()) else { return true };
         let limit = |formula: &Option<eds::Formula>| match formula.as_ref()?.evaluate(node) {
-            #[allow(clippy::cast_precision_loss)] // Integers that are limited have 32 bits.
+            #[allow(clippy::cast_precision_loss)] // Integers with limits have 32 bits.
             eds::Value::Integer(value) => Some(value as f64),
             eds::Value::Real(value) => Some(value),
             eds::Value::Text(_) => None,
@@ -122,12 +123,12 @@ impl Catalogue {
             && !limit(&entry.high).is_some_and(|high| value > high)
     }
 
-    /// All entries of the data sheet; those of the communication profile where there is none.
+    /// All entries of the data sheet; without one, the entries of the communication profile.
     pub fn entries(&self) -> impl Iterator<Item = &Entry> {
         self.sheet.entries()
     }
 
-    /// What a device of this project is called, by its identity (1018h:1 and 2): `pressure`, `encoder` ...
+    /// The name of a device of this project, by its identity (1018h:1 and 2): `pressure`, `encoder` ...
     #[must_use]
     pub fn device_name(vendor: u32, product: u32) -> Option<String> {
         let is_it = |device: &&eds::Device| {
@@ -137,7 +138,7 @@ impl Catalogue {
         DEVICES.iter().find(is_it).map(|device| device.file_name.trim_end_matches(".eds").to_owned())
     }
 
-    /// All entries of a record or an array that can be read; none where nothing is known of it.
+    /// All readable entries of a record or an array; none where the object is unknown.
     #[must_use]
     pub fn subs(&self, index: u16) -> Vec<Multiplexer> {
         let object = self.sheet.objects.get(&index).or_else(|| self.common.objects.get(&index));
@@ -149,13 +150,13 @@ impl Catalogue {
         readable.map(|entry| Multiplexer { index, sub: entry.sub }).collect()
     }
 
-    /// Its data type.
+    /// The data type of an object.
     #[must_use]
     pub fn data_type(&self, at: Multiplexer) -> Option<DataType> {
         self.entry(at).map(|entry| entry.data_type)
     }
 
-    /// Its physical unit; empty where none is known.
+    /// The physical unit of an object; empty where none is known.
     #[must_use]
     pub fn unit(&self, at: Multiplexer) -> &str {
         self.entry(at).map_or("", |entry| &entry.unit)
@@ -170,7 +171,7 @@ fn built_in(vendor: u32, product: u32) -> Option<Eds> {
 fn common() -> Eds {
     let mut eds = DEVICES.first().map(eds::Device::eds).unwrap_or_default();
     eds.objects.retain(|&index, _| index < FIRST_OF_VENDOR);
-    // It is the profile of every device, and the sheet of none.
+    // The objects are the profile of every device, so the sheet names no device.
     eds.device = DeviceInfo::default();
     eds
 }

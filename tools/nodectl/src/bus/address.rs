@@ -1,4 +1,4 @@
-//! How a bus is named on the command line.
+//! The address of a bus on the command line.
 
 use std::fmt;
 use std::io;
@@ -10,10 +10,10 @@ use super::slcan::Slcan;
 use super::socketcand::Socketcand;
 use super::{Bus, BusError};
 
-/// The port of the socketcand daemon, where the address names none.
+/// The port of a socketcand daemon where the address has none.
 const SOCKETCAND_PORT: u16 = 29_536;
 
-/// Where a bus is.
+/// The address of a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// `socketcan:can0`, an interface of this host (Linux).
@@ -24,7 +24,7 @@ pub enum Address {
         host: String,
         /// TCP port.
         port: u16,
-        /// Name of the bus there.
+        /// Name of the bus on that host.
         bus: String,
     },
     /// `slcan:/dev/ttyACM0`, a LAWICEL adapter at a serial port.
@@ -33,7 +33,7 @@ pub enum Address {
     SlcanTcp(String),
 }
 
-/// A text that names no bus.
+/// The text is no address of a bus.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "{0:?} is no bus; there are socketcan:INTERFACE, socketcand://HOST[:PORT]/BUS, slcan:DEVICE and slcan://HOST:PORT"
@@ -47,9 +47,9 @@ impl Address {
         matches!(self, Address::SlcanSerial(_) | Address::SlcanTcp(_))
     }
 
-    /// Goes on the bus.
+    /// Opens the bus.
     ///
-    /// `bit_rate` in kbit/s is for slcan adapters, which have to be told; the others have theirs.
+    /// `bit_rate` in kbit/s is for slcan adapters. The bit rate of the other buses is set elsewhere.
     ///
     /// # Errors
     /// [`BusError::Open`].

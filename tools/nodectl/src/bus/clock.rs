@@ -1,11 +1,11 @@
-//! The time of buses that are real, and time stamps in text.
+//! The clock of real buses, and time stamps in text.
 
 use std::sync::LazyLock;
 use std::time;
 
 use canopen::Instant;
 
-/// The start is one for all, so that a deadline outlives the bus that is lost and opened again.
+/// One start for all buses, so that a deadline stays valid when a lost bus is opened again.
 static START: LazyLock<time::Instant> = LazyLock::new(time::Instant::now);
 
 /// Microseconds since the first use of the clock.
@@ -13,7 +13,7 @@ pub(crate) fn now() -> Instant {
     Instant(u64::try_from(START.elapsed().as_micros()).unwrap_or(u64::MAX))
 }
 
-/// What is left until an instant; nothing when it has passed.
+/// The time that is left until an instant; 0 when the instant has passed.
 pub(crate) fn left(until: Instant) -> time::Duration {
     time::Duration::from_micros(until.0.saturating_sub(now().0))
 }

@@ -1,4 +1,4 @@
-//! Ways onto a CAN bus. One trait, so that everything above it runs on any adapter and in a test without one.
+//! Access to CAN buses. All code above the trait [`Bus`] runs on any adapter, and in tests without an adapter.
 
 mod address;
 pub(crate) mod clock;
@@ -21,19 +21,20 @@ pub use simulated::{Simulated, Station};
 
 /// Access to a CAN bus.
 ///
-/// CANopen uses 11-bit identifiers: frames with longer ones are not reported, nor are those that were sent here.
+/// CANopen uses 11-bit identifiers. Frames with 29-bit identifiers are not reported, and neither are frames that this
+/// program has sent.
 pub trait Bus {
-    /// The time, from some start on. It goes on while nothing is called, unless it is virtual.
+    /// The time since some start. It passes between calls, except on a simulated bus.
     fn now(&self) -> Instant;
 
-    /// Sends a frame, or hands it to a queue that will.
+    /// Sends a frame, or puts it into the queue of the adapter.
     ///
     /// # Errors
     /// [`BusError::Lost`].
     fn send(&mut self, frame: &Frame) -> Result<(), BusError>;
 
-    /// The next frame of somebody else; `None` when there was none until then. With an instant that has passed, it looks
-    /// whether there is one and does not wait.
+    /// The next frame of another node; `None` when none has come until then. With an instant in the past, the function
+    /// does not wait: it returns a frame only if one is there.
     ///
     /// # Errors
     /// [`BusError::Lost`].
@@ -45,23 +46,23 @@ pub trait Bus {
 pub struct Received {
     /// The frame.
     pub frame: Frame,
-    /// When it was on the bus, by the clock of the adapter where it has one, else when it arrived here. Only the
-    /// difference of two such times means something.
+    /// Time of the frame on the bus, by the clock of the adapter. Without such a clock, the time of its arrival here.
+    /// Only differences have a meaning.
     pub at: Instant,
 }
 
 /// Why the bus cannot be used.
 #[derive(Debug, Error)]
 pub enum BusError {
-    /// It could not be opened.
+    /// The bus could not be opened.
     #[error("cannot open {address}: {reason}")]
     Open {
-        /// What was asked for.
+        /// The address of the bus.
         address: String,
-        /// Why not.
+        /// The reason.
         reason: io::Error,
     },
-    /// It was open, and is gone.
+    /// The bus was open, and is lost.
     #[error("the bus is lost: {0}")]
     Lost(io::Error),
 }

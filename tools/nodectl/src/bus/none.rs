@@ -1,4 +1,4 @@
-//! No bus at all.
+//! The bus of commands that need none.
 
 use std::io;
 
@@ -6,7 +6,7 @@ use canopen::{Frame, Instant};
 
 use super::{Bus, BusError, Received, clock};
 
-/// The bus of a command that is about files: whoever uses it nonetheless is told that it is lost.
+/// The bus of a command that works on files only: every access fails, as on a lost bus.
 #[derive(Clone, Copy, Debug)]
 pub struct NoBus;
 

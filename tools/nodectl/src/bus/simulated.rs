@@ -1,4 +1,4 @@
-//! A bus in this process with time of its own: for tests, of this crate and of programs that use it.
+//! A bus in this process with its own time, for tests of this crate and of other programs.
 
 use std::collections::VecDeque;
 
@@ -6,15 +6,15 @@ use canopen::{Duration, Frame, Instant, QueueFull, Transmit};
 
 use super::{Bus, BusError, Received};
 
-/// A frame of eight bytes at 250 kbit/s: 111 bits and some stuffing.
+/// The time of a frame of eight bytes at 250 kbit/s: 111 bits and some stuffing.
 const FRAME_TIME: Duration = Duration(464);
 
-/// A node on a simulated bus. Time is an argument, as in crate `canopen`.
+/// A node on a simulated bus. Time is an argument, as in the crate `canopen`.
 pub trait Station {
-    /// A frame was on the bus.
+    /// Takes a frame from the bus.
     fn receive(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit);
 
-    /// Does what is due. Returns the instant of the next call, `Instant::NEVER` for none.
+    /// Does the work that is due. Returns the instant of the next call, `Instant::NEVER` for none.
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant;
 }
 
@@ -29,8 +29,8 @@ impl<S: Station> Station for Vec<S> {
     }
 }
 
-/// A station and this program on a bus of 250 kbit/s. Frames go out in the order in which they were requested, and
-/// every frame takes the same time. A station does not hear the others of a `Vec`.
+/// A station and this program on a bus of 250 kbit/s. Frames are sent in the order of the requests, and every frame
+/// takes the same time. The stations of a `Vec` do not hear each other.
 #[derive(Debug)]
 pub struct Simulated<S> {
     /// The other side of the bus.
@@ -41,12 +41,12 @@ pub struct Simulated<S> {
 }
 
 impl<S: Station> Simulated<S> {
-    /// At time 0.
+    /// A bus at time 0.
     pub fn new(station: S) -> Simulated<S> {
         Simulated { station, now: Instant(0), queue: VecDeque::new() }
     }
 
-    /// Lets time pass up to an instant, or to the next frame.
+    /// Advances the time to an instant, or to the next frame.
     fn advance(&mut self, until: Instant) {
         let mut out = Out(&mut self.queue);
         while out.0.is_empty() && self.now < until {

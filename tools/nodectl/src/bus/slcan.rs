@@ -1,7 +1,7 @@
 //! slcan: the line protocol of the LAWICEL CAN232 and CANUSB adapters ("CANUSB Manual", version 1.0, chapter 3).
 //!
-//! A command ends with a carriage return. Success is answered with a carriage return, refusal with a bell; adapters
-//! differ in which commands they answer at all, so nothing waits for an answer.
+//! A command ends with a carriage return. An adapter answers with a carriage return for success and with a bell for
+//! refusal. Some adapters do not answer every command, so nothing waits for an answer.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -15,12 +15,12 @@ use crate::value::hex_bytes;
 
 /// Bit rates of S0 to S8 in kbit/s.
 const BIT_RATES: [u16; 9] = [10, 20, 50, 100, 125, 250, 500, 800, 1000];
-/// How long somebody who is no adapter may take to say so.
+/// How long to wait for the greeting of a peer that is no adapter.
 const GREETING: Duration = Duration::from_millis(200);
 /// The longest line of an adapter is an extended frame with a time stamp: 30 characters.
 const LONGEST: usize = 64;
 
-/// Reads a line without its carriage return; `None` where it is no base frame.
+/// Reads a line without its carriage return; `None` where the line is no frame with an 11-bit identifier.
 fn parse(line: &str) -> Option<Frame> {
     let (kind, rest) = line.split_at_checked(1)?;
     let (id, rest) = rest.split_at_checked(3)?;
@@ -45,8 +45,8 @@ fn format(frame: &Frame) -> String {
     line + "\r"
 }
 
-/// Leaves the bus if it was on it, sets the bit rate, goes on the bus. The empty lines end what an earlier user left
-/// unfinished.
+/// The commands that leave the bus if the adapter is on it, set the bit rate and go on the bus. The empty lines end an
+/// unfinished command of an earlier user.
 fn opening(bit_rate: u16) -> io::Result<String> {
     let index = BIT_RATES.iter().position(|&rate| rate == bit_rate);
     let index = index.ok_or_else(|| {
@@ -67,7 +67,7 @@ impl Splitter {
                 b'\r' | b'\x07' => {
                     frames.extend(parse(&String::from_utf8_lossy(&std::mem::take(&mut self.0))));
                 }
-                // The acknowledge of a sent frame has no carriage return of its own with some adapters.
+                // Some adapters acknowledge a sent frame without a carriage return.
                 b'z' | b'Z' if self.0.is_empty() => (),
                 _ if self.0.len() < LONGEST => self.0.push(byte),
                 _ => (),
@@ -86,7 +86,7 @@ pub(super) struct Slcan {
 impl Slcan {
     pub(super) fn connect(host: &str, bit_rate: u16) -> io::Result<Slcan> {
         let mut stream = Stream::connect(host)?;
-        // A socketcand greets at once; an adapter says nothing before it is asked.
+        // A socketcand daemon greets at once; an adapter sends nothing before a command.
         let greeting = stream.read(clock::now() + GREETING).map_err(io::Error::other)?;
         if greeting.starts_with(b"<") {
             let message = "a socketcand answers there: the address is socketcand://HOST:PORT/BUS";
@@ -106,7 +106,7 @@ impl Slcan {
 }
 
 impl Drop for Slcan {
-    /// An adapter that stays open would fill its buffer for the next user.
+    /// Closes the adapter. An open adapter would fill its buffer for the next user.
     fn drop(&mut self) {
         let _ = self.stream.write("C\r");
     }

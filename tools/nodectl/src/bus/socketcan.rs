@@ -10,11 +10,12 @@ use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Id, Socket, StandardId};
 use super::stream::is_time_out;
 use super::{Bus, BusError, Received, clock};
 
-/// The shortest time that a read with a limit waits; 0 would be for ever.
+/// The shortest time-out of a read; 0 would mean no time-out.
 const SHORTEST: Duration = Duration::from_millis(1);
-/// The queue of the interface is full (`ENOBUFS`); it holds ten frames by default. Tried again after this time.
+/// The time before the next try when the queue of the interface is full (`ENOBUFS`). The queue holds ten frames by
+/// default.
 const FULL: Duration = Duration::from_millis(1);
-/// How often, before the bus counts as lost: nobody acknowledges.
+/// The number of tries before the bus counts as lost, because no node acknowledges.
 const TRIES: usize = 2000;
 
 /// An open interface.
@@ -27,7 +28,7 @@ impl SocketCan {
         Ok(SocketCan { socket: CanSocket::open(interface)? })
     }
 
-    /// A frame within this time; with no time at all, one that is there.
+    /// The next frame within this time. With a time of 0, a frame that is there already.
     fn read_within(&mut self, time: Duration) -> io::Result<CanFrame> {
         if !time.is_zero() {
             self.socket.set_read_timeout(time.max(SHORTEST))?;
@@ -79,7 +80,7 @@ fn is_full(error: &io::Error) -> bool {
     error.raw_os_error() == Some(ENOBUFS) || error.kind() == ErrorKind::WouldBlock
 }
 
-/// `None` for an extended identifier, and for an error frame.
+/// The frame; `None` for a 29-bit identifier and for an error frame.
 fn from_host(frame: &CanFrame) -> Option<Frame> {
     let Id::Standard(id) = frame.id() else { return None };
     match frame {

@@ -1,6 +1,6 @@
 //! The client of a socketcand daemon: frames as text between angle brackets over TCP.
 //!
-//! Follows doc/protocol.md of <https://github.com/linux-can/socketcand>, in raw mode: every frame is reported.
+//! Follows doc/protocol.md of <https://github.com/linux-can/socketcand>, in raw mode: the daemon reports every frame.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ use crate::value::hex_bytes;
 
 /// How long the daemon may take to answer.
 const ANSWER: Duration = Duration::from_millis(3000);
-/// Without a bracket in so many bytes, what arrives is not the protocol.
+/// Without a bracket in this number of bytes, the peer does not speak the protocol.
 const LONGEST: usize = 4096;
 
 /// A message of the daemon.
@@ -25,7 +25,7 @@ enum Message {
     Ok,
     Error(String),
     Frame(Received),
-    /// Anything that this client has no use for: error frames, extended identifiers, statistics.
+    /// Messages that this client does not use: error frames, 29-bit identifiers, statistics.
     Other,
 }
 
@@ -43,7 +43,7 @@ fn parse(text: &str) -> Message {
 }
 
 fn frame(id: &str, time: &str, frame: impl FnOnce(u16) -> Option<Frame>) -> Message {
-    // Eight digits are an extended identifier, whatever its value.
+    // An identifier of eight digits is a 29-bit identifier, whatever its value.
     let id = u16::from_str_radix(id, 16).ok().filter(|_| id.len() <= 3);
     let received = || Some(Received { frame: frame(id?)?, at: clock::parse(time)? });
     received().map_or(Message::Other, Message::Frame)
@@ -68,7 +68,7 @@ fn format(frame: &Frame) -> String {
 struct Splitter(Vec<u8>);
 
 impl Splitter {
-    /// Takes bytes; what they complete goes to `messages`.
+    /// Takes bytes; complete messages go to `messages`.
     fn push(&mut self, bytes: &[u8], messages: &mut VecDeque<Message>) {
         for &byte in bytes {
             match byte {
@@ -89,7 +89,7 @@ pub(super) struct Socketcand {
 }
 
 impl Socketcand {
-    /// Connects and opens a bus there.
+    /// Connects to a daemon and opens a bus of it.
     pub(super) fn connect(host: impl ToSocketAddrs, bus: &str) -> io::Result<Socketcand> {
         let stream = Stream::connect(host)?;
         let mut this = Socketcand { stream, splitter: Splitter::default(), messages: VecDeque::new() };

@@ -1,4 +1,4 @@
-//! Bytes that come and go over TCP or a serial port, with deadlines.
+//! Streams of bytes over TCP or a serial port, with deadlines.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -12,12 +12,12 @@ use super::clock;
 
 /// How long a host may take to accept a connection.
 const CONNECT: Duration = Duration::from_secs(3);
-/// The shortest time that a read with a limit waits; 0 would be for ever.
+/// The shortest time-out of a read; 0 would mean no time-out.
 const SHORTEST: Duration = Duration::from_millis(1);
 
-/// Something to read from with a limit.
+/// A source of bytes that can be read with a time-out.
 trait Port: Read + Write {
-    /// Some bytes within this time. With no time at all, those that are there.
+    /// Reads some bytes within this time. With a time of 0, bytes that are there already.
     fn read_within(&mut self, time: Duration, buffer: &mut [u8]) -> io::Result<usize>;
 }
 
@@ -50,13 +50,13 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// Connects to the first address of a host that accepts.
+    /// Connects to the first address of a host that accepts the connection.
     pub(super) fn connect(host: impl ToSocketAddrs) -> io::Result<Stream> {
         let mut failure = io::Error::new(ErrorKind::NotFound, "no such host");
         for address in host.to_socket_addrs()? {
             match TcpStream::connect_timeout(&address, CONNECT) {
                 Ok(stream) => {
-                    // A request is one small write that must not wait for the next.
+                    // A request is one small write that must be sent at once.
                     stream.set_nodelay(true)?;
                     return Ok(Stream { port: Box::new(stream) });
                 }
@@ -66,7 +66,7 @@ impl Stream {
         Err(failure)
     }
 
-    /// Opens a serial port. The line speed means nothing to the USB adapters that are common today.
+    /// Opens a serial port. The common USB adapters ignore the line speed.
     pub(super) fn serial(device: &str) -> io::Result<Stream> {
         let port = serialport::new(device, 115_200).timeout(SHORTEST).open()?;
         Ok(Stream { port: Box::new(port) })
@@ -76,7 +76,7 @@ impl Stream {
         self.port.write_all(text.as_bytes()).and_then(|()| self.port.flush()).map_err(BusError::Lost)
     }
 
-    /// Some bytes; none at the deadline. It does not wait for one that has passed.
+    /// Reads some bytes; none at the deadline. With a deadline in the past, the function does not wait.
     pub(super) fn read(&mut self, until: Instant) -> Result<Vec<u8>, BusError> {
         let mut buffer = [0; 4096];
         match self.port.read_within(clock::left(until), &mut buffer) {
@@ -88,7 +88,7 @@ impl Stream {
     }
 }
 
-/// What a read says at its limit depends on the system.
+/// Whether an error is a time-out. The kind of error depends on the operating system.
 pub(super) fn is_time_out(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

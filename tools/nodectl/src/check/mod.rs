@@ -1,8 +1,8 @@
 //! A conformance test for any CANopen device: CiA 301, CiA 305 and the mandatory objects of some device profiles.
 //!
-//! A [`Check`] is one rule of a clause and a short function that tries the rule on a [`Subject`], the device on the bus. [`run`]
-//! runs checks one after the other. Each begins in the state Pre-operational, with its own log of the bus, and what a check has
-//! written is written back after it. A folder has the checks of one service.
+//! A [`Check`] is one rule of a clause, with a short function that tries the rule on a [`Subject`], the device on the
+//! bus. [`run`] runs checks one after the other. Each check begins in the state Pre-operational, with its own log of
+//! the bus. The values that a check has written are restored after it. Each folder has the checks of one service.
 
 mod dictionary;
 mod emcy;
@@ -27,46 +27,47 @@ pub use verdict::{Deviation, Outcome, Stop, Verdict};
 
 use subject::prelude;
 
-/// One rule that a device follows.
+/// A rule that a device has to follow.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
-    /// Its name for good: `SDO-07`.
+    /// The permanent name of the check: `SDO-07`.
     pub id: &'static str,
-    /// What a device that follows the rule does.
+    /// The behaviour of a device that follows the rule.
     pub title: &'static str,
-    /// Where the rule is written.
+    /// The clause of the rule.
     pub clause: &'static str,
-    /// What the check does to the device beyond what is written back after it.
+    /// The effect on the device that restoring the written values does not undo.
     pub effect: Effect,
-    /// Whether the clause demands or only recommends.
+    /// Whether the clause demands or recommends the rule.
     pub level: Level,
-    /// Tries it.
+    /// The function that tries the rule.
     pub run: fn(&mut Subject<'_>) -> Outcome,
 }
 
-/// What a check does to the device, beyond what is written back after it.
+/// The effect of a check on the device that restoring the written values does not undo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Effect {
-    /// Nothing.
+    /// No such effect.
     None,
-    /// Restarts the device or its communication: values that are not saved are lost, and written back after the run.
+    /// Restarts the device or its communication. Values that are not saved are lost, and are written back after the
+    /// run.
     Resets,
-    /// Writes the memory of the device, by 1010h, 1011h or LSS.
+    /// Writes the non-volatile memory of the device, by 1010h, 1011h or LSS.
     Stores,
 }
 
 /// How strict a clause is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
-    /// A device that does otherwise does not conform.
+    /// A device that breaks the rule does not conform.
     Demanded,
-    /// A device that does otherwise conforms.
+    /// A device that breaks the rule still conforms.
     Recommended,
 }
 
 impl Check {
-    /// A rule that is demanded, and that is tried without an effect.
+    /// A check of a demanded rule, without an effect on the device.
     const fn new(
         id: &'static str,
         title: &'static str,
@@ -76,35 +77,35 @@ impl Check {
         Check { id, title, clause, effect: Effect::None, level: Level::Demanded, run }
     }
 
-    /// The device is restarted.
+    /// The same check, with a restart of the device as its effect.
     const fn resets(self) -> Check {
         Check { effect: Effect::Resets, ..self }
     }
 
-    /// The memory of the device is written.
+    /// The same check, with writing the memory of the device as its effect.
     const fn stores(self) -> Check {
         Check { effect: Effect::Stores, ..self }
     }
 
-    /// The clause only recommends it.
+    /// The same check, for a rule that is only recommended.
     const fn recommended(self) -> Check {
         Check { level: Level::Recommended, ..self }
     }
 
-    /// The group of the check: what is before the number in its name.
+    /// The group of the check: the part of its name before the number.
     #[must_use]
     pub fn group(&self) -> &'static str {
         self.id.split('-').next().unwrap_or_default()
     }
 
-    /// Whether a person means this check: its name, the name of its group, or the beginning of either.
+    /// Whether a text names this check: by its name, by its group, or by the beginning of either.
     #[must_use]
     pub fn is_meant(&self, text: &str) -> bool {
         !text.is_empty() && self.id.to_ascii_uppercase().starts_with(&text.to_ascii_uppercase())
     }
 }
 
-/// What the checks of a group are about.
+/// The subject of the checks of a group.
 #[must_use]
 pub fn about(group: &str) -> &'static str {
     match group {
@@ -123,7 +124,7 @@ pub fn about(group: &str) -> &'static str {
     }
 }
 
-/// The checks of CiA 301 and 305, in the order in which they are run, and those of a profile.
+/// The checks of CiA 301 and 305, in the order in which they run, then the checks of a profile.
 #[must_use]
 pub fn all(profile: Option<Profile>) -> Vec<Check> {
     let groups: [&[&[Check]]; 11] = [

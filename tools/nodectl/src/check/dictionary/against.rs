@@ -68,10 +68,10 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("DIC-16", "1018h:1 can be read", "CiA 301, 7.5.2.19", identity),
 ];
 
-/// No value yet, or none that can be told in this state.
+/// Abort codes of an object that has no value yet, or none in the current state.
 const NOTHING_YET: [u32; 3] = [abort::NO_DATA, abort::STATE, abort::ACCESS];
 
-/// Goes through entries; the complaints about them are one deviation.
+/// Runs `complain` for each entry. All complaints together are one deviation.
 fn each(
     s: &mut Subject<'_>,
     entries: &[Entry],
@@ -90,7 +90,7 @@ fn each(
     ensure(wrong.is_empty(), expected, wrong.join("; "))
 }
 
-/// Whether an entry is of the communication profile, or of the rest.
+/// Whether an entry is in the same part of the dictionary as `first`: the communication profile or the rest.
 const fn is_of(first: u16, index: u16) -> bool {
     (first < 0x2000) == (index < 0x2000)
 }
@@ -109,18 +109,18 @@ fn sizes<const FIRST: u16>(s: &mut Subject<'_>) -> Outcome {
     })
 }
 
-/// A list of errors, a domain and a program may have no content.
+/// Whether an object may be empty: a list of errors, a domain, a program.
 fn may_be_empty(entry: &Entry) -> bool {
     matches!(entry.index, 0x1003 | 0x1F50..=0x1F5F)
         || entry.data_type == eds::DataType::DOMAIN
         || size(entry).is_none()
 }
 
-/// The bytes that a value of the data sheet has; `None` for what is not a number.
+/// The default of the data sheet as bytes; `None` where it is not a number.
 fn declared(s: &Subject<'_>, entry: &Entry) -> Option<Vec<u8>> {
     let value = match (entry.default.as_ref()?.evaluate(s.node()), entry.data_type.class()) {
         (Value::Integer(number), _) => value::Value::Integer(number),
-        #[allow(clippy::cast_possible_truncation)] // It was a REAL32 in the file.
+        #[allow(clippy::cast_possible_truncation)] // The number was a REAL32 in the file.
         (Value::Real(number), Class::Real(32)) => value::Value::Real32(number as f32),
         (Value::Real(number), _) => value::Value::Real64(number),
         (Value::Text(text), Class::Text) if !text.is_empty() => value::Value::Text(text),
@@ -169,7 +169,7 @@ fn write_only(s: &mut Subject<'_>) -> Outcome {
     })
 }
 
-/// The parameters with a limit that their type leaves room beyond, and the first value beyond.
+/// The parameters whose limit is narrower than their type, with the first value beyond the limit.
 fn beyond_limits(s: &Subject<'_>, is_upper: bool) -> Outcome<Vec<(Entry, Vec<u8>)>> {
     let entries = s.entries(crate::configuration::is_parameter)?;
     let beyond = |entry: Entry| {
@@ -209,7 +209,7 @@ fn lower(s: &mut Subject<'_>) -> Outcome {
     limits(s, false, &[abort::TOO_LOW, abort::VALUE, abort::PARAMETER, abort::STATE, abort::ACCESS])
 }
 
-/// What guards its value: a PDO that is in use, and a SYNC that runs.
+/// Whether the value may be locked: the object of a PDO in use, or of a running SYNC.
 const fn is_locked(index: u16) -> bool {
     matches!(index, 0x1400..=0x1BFF | 0x1019 | 0x1FA0..=0x1FCF)
 }
@@ -220,7 +220,7 @@ fn own_values(s: &mut Subject<'_>) -> Outcome {
         let Ok(value) = s.try_read(entry.index, entry.sub)? else { return Ok(None) };
         Ok(match s.try_write(entry.index, entry.sub, &value)? {
             Ok(()) | Err(Refusal(abort::STATE)) => None,
-            // What the manufacturer defines may be a command that wants a signature, or be locked.
+            // A manufacturer's object may be locked, or be a command that needs a signature.
             Err(Refusal(abort::NOT_STORED | abort::ACCESS)) if matches!(entry.index, 0x2000..=0x5FFF) => None,
             Err(refusal) => Some(format!("{value:02X?}: {refusal}")),
         })
@@ -238,7 +238,7 @@ fn constants(s: &mut Subject<'_>) -> Outcome {
     each(s, &entries, "the value of the data sheet", |s, entry| {
         let (expected, seen) = (declared(s, entry).unwrap_or_default(), s.try_read(entry.index, entry.sub)?);
         Ok(match seen {
-            // A text may be filled up with zeros.
+            // The device may pad a text with zeros.
             Ok(seen)
                 if seen == expected
                     || size(entry).is_none() && value::text(&seen) == value::text(&expected) =>
@@ -251,7 +251,7 @@ fn constants(s: &mut Subject<'_>) -> Outcome {
     })
 }
 
-/// The objects with sub-indices, with the highest that the data sheet has.
+/// The objects with sub-indices, and the highest sub-index in the data sheet.
 fn holders(s: &Subject<'_>) -> Outcome<Vec<(Entry, u8)>> {
     let sheet = s.sheet()?;
     let holders =
@@ -260,7 +260,7 @@ fn holders(s: &Subject<'_>) -> Outcome<Vec<(Entry, u8)>> {
     Ok(holders.filter_map(|object| Some((object.entries.get(&0)?.clone(), highest(object)?))).collect())
 }
 
-/// Of these, sub-index 0 is a number in use: of errors, of mapped objects, of scanner lines.
+/// Whether sub-index 0 of an object counts entries in use: errors, mapped objects, scanner lines.
 const fn counts_use(index: u16) -> bool {
     matches!(index, 0x1003 | 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1FA0..=0x1FFF)
 }
@@ -274,7 +274,7 @@ fn highest(s: &mut Subject<'_>) -> Outcome {
     let mut highest = holders.iter().map(|(_, highest)| *highest);
     each(s, &entries, "the highest sub-index", |s, entry| {
         let highest = highest.next().unwrap_or(0);
-        // A profile may let sub-index 0 count what is in use: the data sheet says so with another default.
+        // A profile may let sub-index 0 count the entries in use. Then the data sheet has another default.
         let counts = declared(s, entry).is_some_and(|default| default != [highest]);
         let seen = s.number(entry.index, 0)?;
         let is_good = seen == u32::from(highest) || counts && seen < u32::from(highest);

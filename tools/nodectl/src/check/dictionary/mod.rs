@@ -1,4 +1,4 @@
-//! The data sheet, and the dictionary of the device against it.
+//! Checks of the data sheet, and of the device's dictionary against it.
 
 mod against;
 mod sheet;

@@ -1,4 +1,4 @@
-//! The data sheet itself (CiA 306).
+//! Checks of the data sheet alone (CiA 306).
 
 use eds::{Access, DataType, Entry, ObjectType, Value};
 
@@ -45,7 +45,7 @@ fn mandatory(s: &mut Subject<'_>) -> Outcome {
     )
 }
 
-/// All entries for which it holds; the others are named.
+/// Passes when all entries fulfil a condition; the error names the others.
 fn each(entries: &[Entry], expected: &str, holds: impl Fn(&Entry) -> bool) -> Outcome {
     let wrong: Vec<String> = entries
         .iter()
@@ -69,7 +69,7 @@ fn counted(s: &mut Subject<'_>) -> Outcome {
 /// A number of the data sheet, for this node.
 fn number(s: &Subject<'_>, formula: Option<&eds::Formula>) -> Option<f64> {
     match formula?.evaluate(s.node()) {
-        #[allow(clippy::cast_precision_loss)] // Limits are compared, and that far from each other.
+        #[allow(clippy::cast_precision_loss)] // Exact enough to compare limits.
         Value::Integer(value) => Some(value as f64),
         Value::Real(value) => Some(value),
         Value::Text(_) => None,
@@ -94,7 +94,7 @@ fn limits(s: &mut Subject<'_>) -> Outcome {
     })
 }
 
-/// The bytes that an object of CiA 301 has; `None` where it may have any number.
+/// The size of an object of CiA 301 in bytes; `None` where any size is permitted.
 const fn standard_size(index: u16, sub: u8) -> Option<usize> {
     match (index, sub) {
         (0x1000 | 0x1002 | 0x1005..=0x1007 | 0x1012 | 0x1014, 0) => Some(4),

@@ -1,4 +1,4 @@
-//! 1003h, the list of errors.
+//! Checks of 1003h, the list of errors.
 
 use super::super::prelude::*;
 use super::provoke::{LIFE, heartbeat_is_back, lose_heartbeat, nobody};
@@ -13,7 +13,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("EMC-46", "1003h:1 cannot be written", "CiA 301, 7.5.2.4", read_only),
 ];
 
-/// What is not there: no data, or no such sub-index.
+/// Abort codes of an empty place in the list: no data, or no such sub-index.
 const EMPTY: [u32; 2] = [abort::NO_DATA, abort::NO_SUB_INDEX];
 
 fn counts(s: &mut Subject<'_>) -> Outcome {

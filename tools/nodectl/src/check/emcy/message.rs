@@ -1,4 +1,4 @@
-//! The messages.
+//! Checks of the EMCY messages.
 
 use super::super::prelude::*;
 use super::provoke::{LIFE, codes, heartbeat_is_back, lose_heartbeat, messages, nobody};

@@ -1,4 +1,4 @@
-//! Emergencies (CiA 301, 7.2.7 and 7.5.2.2 to 7.5.2.17).
+//! Checks of emergencies (CiA 301, 7.2.7 and 7.5.2.2 to 7.5.2.17).
 
 mod list;
 mod message;

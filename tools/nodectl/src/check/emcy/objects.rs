@@ -1,4 +1,4 @@
-//! 1001h, 1014h and 1015h.
+//! Checks of 1001h, 1014h and 1015h.
 
 use super::super::prelude::*;
 use super::provoke::{LIFE, codes, lose_heartbeat, nobody};

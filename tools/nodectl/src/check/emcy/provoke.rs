@@ -1,4 +1,4 @@
-//! Errors that a tool can cause: a heartbeat that is missing.
+//! Provokes an error from the bus: a missing heartbeat.
 
 use super::super::prelude::*;
 use super::super::subject::Mark;
@@ -7,8 +7,8 @@ use crate::Logged;
 /// The emergency error code of a missing heartbeat.
 pub(super) const LIFE: u16 = 0x8130;
 
-/// Lets the device miss the heartbeat of a node that is not there; from where the EMCY is in the log. Skipped where the
-/// device watches no heartbeat.
+/// Lets the device miss the heartbeat of a node that does not exist. Returns the place in the log from which on the
+/// EMCY may come. Skipped where the device watches no heartbeat.
 pub(super) fn lose_heartbeat(s: &mut Subject<'_>, node: u16) -> Outcome<Mark> {
     s.need_solitude()?;
     if s.try_read(0x1016, 1)?.is_err() {
@@ -21,7 +21,7 @@ pub(super) fn lose_heartbeat(s: &mut Subject<'_>, node: u16) -> Outcome<Mark> {
     Ok(mark)
 }
 
-/// The node is back, and the error gone.
+/// Sends the heartbeat again and ends its supervision, so that the error is gone.
 pub(super) fn heartbeat_is_back(s: &mut Subject<'_>, node: u16) -> Outcome<Mark> {
     let mark = s.mark();
     s.send(0x700 + node, &[0x05])?;
@@ -31,18 +31,18 @@ pub(super) fn heartbeat_is_back(s: &mut Subject<'_>, node: u16) -> Outcome<Mark>
     Ok(mark)
 }
 
-/// The EMCY messages since then.
+/// The EMCY messages since a place in the log.
 pub(super) fn messages(s: &Subject<'_>, mark: Mark) -> Vec<Logged> {
     s.heard(mark, 0x80 + s.id())
 }
 
-/// The error codes since then.
+/// The error codes since a place in the log.
 pub(super) fn codes(s: &Subject<'_>, mark: Mark) -> Vec<u16> {
     let code = |heard: &Logged| Some(u16::from_le_bytes(*heard.frame.data().first_chunk()?));
     messages(s, mark).iter().filter_map(code).collect()
 }
 
-/// A node-ID that nobody has.
+/// A node-ID that no node has.
 pub(super) fn nobody(s: &Subject<'_>) -> u16 {
     if s.id() == 0x6F { 0x6E } else { 0x6F }
 }

@@ -1,4 +1,4 @@
-//! The heartbeats that the device watches (1016h), and what follows when one is missing (1029h).
+//! Checks of the heartbeat consumer (1016h), and of the behaviour after a missing heartbeat (1029h).
 
 use super::super::prelude::*;
 
@@ -31,12 +31,12 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("ERR-30", "1016h has entries of four bytes", "CiA 301, 7.5.2.19", entries),
 ];
 
-/// A node-ID that nobody has, as far as was heard.
+/// A node-ID that no node has, as far as was heard.
 fn other(s: &Subject<'_>) -> u16 {
     if s.id() == 0x70 { 0x71 } else { 0x70 }
 }
 
-/// Watches a node for 200 ms.
+/// Lets the device watch a node with a heartbeat time of 200 ms.
 fn watch(s: &mut Subject<'_>) -> Outcome {
     s.need_solitude()?;
     s.need(0x1016, 1)?;
@@ -56,7 +56,7 @@ fn beat(s: &mut Subject<'_>, times: usize) -> Outcome {
     Ok(())
 }
 
-/// The emergency error codes that have come.
+/// The emergency error codes since a place in the log.
 fn codes(s: &Subject<'_>, mark: super::super::subject::Mark) -> Vec<u16> {
     let heard = s.heard(mark, 0x80 + s.id());
     heard.iter().filter_map(|heard| Some(u16::from_le_bytes(*heard.frame.data().first_chunk()?))).collect()

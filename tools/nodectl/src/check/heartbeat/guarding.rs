@@ -1,4 +1,4 @@
-//! Node guarding, which is optional.
+//! Checks of node guarding, which is optional.
 
 use super::super::prelude::*;
 
@@ -67,7 +67,7 @@ fn together(s: &mut Subject<'_>) -> Outcome {
     ensure(time == factor, "both, or neither", if time { "only 100Ch" } else { "only 100Dh" })
 }
 
-/// A device with guarding and without a heartbeat.
+/// Switches the heartbeat off, if the device has one. Skipped where the device has no node guarding.
 fn need_guarding(s: &mut Subject<'_>) -> Outcome {
     s.need(0x100C, 0)?;
     if s.try_read(0x1017, 0)?.is_ok() {

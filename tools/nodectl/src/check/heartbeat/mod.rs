@@ -1,4 +1,4 @@
-//! Error control: heartbeat and node guarding (CiA 301, 7.2.8.2.2).
+//! Checks of error control: heartbeat and node guarding (CiA 301, 7.2.8.2.2).
 
 mod consumer;
 mod guarding;

@@ -1,4 +1,4 @@
-//! The heartbeat that the device sends.
+//! Checks of the heartbeat producer.
 
 use super::super::prelude::*;
 use crate::Logged;
@@ -33,7 +33,7 @@ fn takes_zero(s: &mut Subject<'_>) -> Outcome {
     s.holds(0x1017, 0, 0)
 }
 
-/// The heartbeats of a time.
+/// The heartbeats within a time.
 fn beats(s: &mut Subject<'_>, ms: u64) -> Outcome<Vec<Logged>> {
     let (mark, id) = (s.mark(), s.error_control());
     s.pass(ms)?;
@@ -83,7 +83,7 @@ fn even(s: &mut Subject<'_>) -> Outcome {
     s.beat(100)?;
     let beats = beats(s, 2000)?;
     let gaps: Vec<u64> = beats.windows(2).map(|pair| pair[1].at.0.saturating_sub(pair[0].at.0)).collect();
-    // The first gap may be the rest of the former period.
+    // The first gap may still have the former period.
     let worst = gaps.iter().skip(1).max_by_key(|gap| gap.abs_diff(100_000)).copied();
     let worst = worst.ok_or_else(|| fail("heartbeats each 100 ms", format!("{} in 2 s", beats.len())))?;
     ensure(worst.abs_diff(100_000) <= 10_000, "90 ms to 110 ms between heartbeats", format!("{worst} us"))

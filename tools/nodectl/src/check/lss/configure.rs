@@ -1,4 +1,4 @@
-//! Configuring node-ID and bit rate, as far as nothing of it stays.
+//! Checks of configuring node-ID and bit rate, without storing them.
 
 use canopen::lss::{Request, Response};
 
@@ -22,7 +22,7 @@ pub(super) const CHECKS: &[Check] = &[
 fn node_id<const ID: u8, const CODE: u8>(s: &mut Subject<'_>) -> Outcome {
     selected(s, |s| {
         let seen = respond(s, Request::NodeId(ID));
-        // What was pending before is pending again.
+        // Sets the pending node-ID back to the one of the device.
         let own = s.node().get();
         respond(s, Request::NodeId(own))?;
         let seen = seen?;

@@ -1,4 +1,5 @@
-//! Layer setting services (CiA 305). The device is selected by its identity: others on the bus do not mind.
+//! Checks of layer setting services (CiA 305). The device is selected by its identity, so that other slaves are not
+//! affected.
 
 mod configure;
 mod select;
@@ -13,7 +14,7 @@ pub(super) const CHECKS: &[&[Check]] = &[select::CHECKS, configure::CHECKS];
 const REQUEST: u16 = 0x7E5;
 const RESPONSE: u16 = 0x7E4;
 
-/// How long a slave may take; CiA 305 has no shorter time for any device.
+/// The time-out for a slave's response. CiA 305 sets no shorter time.
 const TIME: u64 = 500;
 
 /// The identity of the device by SDO.
@@ -29,20 +30,20 @@ fn identity(s: &mut Subject<'_>) -> Outcome<Identity> {
     })
 }
 
-/// Sends a request; the eight bytes of the response, if one came.
+/// Sends a request. Returns the eight bytes of the response, if one has come.
 fn ask(s: &mut Subject<'_>, request: [u8; 8]) -> Outcome<Option<Vec<u8>>> {
     let mark = s.mark();
     s.send(REQUEST, &request)?;
     Ok(s.next(mark, RESPONSE, TIME)?.map(|heard| heard.frame.data().to_vec()))
 }
 
-/// All slaves back to the state waiting.
+/// Switches all slaves back to the state Waiting.
 fn release(s: &mut Subject<'_>) -> Outcome {
     s.send(REQUEST, &Request::SwitchGlobal { configuration: false }.encode())?;
     s.pass(20)
 }
 
-/// Selects a slave by an identity; its response, if one came.
+/// Selects a slave by an identity. Returns the response, if one has come.
 fn select(s: &mut Subject<'_>, identity: Identity) -> Outcome<Option<Vec<u8>>> {
     release(s)?;
     let mark = s.mark();
@@ -52,7 +53,7 @@ fn select(s: &mut Subject<'_>, identity: Identity) -> Outcome<Option<Vec<u8>>> {
     Ok(s.next(mark, RESPONSE, TIME)?.map(|heard| heard.frame.data().to_vec()))
 }
 
-/// Selects the device, does something, and lets it go. Skipped where the device is no LSS slave.
+/// Selects the device, runs a function, and releases the device. Skipped where the device is no LSS slave.
 fn selected(s: &mut Subject<'_>, does: impl FnOnce(&mut Subject<'_>) -> Outcome) -> Outcome {
     let identity = identity(s)?;
     let is_declared = s.sheet().is_ok_and(|sheet| sheet.device.lss);
@@ -68,14 +69,14 @@ fn selected(s: &mut Subject<'_>, does: impl FnOnce(&mut Subject<'_>) -> Outcome)
     done
 }
 
-/// The response that has to come.
+/// Sends a request and demands a response.
 fn respond(s: &mut Subject<'_>, request: Request) -> Outcome<Response> {
     let answer = ask(s, request.encode())?;
     let parsed = answer.as_ref().and_then(|answer| Response::parse(answer.as_slice().try_into().ok()?));
     parsed.ok_or_else(|| fail(format!("a response of eight bytes to {request:?}"), format!("{answer:02X?}")))
 }
 
-/// No response may come.
+/// Sends a request and demands that no response comes.
 fn stays_silent(s: &mut Subject<'_>, request: &[u8]) -> Result<(), Stop> {
     let mark = s.mark();
     s.send(REQUEST, request)?;

@@ -1,4 +1,4 @@
-//! Switching the state, asking and finding.
+//! Checks of the services that switch the state, inquire and identify.
 
 use canopen::lss::{Bound, Identity, Part, Request, Response};
 

@@ -1,4 +1,4 @@
-//! Whom a command is for, and what is no command.
+//! Checks of the addressee of a command, and of frames that are no command.
 
 use super::super::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Restart and boot-up message.
+//! Checks of restart and boot-up message.
 
 use super::super::prelude::*;
 use crate::Logged;
@@ -88,7 +88,7 @@ fn enter(s: &mut Subject<'_>, state: u8) -> Outcome {
     }
 }
 
-/// All zeros that came as error control: heartbeats of an initialising device are boot-up messages.
+/// The number of boot-up messages among error control frames. A device that initialises sends the state 0.
 fn boot_ups(heard: &[Logged]) -> usize {
     heard.iter().filter(|heard| heard.frame.data().first() == Some(&0)).count()
 }
@@ -118,7 +118,7 @@ fn first_frame(s: &mut Subject<'_>) -> Outcome {
     let (mark, id) = (s.mark(), s.error_control());
     s.reset(Command::ResetNode)?;
     let own = s.id();
-    // Frames that were on their way when the command came are before it.
+    // Frames that were on their way when the command came do not count.
     let of_device =
         s.since(mark).skip_while(|logged| logged.frame.id() != id && logged.frame.id() & 0x7F != own);
     let first = of_device.map(|logged| logged.frame.id()).next();

@@ -1,4 +1,4 @@
-//! Network management and boot-up (CiA 301, 7.3.2).
+//! Checks of network management and boot-up (CiA 301, 7.3.2).
 
 mod addressing;
 mod boot;

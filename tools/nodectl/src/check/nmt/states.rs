@@ -1,4 +1,4 @@
-//! The states and what the device does in them.
+//! Checks of the NMT states and of the services in each.
 
 use super::super::prelude::*;
 

@@ -1,4 +1,4 @@
-//! What a PDO carries, against the same by SDO.
+//! Checks of the values in a PDO, compared with the values by SDO.
 
 use eds::Entry;
 
@@ -11,7 +11,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("PDO-82", "Two objects stand in a TPDO in their order", "CiA 301, 7.5.2.38", order),
 ];
 
-/// Maps objects that do not change by themselves, and reads the frame.
+/// Maps objects whose values do not change by themselves, and receives the frame.
 fn frame_of(s: &mut Subject<'_>, entries: &[Entry]) -> Outcome<Vec<u8>> {
     let mut pdo = s.tpdo(254, 50)?;
     s.empty(pdo)?;
@@ -27,7 +27,7 @@ fn frame_of(s: &mut Subject<'_>, entries: &[Entry]) -> Outcome<Vec<u8>> {
     Ok(frame.frame.data().to_vec())
 }
 
-/// Up to so many mappable objects that keep their value for a while.
+/// Up to `most` mappable objects that keep their value for a while.
 fn steady(s: &mut Subject<'_>, most: usize) -> Outcome<Vec<Entry>> {
     let candidates = s.entries(|entry| {
         entry.is_tpdo_mappable() && entry.index >= 0x2000 && matches!(size(entry), Some(1..=4))

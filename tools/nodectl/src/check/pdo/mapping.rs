@@ -1,4 +1,4 @@
-//! The mapping and its procedure (CiA 301, 7.5.2.36 and 7.5.2.38).
+//! Checks of the mapping and its procedure (CiA 301, 7.5.2.36 and 7.5.2.38).
 
 use eds::Entry;
 
@@ -74,7 +74,7 @@ fn default_mapping<const FIRST: u16>(s: &mut Subject<'_>) -> Outcome {
             let is_allowed = if FIRST == TPDO { entry.is_tpdo_mappable() } else { entry.is_rpdo_mappable() };
             ensure(is_allowed, format!("{place} can be mapped"), "the data sheet says no")?;
             let expected = mapped(entry) & 0xFF;
-            // A BOOLEAN has one bit, or eight in devices that map whole bytes.
+            // A BOOLEAN takes one bit, or eight bits in devices that map whole bytes.
             ensure(
                 expected == u32::from(bits) || bits == 1,
                 format!("{expected} bits of {place}"),
@@ -86,7 +86,7 @@ fn default_mapping<const FIRST: u16>(s: &mut Subject<'_>) -> Outcome {
     if pdos.is_empty() { Err(skip("the device has no such PDO")) } else { Ok(()) }
 }
 
-/// A PDO that is off and empty.
+/// A PDO that is off and has no mapped objects.
 fn empty(s: &mut Subject<'_>, first: u16) -> Outcome<Pdo> {
     let pdo = s.pdo(first)?;
     s.empty(pdo)?;
@@ -103,7 +103,7 @@ fn procedure<const FIRST: u16>(s: &mut Subject<'_>) -> Outcome {
     s.holds(pdo.mapping(), 0, 1)
 }
 
-/// How a device refuses what is locked: CiA 301 names no code.
+/// Abort codes for a locked object: CiA 301 names no code.
 const LOCKED: [u32; 7] = [
     abort::VALUE,
     abort::STATE,
@@ -122,7 +122,7 @@ fn mapped_one(s: &mut Subject<'_>) -> Outcome<(Pdo, Entry)> {
     Ok((pdo, entry))
 }
 
-/// Another object than this one, or the same where there is no other.
+/// Another object than this one, or the same object where there is no other.
 fn another(s: &Subject<'_>, entry: &Entry) -> u32 {
     let is_other = |other: &Entry| {
         other.is_tpdo_mappable()
@@ -180,7 +180,7 @@ fn maps<const FIRST: u16>(s: &mut Subject<'_>) -> Outcome {
     s.set(pdo.mapping(), 0, 1)
 }
 
-/// Maps what has to be refused: with the entry, or at the latest with the number of entries.
+/// Maps an object that the device must refuse, either at the entry or at the number of entries.
 fn refuses_mapping(s: &mut Subject<'_>, pdo: Pdo, value: u32, codes: &[u32]) -> Outcome {
     match s.change(pdo.mapping(), 1, &value.to_le_bytes())? {
         Ok(()) => s.refuses(pdo.mapping(), 0, 1, codes),
@@ -208,7 +208,7 @@ fn refuses_unmappable<const FIRST: u16>(s: &mut Subject<'_>) -> Outcome {
 
 fn dummy(s: &mut Subject<'_>) -> Outcome {
     let pdo = empty(s, RPDO)?;
-    // UNSIGNED8 as a place holder.
+    // UNSIGNED8 fills the place of a byte.
     match s.change(pdo.mapping(), 1, &0x0005_0008_u32.to_le_bytes())? {
         Ok(()) => s.set(pdo.mapping(), 0, 1),
         Err(refusal) => Err(skip(format!("the device has no dummy objects: {refusal}"))),

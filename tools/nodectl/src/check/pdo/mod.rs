@@ -1,4 +1,4 @@
-//! Process data objects (CiA 301, 7.2.2 and 7.5.2.35 to 7.5.2.38).
+//! Checks of process data objects (CiA 301, 7.2.2 and 7.5.2.35 to 7.5.2.38).
 
 mod content;
 mod mapping;

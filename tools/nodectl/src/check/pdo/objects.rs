@@ -1,4 +1,4 @@
-//! The communication parameters.
+//! Checks of the communication parameters of PDOs.
 
 use super::super::prelude::*;
 
@@ -132,7 +132,7 @@ fn restricted<const FIRST: u16>(s: &mut Subject<'_>) -> Outcome {
     Ok(())
 }
 
-/// How a device refuses what is locked: CiA 301 names no code.
+/// Abort codes for a locked object: CiA 301 names no code.
 const LOCKED: [u32; 6] =
     [abort::VALUE, abort::STATE, abort::LOCAL, abort::ACCESS, abort::PARAMETER, abort::GENERAL];
 

@@ -1,4 +1,4 @@
-//! What the device does with an RPDO that arrives.
+//! Checks of the reception of RPDOs.
 
 use eds::{Class, Entry};
 
@@ -42,7 +42,7 @@ pub(super) fn output(s: &mut Subject<'_>) -> Outcome<Entry> {
             && matches!(size(entry), Some(1..=4))
     })?;
     for entry in entries {
-        // What moves, or acts at once, is no place for a value of a test.
+        // An object that changes by itself cannot hold a test value.
         let first = s.try_read(entry.index, entry.sub)?;
         s.pass(20)?;
         if first.is_ok() && first == s.try_read(entry.index, entry.sub)? {
@@ -52,7 +52,7 @@ pub(super) fn output(s: &mut Subject<'_>) -> Outcome<Entry> {
     Err(skip("the data sheet has no output that can be read back"))
 }
 
-/// Another value than the output has: its lowest bit is different.
+/// A value other than the value of the output: the lowest bit is different.
 pub(super) fn other_value(s: &mut Subject<'_>, entry: &Entry) -> Outcome<Vec<u8>> {
     let mut value = s.read(entry.index, entry.sub)?;
     if let Some(byte) = value.first_mut() {
@@ -61,7 +61,8 @@ pub(super) fn other_value(s: &mut Subject<'_>, entry: &Entry) -> Outcome<Vec<u8>
     Ok(value)
 }
 
-/// An RPDO of this type with the output, on, and the device operational. The output gets its value back after the check.
+/// Switches an RPDO of this type with the output on, and the device to Operational. After the check the output gets its
+/// value back.
 pub(super) fn listening(s: &mut Subject<'_>, entry: &Entry, transmission: u32) -> Outcome<Pdo> {
     let before = s.read(entry.index, entry.sub)?;
     let pdo = s.pdo(RPDO)?;
@@ -75,7 +76,7 @@ pub(super) fn listening(s: &mut Subject<'_>, entry: &Entry, transmission: u32) -
     Ok(pdo)
 }
 
-/// Sends an RPDO; whether its first bytes are in the object then.
+/// Sends an RPDO. Returns whether the object has the expected value then.
 fn arrives(s: &mut Subject<'_>, entry: &Entry, id: u16, frame: &[u8], value: &[u8]) -> Outcome<bool> {
     s.send(id, frame)?;
     s.pass(50)?;

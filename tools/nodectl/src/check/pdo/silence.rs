@@ -1,4 +1,4 @@
-//! No PDO in Stopped and in Pre-operational (CiA 301, table 38).
+//! Checks that no PDO is sent in Stopped and in Pre-operational (CiA 301, table 38).
 
 use super::super::prelude::*;
 
@@ -54,7 +54,7 @@ fn state(is_stopped: bool) -> State {
     if is_stopped { State::Stopped } else { State::PreOperational }
 }
 
-/// Brings a TPDO that is configured through Operational into the state, and counts its frames there.
+/// Configures a TPDO, brings the device through Operational into a state, and counts the frames of the TPDO there.
 fn listen(
     s: &mut Subject<'_>,
     pdo: super::super::subject::Pdo,

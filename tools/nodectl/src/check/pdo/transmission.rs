@@ -1,4 +1,4 @@
-//! When a TPDO is sent, in the state Operational.
+//! Checks of the transmission of TPDOs in the state Operational.
 
 use super::super::prelude::*;
 
@@ -47,12 +47,12 @@ fn remote(s: &mut Subject<'_>) -> Outcome {
 fn timer<const TYPE: u32>(s: &mut Subject<'_>) -> Outcome {
     let pdo = s.tpdo(TYPE, 100)?;
     let count = s.count(pdo, State::Operational, 1000)?;
-    // Values that change send it too, where the type is 255.
+    // With type 255, a changed value triggers the TPDO, too.
     let enough = count >= 9 && (TYPE == 255 || count <= 12);
     ensure(enough, "a frame each 100 ms", format!("{count} in 1 s"))
 }
 
-/// The frames of a TPDO with each of so many SYNC.
+/// The number of frames of a TPDO after each of `syncs` SYNC messages.
 fn with_syncs(s: &mut Subject<'_>, pdo: super::super::subject::Pdo, syncs: usize) -> Outcome<Vec<usize>> {
     let mut counts = Vec::new();
     for _ in 0..syncs {

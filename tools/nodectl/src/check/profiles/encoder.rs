@@ -1,4 +1,4 @@
-//! CiA 406: what both classes have.
+//! Checks of CiA 406: the objects of both classes.
 
 use super::super::prelude::*;
 use super::{has, names, one_is_sent};
@@ -30,7 +30,7 @@ fn position(s: &mut Subject<'_>) -> Outcome {
 }
 
 fn status(s: &mut Subject<'_>) -> Outcome {
-    // Code sequence, commissioning diagnosis, scaling.
+    // The bits of code sequence and scaling.
     let (parameters, status) = (s.number(0x6000, 0)? & 0b101, s.number(0x6500, 0)? & 0b101);
     ensure(parameters == status, format!("bits 0 and 2 as in 6000h: {parameters:b}"), format!("{status:b}"))
 }

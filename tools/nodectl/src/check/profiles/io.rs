@@ -1,4 +1,4 @@
-//! CiA 401: inputs and outputs as 1000h announces them.
+//! Checks of CiA 401: the inputs and outputs that 1000h announces.
 
 use super::super::prelude::*;
 use super::names;
@@ -17,7 +17,7 @@ fn tells(s: &mut Subject<'_>) -> Outcome {
     ensure(functions & 0x1FF != 0, "a bit of 16 to 24 in 1000h", format!("{functions:04X}h in the high word"))
 }
 
-/// Where a bit of 1000h is set, the object has at least one channel.
+/// Where the bit of 1000h is set, the object must have at least one channel.
 fn block<const BIT: u32, const INDEX: u16>(s: &mut Subject<'_>) -> Outcome {
     if s.number(0x1000, 0)? & 1 << BIT == 0 {
         return Err(skip(format!("bit {BIT} of 1000h is 0")));

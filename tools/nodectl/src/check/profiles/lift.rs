@@ -1,4 +1,4 @@
-//! CiA 417: what every device of a lift has.
+//! Checks of CiA 417: the objects of every lift device.
 
 use super::super::prelude::*;
 use super::{has, names};

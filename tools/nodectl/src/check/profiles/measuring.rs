@@ -1,4 +1,4 @@
-//! CiA 404: analogue input function blocks.
+//! Checks of CiA 404: analogue input function blocks.
 
 use super::super::prelude::*;
 use super::{has, names, one_is_sent};

@@ -1,7 +1,7 @@
-//! What device profiles make mandatory.
+//! Checks of the mandatory objects of device profiles.
 //!
-//! The lists are those of the public texts: CiA's product pages, manuals of certified devices, and the published tables of objects.
-//! Where a profile has classes, the smallest is taken.
+//! The lists of objects come from public texts: CiA's product pages, manuals of certified devices, and the published
+//! tables of objects. Where a profile has classes, the smallest class counts.
 
 mod encoder;
 mod io;
@@ -31,7 +31,7 @@ pub enum Profile {
 }
 
 impl Profile {
-    /// Its checks.
+    /// The checks of the profile.
     #[must_use]
     pub(super) const fn checks(self) -> &'static [&'static [Check]] {
         match self {
@@ -42,23 +42,23 @@ impl Profile {
         }
     }
 
-    /// All of them.
+    /// All profiles.
     pub const ALL: [Profile; 4] = [Profile::Io, Profile::Measuring, Profile::Encoder, Profile::Lift];
 }
 
-/// 1000h names the profile.
+/// Checks that 1000h names the profile.
 fn names<const NUMBER: u32>(s: &mut Subject<'_>) -> Outcome {
     let profile = s.number(0x1000, 0)? & 0xFFFF;
     ensure(profile == NUMBER, format!("{NUMBER} in the low word of 1000h"), format!("{profile}"))
 }
 
-/// The entry can be read, with so many bytes.
+/// Checks that the entry can be read and has this number of bytes.
 fn has<const INDEX: u16, const SUB: u8, const BYTES: usize>(s: &mut Subject<'_>) -> Outcome {
     let bytes = s.read(INDEX, SUB)?;
     ensure(bytes.len() == BYTES, format!("{BYTES} bytes in {INDEX:04X}h:{SUB}"), format!("{bytes:02X?}"))
 }
 
-/// The first of these objects that the device has.
+/// The first of these objects that exists in the device.
 fn first_of(s: &mut Subject<'_>, places: &[(u16, u8)]) -> Outcome<Option<(u16, u8)>> {
     for place in places {
         if s.try_read(place.0, place.1)?.is_ok() {
@@ -68,7 +68,7 @@ fn first_of(s: &mut Subject<'_>, places: &[(u16, u8)]) -> Outcome<Option<(u16, u
     Ok(None)
 }
 
-/// Of these objects the device has one, and the data sheet says that a TPDO can carry it.
+/// Checks that the device has one of these objects, and that a TPDO can carry it by the data sheet.
 fn one_is_sent(s: &mut Subject<'_>, places: &[(u16, u8)], name: &str) -> Outcome {
     let there = first_of(s, places)?;
     ensure(there.is_some(), format!("{name} in one of {places:04X?}"), "in none")?;

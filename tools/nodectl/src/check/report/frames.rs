@@ -2,8 +2,8 @@
 
 use crate::Logged;
 
-/// `  0.012345 -> 605 [8] 40 00 10 00 00 00 00 00`: the time from the first frame on, the direction as this side sees it, CAN-ID,
-/// length and data.
+/// A frame as `  0.012345 -> 605 [8] 40 00 10 00 00 00 00 00`: the time since the first frame, the direction as this
+/// side sees it, CAN-ID, length and data.
 pub(super) fn lines(frames: &[Logged]) -> Vec<String> {
     let start = frames.first().map_or(0, |first| first.here.0);
     frames.iter().map(|logged| line(logged, start)).collect()

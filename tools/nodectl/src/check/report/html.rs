@@ -1,4 +1,4 @@
-//! As one page that needs nothing else.
+//! Report as a single HTML page.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ const STYLE: &str = "body{font:15px sans-serif;max-width:70em;margin:2em auto;pa
 100%}td,th{text-align:left;vertical-align:top;padding:.3em .6em;border-bottom:1px solid #ddd}.passed{color:#197a34}.failed{color:#b3201f;\
 font-weight:bold}.recommended{color:#8a5a00}.skipped{color:#777}pre{background:#f4f4f4;padding:.6em;overflow:auto;max-height:24em}";
 
-/// The whole run: the numbers, what did not pass with its frames, and all checks.
+/// The whole run: the numbers, the checks that did not pass with their frames, and all checks.
 #[must_use]
 pub fn html(run: &Run) -> String {
     let node = run.node.get();
@@ -71,7 +71,8 @@ fn row(result: &Result) -> String {
     )
 }
 
-/// Text that stands in HTML and XML. What a device says must not become part of the page, and XML has no control characters.
+/// Escapes a text for HTML and XML: texts of a device must not become part of the page, and XML has no control
+/// characters.
 pub(super) fn escaped(text: &str) -> String {
     let text = visible_lines(text);
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")

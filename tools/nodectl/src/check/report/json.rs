@@ -1,4 +1,4 @@
-//! As JSON.
+//! Report as JSON.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! As JUnit XML, for continuous integration.
+//! Report as JUnit XML, for continuous integration.
 
 use std::fmt::Write;
 
@@ -6,7 +6,8 @@ use super::frames;
 use super::html::escaped;
 use crate::check::{Result, Run, Verdict};
 
-/// One test suite, a test case for each check. What is only recommended is no failure, but is told in the output of its case.
+/// A test suite with a test case for each check. A deviation from a recommended rule is no failure; the output of the
+/// test case tells it.
 #[must_use]
 pub fn junit(run: &Run) -> String {
     let seconds = |time: u64| format!("{}.{:03}", time / 1_000_000, time / 1000 % 1000);

@@ -1,4 +1,4 @@
-//! The results of a run, for people and for machines.
+//! Reports of a run, for people and for machines.
 
 mod frames;
 mod html;

@@ -1,4 +1,4 @@
-//! Many frames in a row.
+//! Checks with many frames in a row.
 
 use super::super::prelude::*;
 
