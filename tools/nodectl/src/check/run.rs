@@ -1,4 +1,4 @@
-//! Runs checks one after the other, and puts the device back.
+//! Runs checks one after the other, and restores the device.
 
 use canopen::nmt::{Command, State};
 use canopen::{Duration, NodeId};
@@ -12,13 +12,14 @@ use crate::configuration::{Configuration, is_parameter, plan};
 use crate::object::Place;
 use crate::value::Value;
 
-/// Frames that are kept of a check that did not pass: the last ones, where the deviation is.
+/// The number of frames that are kept of a check that did not pass. The last frames are kept, because they show the
+/// deviation.
 const KEPT: usize = 250;
 
-/// How long the bus is listened to before the first check: longer than a usual heartbeat.
+/// How long to listen to the bus before the first check: longer than a usual heartbeat period.
 const LOOK: u64 = 1200;
 
-/// Which checks, and what they may do.
+/// The checks to run, and the effects that they may have.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The checks in their order.
@@ -32,9 +33,9 @@ pub struct Options {
 pub struct Result {
     /// The check.
     pub check: Check,
-    /// What came of it.
+    /// The verdict.
     pub verdict: Verdict,
-    /// How long it took, by the clock of the bus.
+    /// The duration of the check, by the clock of the bus.
     pub time: Duration,
     /// The frames of a check that failed.
     pub frames: Vec<Logged>,
@@ -45,21 +46,21 @@ pub struct Result {
 pub struct Run {
     /// The device.
     pub node: NodeId,
-    /// Of all checks, in their order.
+    /// The results of all checks, in their order.
     pub results: Vec<Result>,
-    /// What the device did not take back after the run.
+    /// The values that the device refused to take back after the run.
     pub left_behind: Vec<String>,
 }
 
 impl Run {
-    /// How many checks have this verdict, by its word.
+    /// The number of checks with this verdict, by its word.
     #[must_use]
     pub fn count(&self, word: &str) -> usize {
         self.results.iter().filter(|result| result.verdict.word() == word).count()
     }
 }
 
-/// Runs the checks. `progress` is told each result.
+/// Runs the checks. `progress` is called with each result.
 ///
 /// # Errors
 /// The device does not answer at all, or the bus is lost.
@@ -88,7 +89,7 @@ fn one(subject: &mut Subject<'_>, check: Check) -> std::result::Result<Result, B
     subject.network.begin_log();
     let tried = subject.tidy().and_then(|()| (check.run)(subject));
     let tidied = subject.tidy().and_then(|()| subject.put_back());
-    // A check that was skipped has to put back as well.
+    // A skipped check has to restore its values, too.
     let outcome = match (tried, tidied) {
         (Ok(()) | Err(Stop::Skipped(_)), Err(stop)) => Err(stop),
         (tried, _) => tried,
@@ -111,15 +112,15 @@ fn verdict(outcome: Outcome, level: Level) -> std::result::Result<Verdict, BusEr
     })
 }
 
-/// What is put back after a run.
+/// The state of the device before the run, which is restored after it.
 struct Before {
-    /// `None` where nothing told the state.
+    /// `None` where no heartbeat has told the state.
     state: Option<State>,
     configuration: Configuration,
 }
 
 impl Subject<'_> {
-    /// Looks at the device before anything is changed.
+    /// Reads the state and the configuration of the device before any change.
     fn begin(&mut self) -> Outcome<Before> {
         self.network.begin_log();
         self.look_round(LOOK)?;
@@ -129,7 +130,8 @@ impl Subject<'_> {
         Ok(Before { state, configuration: self.configuration()? })
     }
 
-    /// The state that a heartbeat tells. A device without one gets one for a moment.
+    /// The NMT state that a heartbeat tells. For a device without a heartbeat, the heartbeat is switched on for a
+    /// moment.
     fn present_state(&mut self) -> Outcome<Option<State>> {
         let told = |subject: &Subject<'_>| {
             subject.network.log().iter().rev().find_map(|logged| {
@@ -148,12 +150,12 @@ impl Subject<'_> {
         Ok(state.filter(|state| *state != State::Initialising))
     }
 
-    /// Where every check begins.
+    /// Brings the device into the state in which every check begins.
     fn tidy(&mut self) -> Outcome {
         self.network.forget();
         self.enter(State::PreOperational)?;
         if !self.is_served()? {
-            // One way out of Stopped may be broken; the other leads through Operational.
+            // If the device cannot leave Stopped by this command, try the way through Operational.
             self.enter(State::Operational)?;
             self.enter(State::PreOperational)?;
         }
@@ -171,7 +173,8 @@ impl Subject<'_> {
         Ok(values)
     }
 
-    /// Puts back what a restart has lost, and the state. What the device does not take.
+    /// Restores the values that a restart has lost, and the state. Returns the values that the device does not take
+    /// back.
     fn end(&mut self, before: &Before) -> Outcome<Vec<String>> {
         self.tidy()?;
         let left = self.apply(&before.configuration)?;
@@ -182,7 +185,7 @@ impl Subject<'_> {
         Ok(left)
     }
 
-    /// Writes what differs from a configuration; what the device does not take.
+    /// Writes the values that differ from a configuration. Returns the values that the device does not take.
     fn apply(&mut self, wanted: &Configuration) -> Outcome<Vec<String>> {
         let mut left = Vec::new();
         let Ok(sheet) = self.sheet() else { return Ok(left) };
@@ -200,7 +203,7 @@ impl Subject<'_> {
         Ok(left)
     }
 
-    /// Does something while the device has the values that it was delivered with. What was saved before is saved again.
+    /// Runs a function while the device has its default values. Restores and saves the values that were saved before.
     pub(super) fn with_defaults(&mut self, does: impl FnOnce(&mut Self) -> Outcome) -> Outcome {
         self.sheet()?;
         self.need(0x1010, 1)?;
@@ -211,7 +214,8 @@ impl Subject<'_> {
         self.reset(Command::ResetNode)?;
         let kept = self.written.len();
         let done = does(self);
-        // What was written goes with the values that are saved again.
+        // The values that the function has written need no restoring of their own: all saved values are written back
+        // below.
         self.written.truncate(kept);
         self.tidy()?;
         let has_changed = !saved.differences(&self.configuration()?).is_empty();

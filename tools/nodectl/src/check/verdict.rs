@@ -1,28 +1,28 @@
-//! What comes of a check.
+//! Outcomes and verdicts of checks.
 
 use crate::bus::BusError;
 
-/// What a check found against its rule.
+/// A deviation of the device from a rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Deviation {
-    /// What the rule expects.
+    /// The behaviour that the rule expects.
     pub expected: String,
-    /// What the device did.
+    /// The behaviour of the device.
     pub seen: String,
 }
 
-/// Why a check ends before its end.
+/// Why a check ends early.
 #[derive(Debug)]
 pub enum Stop {
     /// The device breaks the rule.
     Failed(Deviation),
-    /// The rule cannot be tried on this device: the reason.
+    /// The rule cannot be tried on this device, with the reason.
     Skipped(String),
     /// The bus is lost.
     Bus(BusError),
 }
 
-/// `Ok` where the device follows the rule.
+/// The outcome of a check: `Ok` where the device follows the rule.
 pub type Outcome<T = ()> = std::result::Result<T, Stop>;
 
 /// The verdict on one rule.
@@ -30,16 +30,16 @@ pub type Outcome<T = ()> = std::result::Result<T, Stop>;
 pub enum Verdict {
     /// The device follows the rule.
     Passed,
-    /// The device breaks a rule that is demanded.
+    /// The device breaks a demanded rule.
     Failed(Deviation),
-    /// The device does otherwise than a clause recommends.
+    /// The device breaks a recommended rule.
     Recommended(Deviation),
-    /// The rule was not tried: the reason. It is no pass.
+    /// The rule was not tried, with the reason. This is not a pass.
     Skipped(String),
 }
 
 impl Verdict {
-    /// In one word.
+    /// The verdict as one word.
     #[must_use]
     pub const fn word(&self) -> &'static str {
         match self {
@@ -50,7 +50,7 @@ impl Verdict {
         }
     }
 
-    /// What was expected and seen instead.
+    /// The expected and the seen behaviour, where the verdict has them.
     #[must_use]
     pub const fn deviation(&self) -> Option<&Deviation> {
         match self {
@@ -66,17 +66,17 @@ impl From<BusError> for Stop {
     }
 }
 
-/// The device breaks the rule.
+/// The outcome of a device that breaks the rule.
 pub(super) fn fail(expected: impl ToString, seen: impl ToString) -> Stop {
     Stop::Failed(Deviation { expected: expected.to_string(), seen: seen.to_string() })
 }
 
-/// The rule cannot be tried.
+/// The outcome of a rule that cannot be tried.
 pub(super) fn skip(reason: impl ToString) -> Stop {
     Stop::Skipped(reason.to_string())
 }
 
-/// Fails unless it holds.
+/// Fails unless a condition holds.
 pub(super) fn ensure(holds: bool, expected: impl ToString, seen: impl ToString) -> Outcome {
     if holds { Ok(()) } else { Err(fail(expected, seen)) }
 }

@@ -54,7 +54,7 @@ pub(super) struct Check {
 }
 
 impl Check {
-    /// Whether it is about a device.
+    /// Whether the command needs a device: without one, checks can be listed and explained.
     pub(super) const fn needs_a_bus(&self) -> bool {
         !self.list && self.explain.is_none()
     }
@@ -77,7 +77,7 @@ impl Check {
         }
     }
 
-    /// The checks that are wanted, in their order.
+    /// The selected checks, in their order.
     fn checks(&self) -> Result<Vec<Rule>, Failure> {
         let all = check::all(self.profile);
         for text in &self.only {
@@ -99,7 +99,7 @@ impl Check {
         }
     }
 
-    /// What the checks may do: what needs leave is asked for, once.
+    /// The strongest effect that the checks may have. The user is asked once if a check has an effect.
     fn allowed(&self, session: &Session, checks: &[Rule]) -> Result<Effect, Failure> {
         let strongest = checks.iter().map(|check| check.effect).max().unwrap_or(Effect::None);
         if strongest == Effect::None || self.yes {
@@ -144,8 +144,8 @@ impl Check {
         })
     }
 
-    /// The data sheet of the options, else the one that is built in for the identity of the device. A bootloader has the identity of
-    /// its device, and another device type: no data sheet is its own then.
+    /// The data sheet of the options, else the built-in data sheet for the identity of the device. A bootloader has the
+    /// identity of its device but another device type: no built-in data sheet is for a bootloader.
     fn sheet(session: &mut Session, node: NodeId) -> Result<Option<Eds>, Failure> {
         let catalogue = session.catalogue(node)?;
         let sheet = catalogue.is_of_a_device().then(|| catalogue.sheet().clone());
@@ -153,7 +153,7 @@ impl Check {
             return Ok(sheet);
         }
         let Some(sheet) = sheet else { return Ok(None) };
-        // The low word is the profile; the rest may follow from how the device is set up.
+        // The low word is the profile. The high word may depend on the configuration of the device.
         let declared = match sheet.get(0x1000, 0).and_then(|entry| entry.default.as_ref()) {
             Some(eds::Formula::Constant(eds::Value::Integer(number))) => number & 0xFFFF,
             _ => return Ok(Some(sheet)),
@@ -180,7 +180,7 @@ impl Check {
     }
 }
 
-/// Not where nobody looks on.
+/// A progress bar, which is only visible on a terminal.
 fn bar(length: usize) -> ProgressBar {
     let bar = ProgressBar::new(length as u64);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}") {
@@ -223,7 +223,7 @@ impl fmt::Display for Listed {
     }
 }
 
-/// A check at length.
+/// A check with its explanation.
 #[derive(Serialize)]
 struct Explained(Listed);
 
@@ -252,7 +252,7 @@ impl fmt::Display for Explained {
     }
 }
 
-/// All results for people.
+/// All results as a table for people.
 struct Table<'r>(&'r check::Run);
 
 impl Serialize for Table<'_> {

@@ -59,7 +59,7 @@ pub(super) struct Apply {
     force: bool,
 }
 
-/// So often what is still different is written again: some parameters change others.
+/// The number of times that values are written which are still different: some parameters change others.
 const PASSES: usize = 3;
 
 #[derive(Serialize)]
@@ -111,7 +111,7 @@ impl Dump {
 }
 
 impl Diff {
-    /// Two files are compared without one.
+    /// The comparison of two files needs no bus.
     pub(super) fn needs_a_bus(&self) -> bool {
         self.second.is_none()
     }
@@ -169,7 +169,8 @@ impl Apply {
     }
 }
 
-/// Why a file is not for a node. One for another product would be refused object by object; better nothing is changed.
+/// Why a file does not fit a node. A node would refuse the file of another product object by object, so nothing is
+/// written then.
 pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Result<Option<String>, Failure> {
     let device = session.word(node, at(0x1018, 2))?.unwrap_or(0);
     let product = sheet.device.product_number;
@@ -177,7 +178,8 @@ pub(super) fn mismatch(session: &mut Session, node: NodeId, sheet: &Eds) -> Resu
     Ok((device != product).then(words))
 }
 
-/// Writes what differs from a file until nothing does, as `read` tells. Returns what was written.
+/// Writes the parameters that differ from a file, until `read` shows no difference. Returns the parameters that were
+/// written.
 pub(super) fn bring(
     session: &mut Session,
     node: NodeId,
@@ -213,7 +215,7 @@ fn write_all(session: &mut Session, node: NodeId, sheet: &Eds, steps: &[Write]) 
     Ok(())
 }
 
-/// The node-ID that a file is for, where it says so.
+/// The node-ID that a file names, else the other one.
 fn node_of(sheet: &Eds, otherwise: NodeId) -> NodeId {
     sheet.commissioning.as_ref().and_then(|to| NodeId::new(to.node_id)).unwrap_or(otherwise)
 }

@@ -1,4 +1,4 @@
-//! Why a command failed, and the exit code that says so.
+//! Failures of commands, and their exit codes.
 
 use std::io;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use crate::object::Place;
 use crate::sdo::{self, Cause};
 use crate::{lss, update};
 
-/// For the end of the help text.
+/// The exit codes, for the end of the help text.
 pub(super) const EXIT_CODES: &str = "\
 Exit codes:
   0  done
@@ -30,7 +30,7 @@ Exit codes:
 /// Why a command failed.
 #[derive(Debug, Error)]
 pub enum Failure {
-    /// The command line makes no sense.
+    /// The command line has an error.
     #[error("{0}")]
     Usage(String),
     /// A transfer failed.
@@ -42,44 +42,44 @@ pub enum Failure {
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A node was not updated.
+    /// The update of a node has failed.
     #[error(transparent)]
     Update(#[from] update::Error),
-    /// Some nodes were not updated; each was told already.
+    /// Some nodes were not updated; each failure has been printed already.
     #[error("{failed} of {all} nodes were not updated")]
     Nodes {
-        /// How many were not.
+        /// The number of nodes that were not updated.
         failed: usize,
-        /// How many there are.
+        /// The number of all nodes.
         all: usize,
-        /// Of the first that was not.
+        /// The exit code of the first node that was not updated.
         exit_code: u8,
     },
-    /// Some objects could not be read; each was told already.
+    /// Some objects could not be read; each failure has been printed already.
     #[error("{failed} of {all} objects could not be read")]
     Objects {
-        /// How many could not.
+        /// The number of objects that could not be read.
         failed: usize,
-        /// How many there are.
+        /// The number of all objects.
         all: usize,
-        /// Of the first that could not.
+        /// The exit code of the first object that could not be read.
         exit_code: u8,
     },
-    /// Two configurations are not the same.
+    /// Two configurations differ.
     #[error("{0} parameters differ")]
     Different(usize),
-    /// Checks of a device failed, or it did not take back what was changed; each was told already.
+    /// Checks have failed, or the device has not taken back a changed value; both have been printed already.
     #[error("{failed} checks failed{}", left_words(.left_behind))]
     NotConforming {
-        /// How many did.
+        /// The number of failed checks.
         failed: usize,
-        /// What the device did not take back.
+        /// The values that the device has not taken back.
         left_behind: Vec<String>,
     },
-    /// A node does not have what was written to it.
+    /// A node has other values than the values that were written.
     #[error("still different after it was written: {0}")]
     NotApplied(String),
-    /// Somebody did not answer.
+    /// A node has not answered.
     #[error("{0}")]
     Silence(String),
     /// A file cannot be read or written.
@@ -87,7 +87,7 @@ pub enum Failure {
     File {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         reason: String,
     },
     /// The result cannot be written.
@@ -101,12 +101,12 @@ impl Failure {
         Failure::File { path: path.to_owned(), reason: reason.to_string() }
     }
 
-    /// Whether the node is not there: there is nothing to go on with.
+    /// Whether the node does not answer, so that the command cannot go on.
     pub(super) fn is_silence(&self) -> bool {
         matches!(self, Failure::Sdo(error) if error.is_silence())
     }
 
-    /// As JSON: one schema for all commands.
+    /// The failure as JSON: one schema for all commands.
     #[must_use]
     pub fn to_json(&self) -> serde_json::Value {
         let mut value = serde_json::json!({ "error": self.to_string(), "exit_code": self.exit_code() });
@@ -150,7 +150,7 @@ fn sdo_code(error: &sdo::Error) -> u8 {
     }
 }
 
-/// The exit code of a node that was not updated.
+/// The exit code for a node that was not updated.
 pub(super) fn update_code(error: &update::Error) -> u8 {
     match error {
         update::Error::Sdo(error) => sdo_code(error),

@@ -14,7 +14,7 @@ use crate::object::at;
 use crate::text::visible;
 use crate::update::{Program, Status};
 
-/// Longer than one heartbeat takes to come.
+/// Time added to the heartbeat period when waiting for a heartbeat.
 const MARGIN: Duration = Duration::from_millis(200);
 /// 1000h of a bootloader: "BOOT".
 const BOOT: u32 = 0x424F_4F54;
@@ -41,7 +41,7 @@ struct Report {
     program: Option<ProgramReport>,
 }
 
-/// Of a node that can be updated (CiA 302-3).
+/// The program of a node that can be updated (CiA 302-3).
 #[derive(Serialize)]
 struct ProgramReport {
     running: bool,
@@ -80,10 +80,10 @@ fn report(session: &mut Session, node: NodeId) -> Result<Report, Failure> {
     })
 }
 
-/// What the next heartbeat says; nothing where there is none.
+/// The state in the next heartbeat; `None` where no heartbeat comes.
 fn state(session: &mut Session, node: NodeId, period: Option<u32>) -> Result<Option<&'static str>, Failure> {
     let Some(period) = period.filter(|&period| period > 0) else { return Ok(None) };
-    // A node may say anything; 1017h has 16 bits, and nobody waits for a heartbeat longer than for a transfer.
+    // The period comes from the node and may be too long. So the wait is limited to the time of a transfer.
     let period = Duration::from_millis(period.into()).min(session.options.sdo().limit);
     let time = Duration(period.0 + MARGIN.0);
     Ok(heartbeat::wait(&mut session.network, node, time)?.map(heartbeat::words))
@@ -133,7 +133,7 @@ impl fmt::Display for Report {
         let register = self.error_register.map_or_else(|| "-".to_owned(), |value| format!("{value:02X}h"));
         write!(f, "\n  error register    {register}")?;
         for error in &self.errors {
-            // CiA 301, 7.5.2.4: the error code is the low half, the rest is the manufacturer's.
+            // CiA 301, 7.5.2.4: the low half is the error code, the high half is the manufacturer's.
             let code = u16::try_from(error & 0xFFFF).unwrap_or(0);
             write!(
                 f,

@@ -30,7 +30,7 @@ struct Row {
     #[serde(rename = "type")]
     data_type: String,
     access: &'static str,
-    /// What can carry it: `TPDO`, `RPDO` or both.
+    /// The PDOs that can carry the object: `TPDO`, `RPDO` or both.
     pdo: String,
     range: Option<String>,
     value: Option<serde_json::Value>,

@@ -1,4 +1,4 @@
-//! `nodectl completions` and `nodectl man`: what a shell and `man` want to know of the command line.
+//! `nodectl completions` and `nodectl man`: shell completions and manual pages.
 
 use std::io;
 use std::path::PathBuf;

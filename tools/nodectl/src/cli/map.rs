@@ -60,10 +60,10 @@ struct Done {
 /// Bit 31 of a COB-ID: the PDO is switched off.
 pub(super) const OFF: u32 = 1 << 31;
 
-/// More entries than this stand for a multiplexed PDO (CiA 301, 7.5.2.36).
+/// A larger number of entries stands for a multiplexed PDO (CiA 301, 7.5.2.36).
 const SLOTS: u8 = 64;
 
-/// What a PDO carries, when, and with which COB-ID.
+/// The mapping, the transmission type and the COB-ID of a PDO.
 pub(super) struct Mapped {
     pub(super) cob_id: u32,
     pub(super) entries: Vec<u32>,
@@ -103,7 +103,7 @@ impl Pdo {
         written.map_err(|error| session.named(error))
     }
 
-    /// What the PDO is now.
+    /// The present mapping of the PDO.
     pub(super) fn mapped(&self, session: &mut Session) -> Result<Mapped, Failure> {
         let cob_id = self.cob_id(session)?;
         let byte = |bytes: Option<Vec<u8>>| bytes.and_then(|bytes| bytes.first().copied());
@@ -116,8 +116,8 @@ impl Pdo {
         Ok(Mapped { cob_id, entries, transmission })
     }
 
-    /// Changes what the PDO carries, in the five steps of CiA 301 (7.5.2.36). What the node refuses leaves the PDO as it was; that
-    /// the node had.
+    /// Changes the mapping of the PDO, in the five steps of CiA 301 (7.5.2.36). If the node refuses the change, the
+    /// former mapping is restored.
     pub(super) fn remap(
         &self,
         session: &mut Session,
@@ -140,7 +140,7 @@ impl Pdo {
         Ok(cob_id)
     }
 
-    /// Steps 2 to 5 of a PDO that is switched off: empty, objects, their number, on if it is to be on.
+    /// Steps 2 to 5 for a PDO that is off: clear the mapping, write the objects, write their number, write the COB-ID.
     fn change(&self, session: &mut Session, to: &Mapped) -> Result<(), Failure> {
         self.write(session, at(self.mapping, 0), &[0])?;
         for (entry, sub) in to.entries.iter().zip(1..) {
@@ -163,7 +163,7 @@ impl Map {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
         let node = session.options.node.one()?;
         let pdo = Pdo::new(node, self.direction, self.number);
-        // Everything is looked up before anything is changed.
+        // Look up all objects before any change, so that an error leaves the PDO unchanged.
         let entries: Result<Vec<u32>, Failure> =
             self.objects.iter().map(|query| self.entry(session, node, query)).collect();
         let entries = entries?;
@@ -183,7 +183,7 @@ impl Map {
         })
     }
 
-    /// The entry of a mapping: index, sub-index, bits.
+    /// The mapping entry of an object: index, sub-index, bits.
     fn entry(&self, session: &mut Session, node: NodeId, query: &str) -> Result<u32, Failure> {
         let object = session.find(node, query)?;
         let catalogue = session.catalogue(node)?;
@@ -192,7 +192,7 @@ impl Map {
     }
 }
 
-/// The entry of a mapping: index, sub-index, bits. Else why there is none.
+/// The mapping entry of an object (index, sub-index, bits), or the reason why the object cannot be mapped.
 pub(super) fn slot(catalogue: &Catalogue, direction: Direction, object: Multiplexer) -> Result<u32, String> {
     let is_mappable = |entry: &eds::Entry| match direction {
         Direction::Tpdo => entry.is_tpdo_mappable(),
@@ -207,7 +207,7 @@ pub(super) fn slot(catalogue: &Catalogue, direction: Direction, object: Multiple
     Ok(u32::from(object.index) << 16 | u32::from(object.sub) << 8 | u32::from(bits))
 }
 
-/// The bits of all entries, if a PDO has room for them.
+/// The bits of all entries together; an error where they are too many for a PDO.
 pub(super) fn fitting_bits(entries: &[u32]) -> Result<u32, Failure> {
     let bits = entries.iter().map(|entry| entry & 0xFF).sum();
     if bits > 64 {

@@ -74,12 +74,12 @@ enum Command {
 }
 
 impl Cli {
-    /// Does the command, on the bus of the options.
+    /// Runs the command on the bus of the options.
     ///
     /// # Errors
-    /// Why it failed.
+    /// The failure of the command.
     pub fn run(&self, output: Output) -> Result<(), Failure> {
-        // Its bus is on a thread of its own, for many sessions.
+        // `serve` opens the bus on a thread of its own, because many sessions share the bus.
         if let Command::Serve(serve) = &self.command {
             return serve.run(&self.options, output);
         }
@@ -91,7 +91,7 @@ impl Cli {
         self.run_in(&mut session)
     }
 
-    /// Whether the command is about more than files.
+    /// Whether the command needs a bus, not only files.
     fn needs_a_bus(&self) -> bool {
         match &self.command {
             Command::Diff(diff) => diff.needs_a_bus(),
@@ -102,10 +102,10 @@ impl Cli {
         }
     }
 
-    /// Does the command in a session that is open.
+    /// Runs the command in an open session.
     ///
     /// # Errors
-    /// Why it failed.
+    /// The failure of the command.
     pub fn run_in(&self, session: &mut Session) -> Result<(), Failure> {
         match &self.command {
             Command::Scan(scan) => scan.run(session),

@@ -74,7 +74,7 @@ fn restart(session: &mut Session, command: nmt::Command, node: NodeId) -> Result
     session.print(&Done { node: node.get(), state: Some("booted") })
 }
 
-/// A node that sends no heartbeat cannot tell its state; whether there is one, an answer by SDO tells.
+/// Changes the state. A node without a heartbeat cannot tell its state; then an SDO answer shows that the node exists.
 fn change(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<(), Failure> {
     let answers = is_there(session, node)?;
     let time = session.options.timeout().max(Duration::from_millis(1500));
@@ -88,7 +88,7 @@ fn change(session: &mut Session, command: nmt::Command, node: NodeId) -> Result<
     session.print(&Done { node: node.get(), state: state.map(heartbeat::words) })
 }
 
-/// Whether the node answers by SDO, which it does not while it is stopped.
+/// Whether the node answers by SDO. A stopped node does not.
 fn is_there(session: &mut Session, node: NodeId) -> Result<bool, Failure> {
     match session.client(node).upload(at(0x1000, 0)) {
         Err(Error { cause: Cause::Bus(error), .. }) => Err(error.into()),
@@ -98,7 +98,7 @@ fn is_there(session: &mut Session, node: NodeId) -> Result<bool, Failure> {
 }
 
 impl Command {
-    /// The command, and the state it leads to; none for a restart.
+    /// The NMT command and the state that follows; `None` for a restart.
     pub(super) fn meaning(self) -> (nmt::Command, Option<State>) {
         match self {
             Command::Start => (nmt::Command::Start, Some(State::Operational)),

@@ -1,4 +1,4 @@
-//! Which nodes a command is for.
+//! The nodes that a command is for.
 
 use std::collections::BTreeSet;
 use std::str::FromStr;
@@ -7,17 +7,17 @@ use canopen::NodeId;
 
 use super::Failure;
 
-/// One node, several, or all that are on the bus.
+/// One node, several nodes, or all nodes on the bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NodeSet {
-    /// All that are on the bus.
+    /// All nodes on the bus.
     All,
-    /// These, at least one.
+    /// These nodes, at least one.
     These(BTreeSet<NodeId>),
 }
 
 impl NodeSet {
-    /// The nodes by number; of all there is no list.
+    /// The nodes by number; an error for all nodes, because there is no list of them.
     pub(super) fn list(&self) -> Result<Vec<NodeId>, Failure> {
         match self {
             NodeSet::All => Err(Failure::Usage("this command needs node-IDs".to_owned())),
@@ -25,7 +25,7 @@ impl NodeSet {
         }
     }
 
-    /// The one node.
+    /// The single node; an error for several nodes.
     pub(super) fn one(&self) -> Result<NodeId, Failure> {
         match self.list()?.as_slice() {
             [node] => Ok(*node),

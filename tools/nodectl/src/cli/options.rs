@@ -53,7 +53,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// For transfers.
+    /// The options of SDO transfers.
     pub(super) fn sdo(&self) -> sdo::Options {
         let limit = Duration::from_millis(u64::from(self.limit) * 1000);
         sdo::Options { timeout: self.timeout(), limit, retries: self.retries, ..sdo::Options::default() }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::text::visible_lines;
 
-/// Where results go, and how.
+/// The destination and the form of results.
 pub struct Output {
     to: Box<dyn Write>,
     json: bool,
@@ -20,12 +20,12 @@ impl Output {
         Output::new(io::stdout(), json)
     }
 
-    /// Anywhere.
+    /// An output to any destination.
     pub fn new(to: impl Write + 'static, json: bool) -> Output {
         Output { to: Box::new(to), json }
     }
 
-    /// Whether a person looks on.
+    /// Whether a person reads the output.
     pub(super) fn is_interactive(&self) -> bool {
         !self.json && io::stdout().is_terminal()
     }
@@ -35,7 +35,7 @@ impl Output {
         if self.json {
             serde_json::to_writer(&mut self.to, result)?;
         } else {
-            // What a device, a file or a network has put into it must not reach the terminal as it is.
+            // Texts of a device, a file or a network are escaped, because control characters could change the terminal.
             write!(self.to, "{}", visible_lines(&result.to_string()))?;
         }
         writeln!(self.to)?;
@@ -48,14 +48,14 @@ impl Output {
         self.to.flush()
     }
 
-    /// Writes bytes as they are.
+    /// Writes bytes unchanged.
     pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.to.write_all(bytes)?;
         self.to.flush()
     }
 }
 
-/// An identification or a code as people write it.
+/// An identification or a code in hexadecimal digits.
 pub(super) fn hex(value: Option<u32>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:08X}h"))
 }

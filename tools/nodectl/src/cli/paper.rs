@@ -1,15 +1,15 @@
-//! What is printed, for whoever runs a command in a program of their own.
+//! A buffer for the output of a command that runs within another program.
 
 use std::cell::RefCell;
 use std::io::{self, Write};
 use std::rc::Rc;
 
-/// Takes what is printed; its clones are the same paper.
+/// A buffer for printed text; its clones share the text.
 #[derive(Clone, Debug, Default)]
 pub struct Paper(Rc<RefCell<Vec<u8>>>);
 
 impl Paper {
-    /// What has been printed since the last call.
+    /// The text printed since the last call.
     #[must_use]
     pub fn take(&self) -> String {
         String::from_utf8_lossy(&self.0.take()).into_owned()

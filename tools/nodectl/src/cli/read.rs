@@ -38,12 +38,12 @@ pub(super) struct Read {
     out: Option<PathBuf>,
 }
 
-/// The type of a name, for the command line.
+/// The data type of a name, for the command line.
 pub(super) fn parse_type(name: &str) -> Result<DataType, String> {
     data_type(name).ok_or_else(|| "there are UNSIGNED8 (u8) to UNSIGNED64, INTEGER8 (i8) to INTEGER64, REAL32 (r32), REAL64, BOOLEAN (b), VISIBLE_STRING (vs), OCTET_STRING (os), UNICODE_STRING (us) and DOMAIN (d)".to_owned())
 }
 
-/// The value of an object and what is known about it.
+/// The value of an object, with its name, unit and meaning.
 #[derive(Serialize)]
 pub(super) struct Reading {
     node: u8,
@@ -54,10 +54,10 @@ pub(super) struct Reading {
     data_type: String,
     value: Value,
     unit: String,
-    /// The number on the wire, where the value is another.
+    /// The number on the wire, where it differs from the value.
     #[serde(skip_serializing_if = "Option::is_none")]
     raw: Option<Value>,
-    /// What the number stands for.
+    /// The meaning of the number.
     #[serde(skip_serializing_if = "Option::is_none")]
     meaning: Option<String>,
     #[serde(skip)]
@@ -74,7 +74,7 @@ impl Read {
         let mut failures = Vec::new();
         for at in objects.iter().copied() {
             match self.read(session, node, at) {
-                // One that cannot be read does not keep the others from it.
+                // An object that cannot be read does not stop the reading of the others.
                 Err(failure @ Failure::Sdo(_)) if objects.len() > 1 && !failure.is_silence() => {
                     session.tell(&failure)?;
                     failures.push(failure);
@@ -92,7 +92,7 @@ impl Read {
         }
     }
 
-    /// The object that a person means, or all of a record or an array whose sub-index is not given.
+    /// The object that a person means. For a record or an array without a sub-index, all its sub-indices.
     fn meant(&self, session: &mut Session, node: NodeId, query: &str) -> Result<Vec<Multiplexer>, Failure> {
         let at = session.find(node, query)?;
         let catalogue = session.catalogue(node)?;
@@ -122,7 +122,7 @@ impl Read {
         bytes: &[u8],
     ) -> Result<Reading, Failure> {
         let catalogue = session.catalogue(node)?;
-        // The unit is that of the type of the data sheet.
+        // With another type than the one of the data sheet, its unit does not apply.
         let quantity = match self.data_type {
             Some(_) => Quantity::default(),
             None => Quantity::of(&mut session.client(node), &catalogue, at)?,
@@ -131,7 +131,7 @@ impl Read {
     }
 }
 
-/// Whether a query gives no sub-index: an index alone, or a name without a path.
+/// Whether a query has no sub-index: an index alone, or a name without a path.
 fn names_no_sub(query: &str) -> bool {
     !query.contains(':') && !query.to_ascii_lowercase().contains("sub") && !query.contains('/')
 }
@@ -158,19 +158,19 @@ impl Reading {
         )
     }
 
-    /// The value with its unit and what it stands for.
+    /// The value with its unit and its meaning.
     pub(super) fn value_text(&self) -> String {
         let meaning = self.meaning.as_ref().map(|meaning| format!(" [{meaning}]")).unwrap_or_default();
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         format!("{}{unit}{meaning}", visible(&self.value.to_string()))
     }
 
-    /// The value as JSON has it.
+    /// The value in the form of JSON.
     pub(super) fn json_value(&self) -> serde_json::Value {
         serde_json::to_value(&self.value).unwrap_or_default()
     }
 
-    /// Of a value that is decoded.
+    /// The reading of a decoded value.
     pub(super) fn of(
         node: u8,
         at: Multiplexer,
@@ -202,7 +202,7 @@ fn write_out(session: &mut Session, path: &Path, bytes: &[u8]) -> Result<(), Fai
     Replacement::write(path, bytes)
 }
 
-/// As a person writes it.
+/// Serialises an address in the form `1018h:1`.
 pub(super) fn place<S: Serializer>(at: &Multiplexer, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&Place(*at))
 }
@@ -215,7 +215,7 @@ impl fmt::Display for Reading {
             write!(f, "{name} ")?;
         }
         write!(f, "= {}", visible(&self.value.to_string()))?;
-        // Identifiers, units and mappings are read digit by digit.
+        // Identifiers, units and mappings are also shown in hexadecimal, because people read them digit by digit.
         if let (Value::Integer(value), Class::Unsigned(bits @ 32..)) = (&self.value, self.class) {
             write!(f, " ({value:0width$X}h)", width = usize::from(bits / 4))?;
         }

@@ -1,4 +1,4 @@
-//! Files that replace others: nothing is lost before the new one is complete.
+//! Safe replacement of files: the old file stays until the new one is complete.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::Failure;
 
-/// A file that is written beside the place where it belongs, and goes there when it is complete. A file that is there
-/// already stays until then.
+/// A file that is written under a temporary name beside its final path, and is renamed when it is complete. An existing
+/// file stays until then.
 pub(super) struct Replacement {
     path: PathBuf,
     part: PathBuf,
@@ -16,7 +16,7 @@ pub(super) struct Replacement {
 }
 
 impl Replacement {
-    /// Opens it. What cannot be written is told now.
+    /// Opens the file. A path that cannot be written fails here.
     pub(super) fn open(path: &Path) -> Result<Replacement, Failure> {
         if path.is_dir() {
             return Err(Failure::file(path, "it is a directory"));
@@ -28,14 +28,14 @@ impl Replacement {
         Ok(Replacement { path: path.to_owned(), part, file: BufWriter::new(file), is_complete: false })
     }
 
-    /// The file is complete: it takes its place.
+    /// Finishes the file and moves it to its final path.
     pub(super) fn complete(mut self) -> Result<(), Failure> {
         let moved = self.file.flush().and_then(|()| fs::rename(&self.part, &self.path));
         self.is_complete = moved.is_ok();
         moved.map_err(|error| Failure::file(&self.path, error))
     }
 
-    /// Writes all of a file at once.
+    /// Writes a whole file at once.
     pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let mut file = Replacement::open(path)?;
         file.write_all(bytes).map_err(|error| Failure::file(path, error))?;
@@ -54,7 +54,7 @@ impl Write for Replacement {
 }
 
 impl Drop for Replacement {
-    /// What has not become complete is of no use.
+    /// Removes an incomplete file.
     fn drop(&mut self) {
         if !self.is_complete {
             let _ = fs::remove_file(&self.part);

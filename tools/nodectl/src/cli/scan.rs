@@ -13,7 +13,7 @@ use crate::scan::{Presence, scan};
 use crate::text::visible;
 use crate::{heartbeat, value};
 
-/// What may be wrong when nobody answers.
+/// The hint when no node answers.
 const NOBODY: &str = "nobody answers: is the bus the right one, with the right bit rate, and are the nodes on? \
                       Nodes without a node-ID are found by `nodectl lss scan`";
 
@@ -58,7 +58,7 @@ impl Scan {
     }
 }
 
-/// A node that does not answer SDO (it may be stopped) is a row all the same.
+/// The row of a node. A node that does not answer SDO, for example a stopped one, gets a row, too.
 fn row(session: &mut Session, node: NodeId, presence: Presence) -> Result<Row, Failure> {
     let mut row = Row {
         node: node.get(),

@@ -1,4 +1,4 @@
-//! What the commands share: the bus, and what is known about the nodes.
+//! The state that all commands share: the bus, and the catalogues of the nodes.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -22,38 +22,39 @@ use crate::text::visible_lines;
 use crate::value;
 use crate::{Catalogue, Network};
 
-/// The data sheets of the largest devices have a quarter of this.
+/// The greatest size of a data sheet in bytes. The data sheets of the largest devices have a quarter of this size.
 const LARGEST_SHEET: u64 = 4 << 20;
 
-/// A slow bus needs 20 s for the 400 objects of a large dictionary: three times as much is enough for any.
+/// A factor on the time limit for reading a whole dictionary. A slow bus needs 20 s for 400 objects; this limit is
+/// three times as long.
 const MANY: u64 = 6;
 
-/// An open bus, and what is known about the nodes on it.
+/// An open bus, and the catalogues of the nodes on it.
 pub struct Session {
     pub(super) network: Network,
     pub(super) options: Options,
     pub(super) output: Output,
-    /// The data sheet of the options, once it is read.
+    /// The data sheet of the options, once it has been read.
     sheet: Option<Eds>,
     catalogues: BTreeMap<NodeId, Arc<Catalogue>>,
-    /// Until when the transfers have to be over that are made for one node.
+    /// The deadline of all transfers that belong together.
     deadline: Instant,
 }
 
 impl Session {
-    /// Goes on the bus of the options.
+    /// Opens the bus of the options.
     ///
     /// # Errors
     /// The bus cannot be opened.
     pub fn open(options: &Options, output: Output) -> Result<Session, Failure> {
-        // A data sheet that cannot be used is told before anything happens.
+        // Read the data sheet first, so that a wrong one is reported before the bus is opened.
         let sheet = options.eds.as_deref().map(sheet).transpose()?;
         let (address, bit_rate) = (options.bus.clone(), options.bit_rate);
         let network = Network::open(move || address.open(bit_rate))?;
         Ok(Session { sheet, ..Session::with(network, options, output) })
     }
 
-    /// For a command that is about files: nobody is on its bus.
+    /// A session without a bus, for a command that works on files.
     ///
     /// # Errors
     /// The data sheet of the options cannot be used.
@@ -63,7 +64,7 @@ impl Session {
         Ok(Session { sheet, ..Session::with(network, options, output) })
     }
 
-    /// On a bus that is open.
+    /// A session on an open bus.
     #[must_use]
     pub fn with(network: Network, options: &Options, output: Output) -> Session {
         Session {
@@ -82,19 +83,19 @@ impl Session {
         Client::new(&mut self.network, node, self.options.sdo()).by(deadline)
     }
 
-    /// The next transfers are about one node: together they may take as long as one. A node that is slow on purpose costs
-    /// no more, however much it is asked.
+    /// Starts a group of transfers with one node, which together have the time limit of one transfer. So a node that
+    /// answers slowly on purpose cannot hold up the command longer, whatever the number of objects.
     pub(super) fn begin(&mut self) {
         self.deadline = self.network.now() + self.options.sdo().limit;
     }
 
-    /// The next transfers are for all objects of a node: together they may take as long as [`MANY`] of one.
+    /// Starts a group of transfers for all objects of a node, which together have the time limit of [`MANY`] transfers.
     pub(super) fn begin_all(&mut self) {
         let limit = Duration(self.options.sdo().limit.0.saturating_mul(MANY));
         self.deadline = self.network.now() + limit;
     }
 
-    /// What is known about a node: from the file of the options, else by its identity.
+    /// The catalogue of a node: the data sheet of the options, else the built-in data sheet for its identity.
     pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Arc<Catalogue>, Failure> {
         if let Some(known) = self.catalogues.get(&node) {
             return Ok(Arc::clone(known));
@@ -109,17 +110,17 @@ impl Session {
         Ok(Arc::clone(self.catalogues.entry(node).or_insert(Arc::new(catalogue))))
     }
 
-    /// Whether something is known about a node already.
+    /// Whether the catalogue of a node is known already.
     pub(super) fn knows(&self, node: NodeId) -> bool {
         self.catalogues.contains_key(&node)
     }
 
-    /// Tells what is known about a node.
+    /// Sets the catalogue of a node.
     pub(super) fn know(&mut self, node: NodeId, catalogue: Arc<Catalogue>) {
         self.catalogues.insert(node, catalogue);
     }
 
-    /// The data sheet of a node, for what needs one.
+    /// The data sheet of a node; an error where none is known.
     pub(super) fn sheet_of(&mut self, node: NodeId) -> Result<Eds, Failure> {
         let sheet = self.catalogue(node)?.sheet().clone();
         if sheet.device.product_name.is_empty() {
@@ -142,7 +143,7 @@ impl Session {
         values
     }
 
-    /// The same; `progress` is told how many of all are read.
+    /// The values of all parameters of a node. `progress` is called with the number of parameters read and the total.
     pub(super) fn configuration_with(
         &mut self,
         node: NodeId,
@@ -160,17 +161,17 @@ impl Session {
         Ok(vendor.zip(product).and_then(|(vendor, product)| Catalogue::built_in(vendor, product)))
     }
 
-    /// An UNSIGNED32; `None` where the node has no such object.
+    /// The value of an UNSIGNED32 object; `None` where the node has no such object.
     pub(super) fn word(&mut self, node: NodeId, at: Multiplexer) -> Result<Option<u32>, Failure> {
         Ok(self.optional(node, at)?.and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes))
     }
 
-    /// A VISIBLE_STRING without a sub-index; `None` where the node has no such object.
+    /// The value of a VISIBLE_STRING object; `None` where the node has no such object.
     pub(super) fn text(&mut self, node: NodeId, index: u16) -> Result<Option<String>, Failure> {
         Ok(self.optional(node, at(index, 0))?.map(|bytes| value::text(&bytes)))
     }
 
-    /// The bytes of an object; `None` where the node does not have it, or not for us.
+    /// The bytes of an object; `None` where the node does not have the object, or does not let us read it.
     pub(super) fn optional(&mut self, node: NodeId, at: Multiplexer) -> Result<Option<Vec<u8>>, Failure> {
         match self.client(node).upload(at) {
             Ok(bytes) => Ok(Some(bytes)),
@@ -185,14 +186,14 @@ impl Session {
         found.map_err(|error| Failure::Usage(error.to_string()))
     }
 
-    /// The error of a transfer with the name of its object, and what helps.
+    /// The failure of a transfer, with the name of the object and a hint.
     pub(super) fn named(&mut self, error: sdo::Error) -> Failure {
         let name = self.catalogues.get(&error.node).and_then(|catalogue| catalogue.name(error.at));
         let hint = self.hint(&error);
         sdo::Error { name: error.name.clone().or(name), hint, ..error }.into()
     }
 
-    /// What helps against an error.
+    /// A hint for the user on an error.
     fn hint(&self, error: &sdo::Error) -> Option<String> {
         if error.is_silence() && self.network.last_state(error.node) == Some(State::Stopped) {
             return Some("the node is stopped and answers nothing; `nodectl nmt preop` wakes it".to_owned());
@@ -215,7 +216,7 @@ impl Session {
         }
     }
 
-    /// Tells a failure after which the command goes on.
+    /// Prints a failure that does not end the command.
     pub(super) fn tell(&mut self, failure: &Failure) -> Result<(), Failure> {
         if self.options.json {
             return Ok(self.output.json(&failure.to_json())?);

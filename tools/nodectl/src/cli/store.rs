@@ -37,12 +37,12 @@ pub(super) enum Group {
     Manufacturer = 4,
 }
 
-/// What a node does with its parameters.
+/// An order to a node about its parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Order {
-    /// It keeps them (1010h).
+    /// Save the parameters (1010h).
     Save,
-    /// It takes those of the factory from its next reset on (1011h).
+    /// Restore the defaults at the next reset (1011h).
     Restore,
 }
 
@@ -73,7 +73,7 @@ fn for_each(session: &mut Session, order: Order, group: Group, what: &'static st
     Ok(())
 }
 
-/// Writes the signature that shows that the order is meant.
+/// Writes the signature that protects 1010h and 1011h against accidental writes.
 pub(super) fn sign(session: &mut Session, node: NodeId, order: Order, group: Group) -> Result<(), Failure> {
     session.catalogue(node)?;
     let (index, signature) = match order {

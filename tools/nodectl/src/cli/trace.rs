@@ -20,11 +20,11 @@ use crate::text::{hex_digits, visible};
 use crate::trace::{Decoder, Kind, Knowledge, Line, Shown, parse_candump};
 use crate::value::Value;
 
-/// How long a wait for a frame lasts before the end of the trace is looked for.
+/// The longest wait for a frame, after which the end of the trace is checked.
 const PATIENCE: Duration = Duration::from_millis(200);
-/// How long nodes are listened for before they are asked.
+/// How long to listen for nodes before their objects are read.
 const LISTEN: Duration = Duration::from_millis(300);
-/// A line of candump has a tenth of this.
+/// The greatest length of a line of a file: ten times a line of candump.
 const LONGEST_LINE: u64 = 1024;
 
 /// Shows what is said on the bus: every frame decoded, with names, values and units; a transfer of several frames is a line.
@@ -61,7 +61,7 @@ pub(super) struct Trace {
     seconds: Option<u32>,
 }
 
-/// A line, for scripts.
+/// A line in the form for scripts.
 #[derive(Serialize)]
 struct Row {
     time: f64,
@@ -86,7 +86,7 @@ struct Cell {
     meaning: Option<String>,
 }
 
-/// What is decoded, and how many lines may come.
+/// The decoder, and the number of lines that may still be printed.
 struct Printer<'t> {
     trace: &'t Trace,
     decoder: Decoder,
@@ -95,7 +95,7 @@ struct Printer<'t> {
 }
 
 impl Trace {
-    /// A file is decoded without one.
+    /// Whether the command needs a bus: a file is decoded without one.
     pub(super) fn needs_a_bus(&self) -> bool {
         self.file.is_none()
     }
@@ -110,7 +110,7 @@ impl Trace {
         }
     }
 
-    /// A decoder that knows the nodes.
+    /// A decoder with the knowledge about the nodes.
     fn decoder(&self, session: &mut Session) -> Result<Decoder, Failure> {
         let mut decoder = Decoder::default();
         if session.options.eds.is_some() {
@@ -136,7 +136,7 @@ impl Trace {
         Ok(decoder)
     }
 
-    /// The nodes of the filter.
+    /// The nodes that the filter names.
     fn named(&self) -> BTreeSet<NodeId> {
         match &self.of {
             NodeSet::All => (1..=127).filter_map(NodeId::new).collect(),
@@ -144,7 +144,7 @@ impl Trace {
         }
     }
 
-    /// Those of them that answer.
+    /// The nodes of the filter that answer.
     fn present(&self, session: &mut Session) -> Result<Vec<NodeId>, Failure> {
         let found = scan(&mut session.network, LISTEN)?;
         session.network.forget();
@@ -173,7 +173,7 @@ impl Printer<'_> {
             if let Some(received) = session.network.receive(until)? {
                 self.frame(session, &received.frame, received.at)?;
             }
-            // By the clock of the bus once there is one: virtual time may be faster, or slower.
+            // Use the clock of the bus once there is one: virtual time may be faster or slower than real time.
             let (start, now) =
                 self.start.zip(session.network.bus_time()).unwrap_or((begin, session.network.now()));
             if time.is_some_and(|time| now.0.saturating_sub(start.0) >= time.0) {

@@ -66,7 +66,7 @@ impl Update {
             confirm: !self.no_confirm,
         };
         let results = update(&mut session.network, &nodes, &image, &options, &mut Bar::new());
-        // The error of the only node is that of the command.
+        // With a single node, its error is the error of the command.
         for (node, result) in results.iter().filter(|(_, result)| result.is_ok() || nodes.len() > 1) {
             session.print(&Report::new(*node, result))?;
         }
@@ -82,7 +82,7 @@ impl Update {
     }
 }
 
-/// The error of the only node, or how many have failed.
+/// The error of the only node, or the number of failed nodes.
 fn verdict(results: Vec<(NodeId, Result<Outcome, Error>)>) -> Result<(), Failure> {
     let all = results.len();
     let mut errors: Vec<Error> = results.into_iter().filter_map(|(_, result)| result.err()).collect();
@@ -135,10 +135,10 @@ impl fmt::Display for Report {
     }
 }
 
-/// The progress on the standard error output: one line that fits 80 columns.
+/// The progress on the standard error output, in one line of 80 columns.
 struct Bar(ProgressBar);
 
-/// Of a step that takes no known time, and of a download.
+/// The template for a step without a known duration; below it the template for a download.
 const WAITING: &str = "{prefix} {msg:<20} {elapsed}";
 const LOADING: &str = "{prefix} {msg:<20} [{bar:14}] {percent:>3} % {bytes_per_sec:>13} {eta:>4} left";
 
@@ -159,9 +159,9 @@ impl Watcher for Bar {
         self.0.set_message(step.to_string());
         let is_loading = matches!(step, Step::Download | Step::DownloadSegments);
         self.0.set_style(style(if is_loading { LOADING } else { WAITING }));
-        // The rate is that of the download, the time that of the step.
+        // The rate shown is the rate of the download alone, and the time is the time of the step.
         self.0.reset();
-        // Where no bar can be drawn, the steps are told.
+        // Without a terminal the steps are printed as lines.
         if self.0.is_hidden() {
             eprintln!("node {}: {step}", node.get());
         }

@@ -51,7 +51,7 @@ impl Write {
             client.download(at, &bytes, |_| ())
         };
         written.map_err(|error| session.named(error))?;
-        // A unit that was written is in force now.
+        // If the unit itself was written, the new unit applies already.
         let quantity = Quantity::of(&mut session.client(node), &catalogue, at)?;
         session.print(&Reading::new(node.get(), at, &bytes, &catalogue, &quantity, data_type))
     }

@@ -1,4 +1,4 @@
-//! What is for others, and what is the device's own.
+//! Checks with frames for other nodes, and of the CAN-IDs that the device uses.
 
 use super::super::prelude::*;
 
@@ -27,7 +27,7 @@ fn foreign_sdo(s: &mut Subject<'_>) -> Outcome {
     ensure(answers == 0, "no answer", format!("{answers}"))
 }
 
-/// The CAN-IDs of the pre-defined connection set, and those that the COB-ID entries of the PDOs name.
+/// Demands that the device sends only on CAN-IDs of the pre-defined connection set and of its COB-ID entries.
 fn own_ids(s: &mut Subject<'_>) -> Outcome {
     s.need_solitude()?;
     let own = s.id();

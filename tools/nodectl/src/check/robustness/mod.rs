@@ -1,4 +1,4 @@
-//! Foreign traffic, nonsense and floods: the device stays as it is.
+//! Checks with foreign traffic, nonsense and floods, which must not change the device.
 
 mod floods;
 mod foreign;

@@ -1,4 +1,4 @@
-//! Frames that mean nothing.
+//! Checks with frames that have no meaning.
 
 use super::super::prelude::*;
 
@@ -34,7 +34,7 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// A sequence of bytes without order, the same in each run.
+/// Pseudo-random bytes, the same in each run.
 fn noise(seed: u32) -> [u8; 8] {
     let mut state = seed.wrapping_mul(2_654_435_761) | 1;
     std::array::from_fn(|_| {
@@ -64,7 +64,7 @@ fn remote_sdo(s: &mut Subject<'_>) -> Outcome {
     s.serves("remote frames")
 }
 
-/// A request with every first byte, for an object that is not there.
+/// Sends a request with every first byte, for an object that does not exist.
 fn all_commands(s: &mut Subject<'_>) -> Outcome {
     let id = 0x600 + s.id();
     for command in 0..=255_u8 {
@@ -76,7 +76,7 @@ fn all_commands(s: &mut Subject<'_>) -> Outcome {
     s.serves("requests with every first byte")
 }
 
-/// What nonsense must not change.
+/// Parameters that nonsense must not change.
 fn parameters(s: &mut Subject<'_>) -> Outcome<Vec<Option<u32>>> {
     [(0x1005, 0), (0x1014, 0), (0x1016, 1), (0x1017, 0), (0x1400, 1), (0x1800, 1), (0x1A00, 1)]
         .into_iter()
@@ -88,7 +88,7 @@ fn parameters_stay(s: &mut Subject<'_>) -> Outcome {
     let before = parameters(s)?;
     let id = 0x600 + s.id();
     for seed in 0..200 {
-        // Any first byte, and an object of the data types, which no device has.
+        // The first byte is random. The index is one of a data type, which no device has as an object.
         let mut request = noise(seed);
         request[2] = 0x00;
         s.send(id, &request)?;
@@ -136,7 +136,7 @@ fn sync(s: &mut Subject<'_>) -> Outcome {
 fn left_alone(s: &mut Subject<'_>) -> Outcome {
     s.need_writable(0x1017, 0)?;
     s.answer([0x21, 0x17, 0x10, 0, 2, 0, 0, 0])?;
-    // Longer than the time-out of any server that has one; where the server has none, a new transfer begins anew.
+    // Wait longer than the time-out of a server. A server without a time-out must accept a new transfer.
     s.pass(3000)?;
     s.is_served()?;
     s.serves("a download that was left alone")
@@ -151,7 +151,7 @@ fn rpdos(s: &mut Subject<'_>) -> Outcome {
             s.send(base + own, &[0; 8][..len])?;
         }
     }
-    // In Pre-operational, where none of them may have an effect.
+    // In Pre-operational no RPDO may have an effect.
     s.tells(State::PreOperational)?;
     s.serves("RPDOs of any length")
 }

@@ -1,4 +1,4 @@
-//! Block transfers, which are optional.
+//! Checks of block transfers, which are optional.
 
 use canopen::sdo::{BlockEnd, BlockSegment, BlockSize, Request, Response};
 use crc::{CRC_16_XMODEM, Crc};
@@ -38,13 +38,13 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("SDO-78", "A block upload of an absent object is refused", "CiA 301, table 22", absent),
 ];
 
-/// What the blocks of an upload gave.
+/// The data of a block upload, and the CRC if the device has sent one.
 struct Uploaded {
     bytes: Vec<u8>,
     crc: Option<u16>,
 }
 
-/// Begins a block upload; whether the end will carry a CRC. Skipped where the device has no block transfers.
+/// Begins a block upload. Returns whether its end will carry a CRC. Skipped where the device has no block transfers.
 fn begin_upload(s: &mut Subject<'_>, index: u16, crc: bool, block_size: u8) -> Outcome<bool> {
     let request = Request::BlockUpload { at: at(index, 0), crc, block_size, threshold: 0 };
     match s.respond(request)? {
@@ -55,7 +55,7 @@ fn begin_upload(s: &mut Subject<'_>, index: u16, crc: bool, block_size: u8) -> O
     }
 }
 
-/// The next segments, until one is the last, so many have come, or no more comes.
+/// The next segments, up to the last segment of the transfer or to `most` segments. Fails if too few come.
 fn segments(s: &mut Subject<'_>, request: Request, most: u8) -> Outcome<Vec<BlockSegment>> {
     let (mark, id) = (s.mark(), 0x580 + s.id());
     s.send(0x600 + s.id(), &request.encode())?;
@@ -71,7 +71,8 @@ fn segments(s: &mut Subject<'_>, request: Request, most: u8) -> Outcome<Vec<Bloc
     Err(fail(format!("{most} segments, or fewer with the last"), "no more came in 500 ms"))
 }
 
-/// Uploads an object in blocks of this size; the first block is acknowledged up to a segment less when one is to be lost.
+/// Uploads an object in blocks of this size. With `loses_one`, the first acknowledge leaves out the last segment of its
+/// block, as if that segment was lost.
 fn upload(s: &mut Subject<'_>, index: u16, crc: bool, block_size: u8, loses_one: bool) -> Outcome<Uploaded> {
     let crc = begin_upload(s, index, crc, block_size)?;
     let (mut bytes, mut request, mut loses) = (Vec::new(), Request::BlockUploadStart, loses_one);
@@ -120,7 +121,7 @@ fn upload_crc(s: &mut Subject<'_>) -> Outcome {
     ensure(sent == expected, format!("the CRC {expected:04X}h"), format!("{sent:04X}h"))
 }
 
-/// Begins a block download of two bytes; the server's block size.
+/// Begins a block download of two bytes. Returns the block size of the server.
 fn begin_download(s: &mut Subject<'_>, index: u16, crc: bool) -> Outcome<BlockSize> {
     s.need_writable(index, 0)?;
     let value = s.read(index, 0)?;
@@ -191,7 +192,7 @@ fn single_segments(s: &mut Subject<'_>) -> Outcome {
 
 fn lost_segment(s: &mut Subject<'_>) -> Outcome {
     begin_download(s, 0x1017, false)?;
-    // Segment 2 comes without segment 1.
+    // Segment 1 is left out.
     let acknowledge = s.ask(only_segment(2, [0x10, 0x27]))?;
     s.give_up(0x1017, 0)?;
     let acknowledge = acknowledge.ok_or_else(|| fail("an acknowledge", "none"))?;

@@ -1,4 +1,4 @@
-//! Expedited transfers, and the abort codes that a client relies on.
+//! Checks of expedited transfers, and of the abort codes that clients depend on.
 
 use canopen::sdo::{Request, Response};
 use eds::{Class, Entry};
@@ -63,7 +63,7 @@ fn upload(s: &mut Subject<'_>) -> Outcome {
     ensure(answer[0] & 0xE2 == 0x42, "an expedited response", format!("{answer:02X?}"))
 }
 
-/// A parameter of four bytes that takes its own value at any time.
+/// A parameter of four bytes that accepts its own value at any time.
 fn plain(s: &mut Subject<'_>) -> Outcome<(u16, u8)> {
     let entries = s.entries(|entry| {
         let is_guarded = matches!(entry.index, 0x1005..=0x1007 | 0x1014 | 0x1016 | 0x1200..=0x1FFF);
@@ -104,7 +104,7 @@ fn absent_sub_write(s: &mut Subject<'_>) -> Outcome {
     s.aborts([0x23, 0x18, 0x10, 5, 0, 0, 0, 0], &[abort::NO_SUB_INDEX])
 }
 
-/// An index that CiA 301 reserves: 0FFFh of the data types, and no device has it.
+/// Reads 0FFFh, an index that CiA 301 reserves and that no device has.
 fn absent_object_read(s: &mut Subject<'_>) -> Outcome {
     s.hides(0x0FFF, 0, &[abort::NO_OBJECT])
 }

@@ -1,4 +1,4 @@
-//! Service data objects (CiA 301, 7.2.4).
+//! Checks of service data objects (CiA 301, 7.2.4).
 
 mod block;
 mod expedited;

@@ -1,4 +1,4 @@
-//! Segmented transfers.
+//! Checks of segmented transfers.
 
 use canopen::sdo::{Bytes, Initiate, Request, Response, Segment};
 
@@ -47,7 +47,7 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// What is long in any device that has it: name and versions.
+/// An object with a long value: the name or a version of the device.
 fn long(s: &mut Subject<'_>) -> Outcome<u16> {
     for index in [0x1008, 0x100A, 0x1009] {
         if let Response::UploadSegmented(..) = s.respond(Request::Upload(at(index, 0)))? {

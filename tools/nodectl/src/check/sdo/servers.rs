@@ -1,4 +1,4 @@
-//! Objects 1200h to 12FFh: the COB-IDs of servers and clients.
+//! Checks of objects 1200h to 12FFh, the COB-IDs of SDO servers and clients.
 
 use super::super::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Saving and restoring parameters (CiA 301, 7.5.2.13 and 7.5.2.14).
+//! Checks of saving and restoring parameters (CiA 301, 7.5.2.13 and 7.5.2.14).
 
 mod restore;
 mod save;

@@ -1,4 +1,4 @@
-//! 1011h brings the defaults back, with the next restart.
+//! Checks that 1011h restores the defaults with the next restart.
 
 use super::super::prelude::*;
 
@@ -12,7 +12,7 @@ pub(super) const CHECKS: &[Check] = &[
         .stores(),
 ];
 
-/// Saves 1017h with another value than its default; the default.
+/// Saves 1017h with another value than its default. Returns the default.
 fn spoil(s: &mut Subject<'_>) -> Outcome<u32> {
     s.need_writable(0x1017, 0)?;
     let default = s.number(0x1017, 0)?;

@@ -1,4 +1,4 @@
-//! What is saved is there after a restart; what is not, is not.
+//! Checks that saved values survive a restart, and that other values do not.
 
 use super::super::prelude::*;
 
@@ -34,7 +34,8 @@ pub(super) const CHECKS: &[Check] = &[
     .stores(),
 ];
 
-/// Saves a value by a sub-index of 1010h and restarts; whether it is still there. The former value is saved again.
+/// Saves a value by a sub-index of 1010h and restarts. Returns whether the value has survived. The former value is
+/// saved again.
 fn keeps(
     s: &mut Subject<'_>,
     (index, sub): (u16, u8),
@@ -110,7 +111,7 @@ fn client(s: &mut Subject<'_>) -> Outcome {
     is_kept(s, (0x1280, 1), &(OFF | 0x680).to_le_bytes())
 }
 
-/// A parameter of the application that takes any value: the first that takes its own value with another lowest bit.
+/// Checks the first parameter of the application that accepts a value with another lowest bit.
 fn application(s: &mut Subject<'_>) -> Outcome {
     let entries = s.entries(|entry| {
         let is_own = entry.index >= 0x2000 && crate::configuration::is_parameter(entry);

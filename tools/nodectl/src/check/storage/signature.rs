@@ -1,4 +1,4 @@
-//! The signatures that show that a save or a restore is meant.
+//! Checks of the signatures that protect saving and restoring.
 
 use super::super::prelude::*;
 

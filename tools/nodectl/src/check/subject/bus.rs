@@ -1,4 +1,4 @@
-//! Frames: what is sent, and what the device sends of its own.
+//! Sending of frames, and the log of the frames of the device.
 
 use canopen::{Duration, Frame};
 
@@ -12,12 +12,12 @@ use crate::check::verdict::skip;
 pub(in crate::check) struct Mark(usize);
 
 impl Subject<'_> {
-    /// From here on.
+    /// The present end of the log.
     pub(in crate::check) fn mark(&self) -> Mark {
         Mark(self.network.log().len())
     }
 
-    /// Lets so many milliseconds pass.
+    /// Lets `ms` milliseconds pass.
     pub(in crate::check) fn pass(&mut self, ms: u64) -> Outcome {
         self.network.pause(Duration::from_millis(ms))?;
         self.network.forget();
@@ -41,12 +41,12 @@ impl Subject<'_> {
         }
     }
 
-    /// What has come since then.
+    /// The frames that have come since a place in the log.
     pub(in crate::check) fn since(&self, mark: Mark) -> impl Iterator<Item = &Logged> {
         self.network.log().iter().skip(mark.0).filter(|logged| !logged.is_sent)
     }
 
-    /// The data frames with this CAN-ID that have come since then.
+    /// The data frames with this CAN-ID that have come since a place in the log.
     pub(in crate::check) fn heard(&self, mark: Mark, id: u16) -> Vec<Logged> {
         self.since(mark)
             .filter(|logged| logged.frame.id() == id && !logged.frame.is_remote())
@@ -59,7 +59,7 @@ impl Subject<'_> {
         self.heard(Mark(0), id).last().copied()
     }
 
-    /// The first data frame with this CAN-ID since then; waits so many milliseconds for one.
+    /// The first data frame with this CAN-ID since a place in the log. Waits up to `ms` milliseconds for the frame.
     pub(in crate::check) fn next(&mut self, mark: Mark, id: u16, ms: u64) -> Outcome<Option<Logged>> {
         let until = self.network.now() + Duration::from_millis(ms);
         loop {
@@ -74,13 +74,13 @@ impl Subject<'_> {
         }
     }
 
-    /// Sends a SYNC, and lets time pass until it has its effect.
+    /// Sends a SYNC, and waits until the SYNC has had its effect.
     pub(in crate::check) fn sync(&mut self) -> Outcome {
         self.send(0x080, &[])?;
         self.pass(20)
     }
 
-    /// Nothing is sent that is for all nodes while others are on the bus.
+    /// Skips the check while other nodes are on the bus. Needed before sending a frame that is for all nodes.
     pub(in crate::check) fn need_solitude(&self) -> Outcome {
         if self.has_company {
             Err(skip("other nodes are on the bus, and the frame would be for them too"))
@@ -89,7 +89,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Listens for this long whether there are others.
+    /// Listens for this time whether other nodes are on the bus.
     pub(in crate::check) fn look_round(&mut self, ms: u64) -> Outcome {
         let mark = self.mark();
         self.pass(ms)?;

@@ -9,10 +9,10 @@ use crate::check::verdict::{fail, skip};
 /// How long a device may take to change its state.
 const SETTLE: u64 = 20;
 
-/// How long a heartbeat of a fixed time is waited for.
+/// How long to wait for a heartbeat with a fixed period.
 const SLOWEST: u64 = 2500;
 
-/// After this time a device that answers again is taken for booted, even without a boot-up message.
+/// After this time a device that answers again counts as booted, even without a boot-up message.
 const MUTE: u64 = 1500;
 
 impl Subject<'_> {
@@ -21,7 +21,7 @@ impl Subject<'_> {
         self.send(0x000, &command.encode(Some(self.setup.node)))
     }
 
-    /// Brings the device into a state, and gives it a little time.
+    /// Brings the device into a state, and waits a short time.
     pub(in crate::check) fn enter(&mut self, state: State) -> Outcome {
         self.command(match state {
             State::Operational => Command::Start,
@@ -36,7 +36,8 @@ impl Subject<'_> {
         0x700 + self.id()
     }
 
-    /// Switches a heartbeat on; skipped where the device has none. A device whose heartbeat time is fixed has the one it has.
+    /// Switches the heartbeat on; skipped where the device has no 1017h. A device with a fixed heartbeat time keeps its
+    /// time.
     pub(in crate::check) fn beat(&mut self, ms: u16) -> Outcome {
         self.need(0x1017, 0)?;
         match self.change(0x1017, 0, &ms.to_le_bytes())? {
@@ -47,7 +48,7 @@ impl Subject<'_> {
         }
     }
 
-    /// The state that the next heartbeat tells; a heartbeat has to be on.
+    /// The state in the next heartbeat. The heartbeat has to be on.
     pub(in crate::check) fn told_state(&mut self) -> Outcome<u8> {
         let (mark, id) = (self.mark(), self.error_control());
         let heard = match self.next(mark, id, 500)? {
@@ -58,7 +59,7 @@ impl Subject<'_> {
         heard.frame.data().first().copied().ok_or_else(|| fail("a heartbeat of one byte", "no byte"))
     }
 
-    /// The next heartbeat tells this state.
+    /// Demands that the next heartbeat tells this state.
     pub(in crate::check) fn tells(&mut self, state: State) -> Outcome {
         let seen = self.told_state()?;
         if seen == state.code() {
@@ -78,7 +79,7 @@ impl Subject<'_> {
             if boot_ups > 0 {
                 return self.pass(SETTLE);
             }
-            // A boot-up message that says something else than 0 is for NMT-01 to tell; the other checks go on.
+            // Check NMT-01 reports a boot-up message whose data is not 0. The other checks accept such a message.
             let is_back =
                 time - left > MUTE && self.heard(mark, id).iter().any(|heard| heard.frame.data() != [0]);
             if is_back && self.is_served()? {
@@ -91,7 +92,7 @@ impl Subject<'_> {
         }
     }
 
-    /// The device rests in Pre-operational after a restart; one that starts by itself is skipped.
+    /// Skips the check where the device starts by itself after a restart, instead of staying in Pre-operational.
     pub(in crate::check) fn need_no_self_start(&mut self) -> Outcome {
         match self.optional(0x1F80, 0)? {
             Some(value) if value & 0x04 == 0 && value != 0 => {

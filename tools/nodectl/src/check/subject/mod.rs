@@ -1,4 +1,4 @@
-//! The device that is checked, as the checks use it.
+//! The device under test, as the checks use it.
 
 mod bus;
 mod control;
@@ -19,7 +19,7 @@ pub(in crate::check) use pdo::{OFF, Pdo, RPDO, TPDO};
 pub(in crate::check) use sdo::{Refusal, abort};
 pub(in crate::check) use sheet::size;
 
-/// What a check needs, in one line.
+/// The names that every check needs.
 pub(in crate::check) mod prelude {
     pub(in crate::check) use canopen::nmt::{Command, State};
 
@@ -28,26 +28,26 @@ pub(in crate::check) mod prelude {
     pub(in crate::check) use super::{OFF, RPDO, Refusal, TPDO, abort};
 }
 
-/// What is known of the device before its checks.
+/// The settings for a device under test.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// Its node-ID.
+    /// The node-ID.
     pub node: NodeId,
-    /// Its data sheet, where there is one.
+    /// The data sheet, where there is one.
     pub sheet: Option<Eds>,
-    /// How long it may take to answer.
+    /// The time-out for an answer.
     pub timeout: Duration,
-    /// How long it may take to boot.
+    /// The time-out for booting.
     pub boot: Duration,
 }
 
-/// The device on the bus, and what a check has done to it.
+/// The device on the bus, and the changes that a check has made.
 pub struct Subject<'n> {
     pub(super) network: &'n mut Network,
     setup: Setup,
-    /// What was written, and the bytes that were there before; the newest last.
+    /// The objects that were written, with their former bytes; the newest is the last.
     pub(super) written: Vec<(Multiplexer, Vec<u8>)>,
-    /// Whether other nodes were heard on the bus: nothing is sent then that is for all nodes.
+    /// Whether other nodes were heard on the bus. Then no frames for all nodes are sent.
     has_company: bool,
 }
 
@@ -57,13 +57,13 @@ impl<'n> Subject<'n> {
         Subject { network, setup, written: Vec::new(), has_company: false }
     }
 
-    /// Its node-ID.
+    /// The node-ID.
     #[must_use]
     pub fn node(&self) -> NodeId {
         self.setup.node
     }
 
-    /// Its node-ID as a number.
+    /// The node-ID as a number.
     pub(in crate::check) fn id(&self) -> u16 {
         self.setup.node.get().into()
     }

@@ -1,4 +1,4 @@
-//! PDOs of the device: which there are, and how one is configured (CiA 301, 7.5.2.36 and 7.5.2.38).
+//! PDOs of the device and their configuration (CiA 301, 7.5.2.36 and 7.5.2.38).
 
 use canopen::nmt::State;
 use canopen::pdo::MappedObject;
@@ -14,7 +14,7 @@ use crate::pdo_parameters::slots;
 
 /// Bit 31 of a COB-ID: the PDO does not exist.
 pub(in crate::check) const OFF: u32 = 1 << 31;
-/// Bit 30 of the COB-ID of a TPDO: no remote frame is answered.
+/// Bit 30 of the COB-ID of a TPDO: the device answers no remote frame.
 const NO_RTR: u32 = 1 << 30;
 
 /// The first communication object of each direction.
@@ -24,33 +24,34 @@ pub(in crate::check) const TPDO: u16 = 0x1800;
 /// A PDO of the device, switched off.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::check) struct Pdo {
-    /// The index of its communication object.
+    /// The index of the communication object.
     pub(in crate::check) index: u16,
-    /// The value of its COB-ID entry when it is on.
+    /// The value of the COB-ID entry when the PDO is on.
     pub(in crate::check) cob_id: u32,
 }
 
 impl Pdo {
-    /// Its CAN-ID.
+    /// The CAN-ID.
     #[allow(clippy::cast_possible_truncation)] // Eleven bits.
     pub(in crate::check) const fn id(self) -> u16 {
         (self.cob_id & 0x7FF) as u16
     }
 
-    /// The index of its mapping object.
+    /// The index of the mapping object.
     pub(in crate::check) const fn mapping(self) -> u16 {
         self.index | 0x0200
     }
 }
 
 impl Subject<'_> {
-    /// The communication objects of a direction that the device has: of those of the data sheet, else of the first eight.
+    /// The communication objects of a direction that the device has, out of the first eight of the data sheet; without
+    /// a data sheet, out of the first eight indices.
     pub(in crate::check) fn pdos(&mut self, first: u16) -> Outcome<Vec<u16>> {
         let candidates: Vec<u16> = match self.sheet() {
             Ok(sheet) => sheet.objects.range(first..first + 0x200).map(|(index, _)| *index).take(8).collect(),
             Err(_) => (first..first + 8).collect(),
         };
-        // In a lift these two carry calls, one message each, and nothing before the first.
+        // In a lift these two PDOs carry calls: each call is one message, and nothing is sent before the first call.
         let is_lift = self.number(0x1000, 0)? & 0xFFFF == 417;
         let is_of_calls = |index: u16| is_lift && matches!(index, 0x1881 | 0x1900);
         let mut found = Vec::new();
@@ -62,8 +63,8 @@ impl Subject<'_> {
         Ok(found)
     }
 
-    /// A PDO of a direction, switched off: the first that is on, else the first. Skipped where the device has none. Multiplexed
-    /// PDOs, whose mapping has no objects, do not count.
+    /// A PDO of a direction, switched off: the first PDO that is on, else the first PDO. Skipped where the device has
+    /// none. Multiplexed PDOs do not count, because their mapping has no objects.
     pub(in crate::check) fn pdo(&mut self, first: u16) -> Outcome<Pdo> {
         let name = if first == TPDO { "TPDO" } else { "RPDO" };
         let mut candidates = self.pdos(first)?;
@@ -85,13 +86,15 @@ impl Subject<'_> {
         let free = if first == TPDO { 0x180 } else { 0x200 } + u32::from(self.id());
         let id = if before & 0x7FF == 0 { free } else { before & 0x7FF };
         let no_rtr = if first == TPDO { NO_RTR } else { 0 };
-        // A device without remote frames takes the COB-ID only with bit 30, one with them takes either.
+        // A device without remote frames accepts the COB-ID with bit 30 only. A device with remote frames accepts
+        // either.
         let pdo = Pdo { index, cob_id: before & no_rtr | id };
         self.set_if_supported(index, 1, before | OFF)?;
         Ok(pdo)
     }
 
-    /// A PDO that is off as the device is now, and whose mapping is fixed, waits for something that no clause of CiA 301 names.
+    /// Skips the check where a PDO is off by default and its mapping is fixed. Such a PDO needs an activation that no
+    /// clause of CiA 301 names.
     fn need_free_mapping(&mut self, mapping: u16, name: &str) -> Outcome {
         let before = self.read(mapping, 0)?;
         match self.try_write(mapping, 0, &[0])? {
@@ -102,7 +105,7 @@ impl Subject<'_> {
         }
     }
 
-    /// A TPDO with one mapped object, of this transmission type and with this event timer; still switched off.
+    /// A TPDO with one mapped object, this transmission type and this event timer, still switched off.
     pub(in crate::check) fn tpdo(&mut self, transmission: u32, event_timer: u32) -> Outcome<Pdo> {
         let pdo = self.pdo(TPDO)?;
         self.set_if_supported(pdo.index, 2, transmission)?;
@@ -118,7 +121,7 @@ impl Subject<'_> {
         Ok(pdo)
     }
 
-    /// Maps an object into a PDO that is empty.
+    /// Maps an object into a PDO, if the PDO is empty.
     pub(in crate::check) fn fill(&mut self, pdo: Pdo) -> Outcome {
         if matches!(self.number(pdo.mapping(), 0)?, 1..=64) {
             return Ok(());
@@ -148,7 +151,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Switches a TPDO on that is configured, enters a state, and counts its frames in this time.
+    /// Switches a configured TPDO on, enters a state, and counts the frames of the TPDO within a time.
     pub(in crate::check) fn count(&mut self, pdo: Pdo, state: State, ms: u64) -> Outcome<usize> {
         self.switch_on(pdo)?;
         self.enter(state)?;
@@ -157,7 +160,7 @@ impl Subject<'_> {
         Ok(self.heard(mark, pdo.id()).len())
     }
 
-    /// Empties the mapping of a PDO that is switched off, for what a check maps. Skipped where the mapping is fixed.
+    /// Empties the mapping of a PDO that is off, so that a check can map objects. Skipped where the mapping is fixed.
     pub(in crate::check) fn empty(&mut self, pdo: Pdo) -> Outcome {
         let before = self.read(pdo.mapping(), 0)?;
         self.written.push((at(pdo.mapping(), 0), before));
@@ -167,7 +170,7 @@ impl Subject<'_> {
         }
     }
 
-    /// What the mapping of a PDO holds, object by object, with the length in bits.
+    /// The mapped objects of a PDO with their lengths in bits.
     pub(in crate::check) fn mapping(&mut self, pdo: u16) -> Outcome<Vec<(Multiplexer, u8)>> {
         let count = self.number(pdo | 0x0200, 0)?;
         let mut objects = Vec::new();

@@ -1,4 +1,4 @@
-//! Objects of the device by SDO: read, written, refused.
+//! Access to the objects of the device by SDO, with and without an expected refusal.
 
 use canopen::Duration;
 use canopen::client::sdo::Error;
@@ -38,7 +38,7 @@ pub(in crate::check) mod abort {
     pub(in crate::check) const NO_DATA: u32 = 0x0800_0024;
 }
 
-/// A transfer that the device refused: its abort code.
+/// The abort code of a transfer that the device has refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::check) struct Refusal(pub(in crate::check) u32);
 
@@ -48,13 +48,13 @@ impl std::fmt::Display for Refusal {
     }
 }
 
-/// Any of these codes, in words.
+/// The texts of several abort codes.
 pub(super) fn any_of(codes: &[u32]) -> String {
     let codes: Vec<String> = codes.iter().map(|code| Refusal(*code).to_string()).collect();
     codes.join(" or ")
 }
 
-/// What came of a transfer, in words.
+/// The result of a transfer as a text.
 pub(super) fn result(result: std::result::Result<Vec<u8>, Refusal>) -> String {
     match result {
         Ok(bytes) if bytes.is_empty() => "done".to_owned(),
@@ -64,13 +64,13 @@ pub(super) fn result(result: std::result::Result<Vec<u8>, Refusal>) -> String {
 }
 
 impl Subject<'_> {
-    /// Sends eight bytes to the SDO server; the answer, if one came in time.
+    /// Sends eight bytes to the SDO server. Returns the answer, if one comes in time.
     pub(in crate::check) fn ask(&mut self, request: [u8; 8]) -> Outcome<Option<[u8; 8]>> {
         let time = self.setup.timeout.0 / 1000;
         self.ask_within(request, time)
     }
 
-    /// The same with so many milliseconds for the answer.
+    /// Sends eight bytes to the SDO server. Returns the answer, if one comes within `ms` milliseconds.
     pub(in crate::check) fn ask_within(&mut self, request: [u8; 8], ms: u64) -> Outcome<Option<[u8; 8]>> {
         let mark = self.mark();
         self.send(0x600 + self.id(), &request)?;
@@ -80,13 +80,13 @@ impl Subject<'_> {
         whole.map(Some).map_err(|_| fail("an answer of eight bytes", format!("{} bytes", data.len())))
     }
 
-    /// The answer that has to come.
+    /// Sends a request and demands an answer.
     pub(in crate::check) fn answer(&mut self, request: [u8; 8]) -> Outcome<[u8; 8]> {
         let expected = format!("an answer to the request {request:02X?}");
         self.ask(request)?.ok_or_else(|| fail(expected, "none in time"))
     }
 
-    /// The abort code that has to come.
+    /// Sends a request and demands an abort with one of these codes.
     pub(in crate::check) fn aborts(&mut self, request: [u8; 8], codes: &[u32]) -> Outcome {
         let answer = self.answer(request)?;
         let code = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
@@ -104,7 +104,7 @@ impl Subject<'_> {
         Client::new(self.network, self.setup.node, options)
     }
 
-    /// Reads an object; or how the device refused.
+    /// Reads an object. Returns its bytes, or the abort code of the device.
     pub(in crate::check) fn try_read(
         &mut self,
         index: u16,
@@ -114,7 +114,7 @@ impl Subject<'_> {
         judged(result, "a correct upload")
     }
 
-    /// Writes an object, without a note of what was there before; or how the device refused.
+    /// Writes an object without noting its former value. Returns the abort code if the device refuses.
     pub(in crate::check) fn try_write(
         &mut self,
         index: u16,
@@ -125,7 +125,7 @@ impl Subject<'_> {
         judged(result, "a correct download")
     }
 
-    /// Reads an object in blocks; or how the device refused.
+    /// Reads an object in blocks. Returns its bytes, or the abort code of the device.
     pub(in crate::check) fn try_block_read(
         &mut self,
         index: u16,
@@ -135,7 +135,7 @@ impl Subject<'_> {
         judged(result, "a correct block upload")
     }
 
-    /// Writes an object in blocks; or how the device refused.
+    /// Writes an object in blocks. Returns the abort code if the device refuses.
     pub(in crate::check) fn try_block_write(
         &mut self,
         index: u16,
@@ -146,13 +146,13 @@ impl Subject<'_> {
         judged(result, "a correct block download")
     }
 
-    /// The bytes of an object that has to be readable.
+    /// The bytes of an object that must be readable.
     pub(in crate::check) fn read(&mut self, index: u16, sub: u8) -> Outcome<Vec<u8>> {
         let place = Place(at(index, sub));
         self.try_read(index, sub)?.map_err(|refusal| fail(format!("{place} can be read"), refusal))
     }
 
-    /// An unsigned number of up to four bytes.
+    /// The value of an object as an unsigned number of up to four bytes.
     pub(in crate::check) fn number(&mut self, index: u16, sub: u8) -> Outcome<u32> {
         let bytes = self.read(index, sub)?;
         let mut word = [0; 4];
@@ -184,7 +184,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Skips the check where the device does not have an object, or not for us to write.
+    /// Skips the check where the device does not have the object, or does not let us write it.
     pub(in crate::check) fn need_writable(&mut self, index: u16, sub: u8) -> Outcome {
         self.need(index, sub)?;
         let value = self.read(index, sub)?;
@@ -196,19 +196,19 @@ impl Subject<'_> {
         }
     }
 
-    /// Writes bytes that have to be taken. What was there before is written back after the check.
+    /// Writes an object and demands success. The former value is written back after the check.
     pub(in crate::check) fn write(&mut self, index: u16, sub: u8, value: &[u8]) -> Outcome {
         let place = Place(at(index, sub));
         let expected = format!("{place} takes {value:02X?}");
         self.change(index, sub, value)?.map_err(|refusal| fail(expected, refusal))
     }
 
-    /// This value is written back after the check.
+    /// Notes a value that is written back after the check.
     pub(in crate::check) fn remember(&mut self, at: Multiplexer, before: Vec<u8>) {
         self.written.push((at, before));
     }
 
-    /// Writes bytes that may be refused. What was there before is written back after the check.
+    /// Writes an object, which the device may refuse. The former value is written back after the check.
     pub(in crate::check) fn change(
         &mut self,
         index: u16,
@@ -221,19 +221,19 @@ impl Subject<'_> {
         self.try_write(index, sub, value)
     }
 
-    /// A number in as many bytes as the object has.
+    /// A number as the bytes of an object, in the length of the object.
     fn sized(&mut self, index: u16, sub: u8, value: u32) -> Outcome<Vec<u8>> {
         let size = self.read(index, sub)?.len().min(4);
         Ok(value.to_le_bytes()[..size].to_vec())
     }
 
-    /// Writes a number that has to be taken.
+    /// Writes a number and demands success.
     pub(in crate::check) fn set(&mut self, index: u16, sub: u8, value: u32) -> Outcome {
         let bytes = self.sized(index, sub, value)?;
         self.write(index, sub, &bytes)
     }
 
-    /// Writes a number that the device may not support: skipped then.
+    /// Writes a number. Skips the check where the device does not support the number.
     pub(in crate::check) fn set_if_supported(&mut self, index: u16, sub: u8, value: u32) -> Outcome {
         let bytes = self.sized(index, sub, value)?;
         let place = Place(at(index, sub));
@@ -241,19 +241,19 @@ impl Subject<'_> {
         self.change(index, sub, &bytes)?.map_err(refused)
     }
 
-    /// Reads back a number that was written.
+    /// Demands that an object has this number.
     pub(in crate::check) fn holds(&mut self, index: u16, sub: u8, value: u32) -> Outcome {
         let seen = self.number(index, sub)?;
         ensure(seen == value, format!("{} holds {value:X}h", Place(at(index, sub))), format!("{seen:X}h"))
     }
 
-    /// Writes a number that has to be refused with one of these codes.
+    /// Writes a number and demands a refusal with one of these codes.
     pub(in crate::check) fn refuses(&mut self, index: u16, sub: u8, value: u32, codes: &[u32]) -> Outcome {
         let bytes = self.sized(index, sub, value)?;
         self.refuses_bytes(index, sub, &bytes, codes)
     }
 
-    /// Writes bytes that have to be refused with one of these codes.
+    /// Writes bytes and demands a refusal with one of these codes.
     pub(in crate::check) fn refuses_bytes(
         &mut self,
         index: u16,
@@ -270,7 +270,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Reads what has to be refused with one of these codes.
+    /// Reads an object and demands a refusal with one of these codes.
     pub(in crate::check) fn hides(&mut self, index: u16, sub: u8, codes: &[u32]) -> Outcome {
         let read = self.try_read(index, sub)?;
         let expected = format!("{} for the upload of {}", any_of(codes), Place(at(index, sub)));
@@ -286,13 +286,13 @@ impl Subject<'_> {
         Ok(answer.is_some_and(|answer| answer[0] >> 5 == 2))
     }
 
-    /// The device still serves SDO.
+    /// Demands that the device still serves SDO.
     pub(in crate::check) fn serves(&mut self, after: &str) -> Outcome {
         let is_served = self.is_served()?;
         ensure(is_served, format!("1000h can be read after {after}"), "no answer")
     }
 
-    /// Switches the PDOs off that were changed: what guards them must not be in the way.
+    /// Switches the changed PDOs off, because a PDO in use refuses changes of its parameters.
     fn switch_off(&mut self, written: &[(Multiplexer, Vec<u8>)]) -> Outcome {
         let mut pdos: Vec<u16> = written.iter().map(|(at, _)| at.index & !0x0200).collect();
         pdos.retain(|index| is_communication(*index));
@@ -305,19 +305,19 @@ impl Subject<'_> {
                     .enumerate()
                     .map(|(i, byte)| if i == 3 { byte | 0x80 } else { *byte })
                     .collect();
-                // A device that refuses shows it when the values are written back.
+                // A refusal here shows up again when the values are written back.
                 let _ = self.try_write(index, 1, &off)?;
             }
         }
         Ok(())
     }
 
-    /// Writes back what was written, the newest first, and what has another value now than before.
+    /// Writes back the objects whose value has changed, the newest first.
     pub(in crate::check) fn put_back(&mut self) -> Outcome {
         let written = std::mem::take(&mut self.written);
         let mut refused = Vec::new();
         self.switch_off(&written)?;
-        // A PDO is on again when all else of it is as before.
+        // A PDO is switched on last, after its other parameters are restored.
         let is_switch = |at: &Multiplexer| at.sub == 1 && is_communication(at.index);
         let (switches, others): (Vec<_>, Vec<_>) = written.into_iter().partition(|(at, _)| is_switch(at));
         let mut first: Vec<(Multiplexer, Vec<u8>)> = Vec::new();
@@ -338,12 +338,12 @@ impl Subject<'_> {
     }
 }
 
-/// Whether the index is that of the communication parameters of a PDO.
+/// Whether an index belongs to the communication parameters of a PDO.
 const fn is_communication(index: u16) -> bool {
     matches!(index, 0x1400..=0x15FF | 0x1800..=0x19FF)
 }
 
-/// A refusal is a result; anything else that goes wrong breaks the protocol.
+/// Returns a refusal as a result. Any other error of the transfer is a deviation from the protocol.
 fn judged<T>(
     result: std::result::Result<T, crate::sdo::Error>,
     expected: &str,

@@ -1,4 +1,4 @@
-//! Transfers frame by frame, for what a client does not do of itself.
+//! Transfers frame by frame, for situations that a normal client does not produce.
 
 use canopen::sdo::{Bytes, Initiate, Request, Response, Segment};
 
@@ -8,14 +8,14 @@ use crate::check::verdict::{fail, skip};
 use crate::object::at;
 
 impl Subject<'_> {
-    /// The answer to a request, as what it means.
+    /// Sends a request and returns the decoded response.
     pub(in crate::check) fn respond(&mut self, request: Request) -> Outcome<Response> {
         let answer = self.answer(request.encode())?;
         Response::parse(answer)
             .ok_or_else(|| fail("an answer with a command specifier of CiA 301", format!("{answer:02X?}")))
     }
 
-    /// Downloads in segments, however short the value is.
+    /// Downloads in segments, also a short value.
     pub(in crate::check) fn segmented(
         &mut self,
         index: u16,
@@ -50,7 +50,8 @@ impl Subject<'_> {
         Ok(Ok(()))
     }
 
-    /// Begins an upload in segments, and gives the size that the device announces. Skipped where it is not segmented.
+    /// Begins an upload in segments. Returns the size that the device announces. Skipped where the upload is not
+    /// segmented.
     pub(in crate::check) fn begin_segmented_upload(&mut self, index: u16, sub: u8) -> Outcome<Option<u32>> {
         match self.respond(Request::Upload(at(index, sub)))? {
             Response::UploadSegmented(_, size) => Ok(size),
@@ -59,7 +60,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Uploads in segments: all segments as they came.
+    /// Uploads in segments. Returns all segments as they came.
     pub(in crate::check) fn segments(&mut self) -> Outcome<Vec<Segment>> {
         let mut segments: Vec<Segment> = Vec::new();
         while segments.last().is_none_or(|segment| !segment.last) {
@@ -72,7 +73,7 @@ impl Subject<'_> {
         Ok(segments)
     }
 
-    /// The client gives up, so that the next transfer begins anew.
+    /// Aborts a transfer, so that the next transfer starts afresh.
     pub(in crate::check) fn give_up(&mut self, index: u16, sub: u8) -> Outcome {
         let request = Request::Abort(at(index, sub), 0x0800_0000).encode();
         self.send(0x600 + self.id(), &request)?;

@@ -1,4 +1,4 @@
-//! What the data sheet says of the device.
+//! The data sheet of the device.
 
 use eds::{Class, Eds, Entry};
 
@@ -12,12 +12,12 @@ impl Subject<'_> {
         self.setup.sheet.clone().ok_or_else(|| skip("no data sheet: give it with --eds"))
     }
 
-    /// The entries of the data sheet that are wanted.
+    /// The entries of the data sheet that fulfil a condition.
     pub(in crate::check) fn entries(&self, is_wanted: impl Fn(&Entry) -> bool) -> Outcome<Vec<Entry>> {
         Ok(self.sheet()?.entries().filter(|entry| is_wanted(entry)).cloned().collect())
     }
 
-    /// The first entry of the data sheet that is wanted; skipped where there is none.
+    /// The first entry of the data sheet that fulfils a condition; skipped where there is none.
     pub(in crate::check) fn entry(&self, what: &str, is_wanted: impl Fn(&Entry) -> bool) -> Outcome<Entry> {
         let sheet = self.sheet()?;
         sheet
@@ -28,7 +28,7 @@ impl Subject<'_> {
     }
 }
 
-/// The bytes that a value of a number type has; `None` for text and bytes.
+/// The size of a value in bytes, for a number type; `None` for text and bytes.
 pub(in crate::check) fn size(entry: &Entry) -> Option<usize> {
     match entry.data_type.class() {
         Class::Signed(bits) | Class::Unsigned(bits) | Class::Real(bits) => {

@@ -1,4 +1,4 @@
-//! Synchronisation (CiA 301, 7.2.5).
+//! Checks of synchronisation (CiA 301, 7.2.5).
 
 mod objects;
 mod producer;

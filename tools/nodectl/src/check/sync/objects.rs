@@ -1,4 +1,4 @@
-//! 1005h, 1006h, 1007h and 1019h.
+//! Checks of 1005h, 1006h, 1007h and 1019h.
 
 use super::super::prelude::*;
 

@@ -1,4 +1,4 @@
-//! The SYNC that the device itself sends, which is optional.
+//! Checks of the SYNC producer, which is optional.
 
 use super::super::prelude::*;
 use crate::Logged;
@@ -17,7 +17,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check::new("SYN-25", "Without bit 30 of 1005h no SYNC is sent", "CiA 301, 7.5.2.5", off),
 ];
 
-/// Makes the device a producer with a period of 100 ms. Skipped where it cannot be one.
+/// Makes the device a SYNC producer with a period of 100 ms. Skipped where the device cannot be one.
 fn produce(s: &mut Subject<'_>, overflow: u32) -> Outcome {
     s.need_solitude()?;
     s.need(0x1006, 0)?;

@@ -16,7 +16,7 @@ use super::{Failure, Session};
 use crate::heartbeat;
 use crate::lss::{Master, Selection};
 
-/// How long a node may take to boot with a new node-ID, at least.
+/// The minimum time to wait for a node that boots with a new node-ID.
 const BOOT: Duration = Duration::from_millis(2000);
 
 /// Node-IDs and bit rates of nodes that are known by their identity (CiA 305).
@@ -91,7 +91,7 @@ impl Lss {
         let mut master = Master::new(&mut session.network, timeout);
         master.select(selection)?;
         let done = self.serve(&mut master);
-        // Whatever came of it, no slave is left waiting for more.
+        // Release all slaves in any case, also after an error.
         let released = master.release();
         let done = done?;
         released?;
@@ -104,7 +104,7 @@ impl Lss {
         done.print(session)
     }
 
-    /// Whom the command is for. What cannot be is refused before anybody is selected.
+    /// The slaves that the command is for. Wrong arguments are refused before any slave is selected.
     fn selection(&self, session: &mut Session) -> Result<Selection, Failure> {
         if let Command::SetRate { kbit, .. } = self.command {
             bit_rate(kbit)?;
@@ -160,7 +160,7 @@ impl Lss {
     }
 }
 
-/// What there is to print.
+/// The result to print.
 enum Answer {
     Slave(Slave),
     Done(Done),
@@ -188,12 +188,12 @@ impl Answer {
     }
 }
 
-/// How long a step of a search may take.
+/// The duration of a step of a search.
 fn step(session: &Session, given: Option<u32>) -> Duration {
     given.map_or(Duration(session.options.timeout().0 / 10), |step| Duration::from_millis(step.into()))
 }
 
-/// Refuses a node-ID that somebody else has.
+/// Refuses a node-ID that another node has.
 pub(super) fn free(session: &mut Session, id: NodeId, identity: &Identity) -> Result<(), Failure> {
     let is_used = only::configured(session)?.contains_key(&id);
     if is_used && only::identity(session, id).ok().as_ref() != Some(identity) {

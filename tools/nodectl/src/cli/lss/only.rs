@@ -1,4 +1,4 @@
-//! Who would take a command that names no node: it must be one, and no more.
+//! Finds the only node on the bus, for a command without `--select`. Fails where there are several nodes.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +11,12 @@ use crate::lss::Master;
 use crate::object::at;
 use crate::scan::{Presence, scan};
 
-/// Heartbeats usually come once a second.
+/// How long to listen for heartbeats, which usually come once a second.
 const LISTEN: Duration = Duration::from_millis(1200);
-/// So many nodes are named; more are not looked for.
+/// The number of nodes that the error names. The search for further nodes ends there.
 const NAMED: usize = 4;
 
-/// The nodes that have a node-ID and answer, or send a heartbeat.
+/// The nodes with a node-ID that answer or send a heartbeat.
 pub(super) fn configured(session: &mut Session) -> Result<BTreeMap<NodeId, Presence>, Failure> {
     Ok(scan(&mut session.network, LISTEN)?)
 }
@@ -43,7 +43,7 @@ pub(super) fn only(session: &mut Session) -> Result<Identity, Failure> {
     }
 }
 
-/// The nodes without a node-ID. Each that is found stays selected and takes no part in the search for the next.
+/// The nodes without a node-ID. A found node stays selected and takes no part in the search for the next node.
 fn unconfigured(session: &mut Session) -> Result<Vec<Identity>, Failure> {
     let step = step(session, None);
     let mut master = Master::new(&mut session.network, step);
@@ -60,7 +60,7 @@ fn unconfigured(session: &mut Session) -> Result<Vec<Identity>, Failure> {
     Ok(result?)
 }
 
-/// What a node says in 1018h.
+/// The identity in 1018h.
 pub(super) fn identity(session: &mut Session, node: NodeId) -> Result<Identity, Failure> {
     let mut words = [0; 4];
     for (word, sub) in words.iter_mut().zip(1..) {

@@ -12,7 +12,7 @@ use super::{booted, only, slave, step};
 use crate::cli::{Failure, Session};
 use crate::lss::Master;
 
-/// So often a search is begun anew, more slowly, when nodes are there and none is found.
+/// The number of searches, each with longer steps, when nodes are there and none is found.
 const ATTEMPTS: u32 = 3;
 
 #[derive(Debug, Args)]
@@ -53,7 +53,7 @@ impl Scan {
         }
     }
 
-    /// Node-IDs that nobody has.
+    /// Free node-IDs.
     fn free(&self, session: &mut Session) -> Result<VecDeque<NodeId>, Failure> {
         let Some(first) = self.assign else { return Ok(VecDeque::new()) };
         let used = only::configured(session)?;
@@ -79,8 +79,9 @@ impl Scan {
     }
 }
 
-/// Finds a node without a node-ID and leaves it selected. On a slow way to the bus an answer may come after its step: whether
-/// there is nobody, a question with all of the time-out decides. `progress` is told how many questions have been asked.
+/// Finds a node without a node-ID and leaves it selected. On a slow bus adapter an answer may come after its step. So a
+/// question with the full time-out decides whether there is no such node. `progress` is called with the number of
+/// questions asked.
 pub(in crate::cli) fn find(
     session: &mut Session,
     step: canopen::Duration,

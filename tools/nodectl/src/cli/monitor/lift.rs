@@ -1,4 +1,4 @@
-//! `nodectl monitor --lift`: a line for each value in a pre-defined PDO of a lift, whoever sends it.
+//! `nodectl monitor --lift`: a line for each value in a pre-defined PDO of a lift, from any node.
 
 use std::fmt;
 
@@ -12,16 +12,16 @@ use crate::cli::{Failure, Session};
 use crate::lift::{Lift, Reading};
 use crate::value::Value;
 
-/// How long a wait for a frame lasts before the next one begins.
+/// The time-out of one wait for a frame; then the next wait begins.
 const PATIENCE: Duration = Duration::from_millis(1000);
 
-/// A value on a line.
+/// A value as a line of the output.
 #[derive(Serialize)]
 struct Line {
     time: f64,
     can_id: u16,
     pdo: &'static str,
-    /// `null` where the CAN-ID does not tell it.
+    /// The producer; `null` where it does not follow from the CAN-ID.
     producer: Option<u8>,
     #[serde(rename = "object", serialize_with = "place")]
     at: Multiplexer,
@@ -29,7 +29,7 @@ struct Line {
     value: Value,
 }
 
-/// Prints so many values.
+/// Prints `count` values.
 pub(super) fn print_lines(session: &mut Session, count: usize) -> Result<(), Failure> {
     let (lift, mut start, mut left) = (Lift::default(), None, count);
     while left > 0 {
@@ -56,7 +56,7 @@ impl fmt::Display for Line {
         if let Some(producer) = producer {
             write!(f, " of node {producer}")?;
         }
-        // An object that nobody knows has an address all the same.
+        // An unknown object has no name: print its address.
         match name.as_str() {
             "" => write!(f, ": {:04X}h:{} = {value}", at.index, at.sub),
             name => write!(f, ": {name} = {value}"),

@@ -22,7 +22,7 @@ use crate::object::Place;
 use crate::text::visible;
 use crate::value::Value;
 
-/// After so long without a value somebody wonders.
+/// A hint is printed after this time without a value.
 const SILENCE: Duration = Duration::from_millis(2000);
 
 /// Shows live values, with a plot where the output is a terminal; else one line for each value.
@@ -65,7 +65,7 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// The values of the session's node, and where results go.
+    /// Opens the acquisition of the session's node; results go to the session's output.
     pub(super) fn open<'s>(
         &self,
         session: &'s mut Session,
@@ -85,7 +85,7 @@ impl Source {
     }
 }
 
-/// A value on a line.
+/// A value as a line of the output.
 #[derive(Serialize)]
 struct Line<'a> {
     time: f64,

@@ -1,4 +1,4 @@
-//! Plots over time: of the chosen signal, and of those after it as far as there is room.
+//! Plots over time: the chosen signal, and the signals after it while there is room.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -9,7 +9,7 @@ use ratatui::widgets::{Axis, Block, Borders, Chart, Dataset, GraphType};
 use super::view::Track;
 use crate::cli::record::range;
 
-/// The lowest and the narrowest plot that shows something.
+/// The least height and width of a useful plot.
 const LOWEST: u16 = 5;
 const NARROWEST: u16 = 20;
 

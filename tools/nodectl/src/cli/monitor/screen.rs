@@ -12,13 +12,13 @@ use super::view::View;
 use crate::acquisition::Acquisition;
 use crate::cli::Failure;
 
-/// How often the screen is drawn.
+/// The period of drawing the screen.
 const REFRESH: canopen::Duration = canopen::Duration::from_millis(100);
 
-/// A second in microseconds: over so long frames are counted.
+/// A second in microseconds: the time over which frames are counted.
 const SECOND: u64 = 1_000_000;
 
-/// The terminal, given back when the value is dropped.
+/// The terminal, restored when the value is dropped.
 struct Terminal(DefaultTerminal);
 
 impl Drop for Terminal {
@@ -27,7 +27,7 @@ impl Drop for Terminal {
     }
 }
 
-/// Shows values until `q` is pressed, or so many have come.
+/// Shows values until `q` is pressed, or until `count` values have come.
 pub(super) fn run(
     acquisition: &mut Acquisition,
     mut view: View,
@@ -54,7 +54,7 @@ pub(super) fn run(
     Ok(())
 }
 
-/// Takes values until an instant, at most so many; how many they were.
+/// Takes up to `most` values until an instant. Returns the number of values.
 fn acquire(
     acquisition: &mut Acquisition,
     view: &mut View,
@@ -71,7 +71,7 @@ fn acquire(
     Ok(taken)
 }
 
-/// Reads the keys; whether one of them ends it.
+/// Handles the keys. Returns whether one of them ends the program.
 fn is_over(view: &mut View) -> io::Result<bool> {
     while event::poll(Duration::ZERO)? {
         if let Event::Key(key) = event::read()?

@@ -1,4 +1,4 @@
-//! The first line of the screen: the node, as far as the bus tells.
+//! The first line of the screen: the state of the node, as far as it is known.
 
 use ratatui::style::Stylize;
 use ratatui::text::{Line, Span};
@@ -7,19 +7,19 @@ use crate::acquisition::Acquisition;
 use crate::heartbeat::words;
 use crate::text::visible;
 
-/// On a terminal that is narrower there is no room for everything.
+/// A narrower terminal has no room for the whole line.
 const NARROW: u16 = 60;
 
-/// What is known of the node.
+/// The known state of the node.
 pub(super) struct Status {
     pub(super) node: u8,
-    /// Its NMT state.
+    /// The NMT state.
     pub(super) state: &'static str,
-    /// Its newest emergency.
+    /// The newest emergency.
     pub(super) emergency: Option<String>,
-    /// Frames of anybody in a second; `None` where they are not counted yet.
+    /// Frames of all nodes in a second; `None` until they are counted.
     pub(super) rate: Option<u64>,
-    /// Why there may be no values.
+    /// A reason why values may be missing.
     pub(super) hint: Option<String>,
 }
 
@@ -35,7 +35,7 @@ impl Status {
     }
 
     /// `node 1  operational  51 frames/s  EMCY 8130h heartbeat ...`
-    /// On a narrow terminal the emergency comes before the frames.
+    /// On a narrow terminal the emergency is more important than the frame rate.
     pub(super) fn line(&self, width: u16) -> Line<'static> {
         let has_room = self.emergency.is_none() || width >= NARROW;
         let rate =

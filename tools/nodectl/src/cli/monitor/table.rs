@@ -1,4 +1,4 @@
-//! The table of the signals. The narrower the terminal, the fewer columns: the value and its unit are the last to go.
+//! The table of the signals. A narrower terminal shows fewer columns; value and unit are left out last.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Rect};
@@ -20,7 +20,7 @@ const fn column(title: &'static str, width: u16, cell: fn(&Track) -> String) -> 
     Column { title, width, cell }
 }
 
-/// In the order on the screen.
+/// The columns in the order on the screen.
 const COLUMNS: [Column; 7] = [
     column("object", 9, |track| Place(track.signal.at).to_string()),
     column("name", 0, |track| visible(&track.signal.name)),
@@ -31,12 +31,12 @@ const COLUMNS: [Column; 7] = [
     column("values", 7, |track| track.count.to_string()),
 ];
 
-/// The place of the name, which takes the room that is left.
+/// The column of the name, which takes the remaining width.
 const NAME: usize = 1;
-/// The shortest name that tells something, and the longest there is room for.
+/// The least useful width of the name, and the greatest one.
 const SHORTEST: u16 = 8;
 const LONGEST: u16 = 40;
-/// The order in which columns come, the more room there is.
+/// The order in which columns are added as the width grows.
 const ORDER: [usize; 7] = [2, 3, 1, 0, 6, 4, 5];
 
 pub(super) fn draw(frame: &mut Frame, area: Rect, tracks: &[Track], chosen: usize) {
@@ -51,13 +51,13 @@ pub(super) fn draw(frame: &mut Frame, area: Rect, tracks: &[Track], chosen: usiz
         if number == chosen { row.bold() } else { row }
     });
     let titles = Row::new(shown.iter().map(|&number| COLUMNS[number].title)).dim();
-    // Of more signals than rows, the chosen one is seen.
+    // Scroll so that the chosen signal is visible.
     let room = usize::from(area.height.saturating_sub(1)).max(1);
     let rows = rows.skip((chosen + 1).saturating_sub(room));
     frame.render_widget(Table::new(rows, widths).header(titles), area);
 }
 
-/// The columns for which there is room, in the order on the screen.
+/// The columns that fit into a width, in the order on the screen.
 fn shown(width: u16) -> Vec<usize> {
     let mut left = width;
     let mut shown = Vec::new();
@@ -73,7 +73,7 @@ fn shown(width: u16) -> Vec<usize> {
     shown
 }
 
-/// A text in so many columns; the end of a longer one is left out, and that is seen.
+/// A text cut to a width; a mark shows where the end of the text is left out.
 fn cut(text: String, width: u16) -> String {
     let width = usize::from(width);
     if text.chars().count() <= width {

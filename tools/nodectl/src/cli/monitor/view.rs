@@ -1,4 +1,4 @@
-//! What is on the screen: the node, a table of all signals, plots of as many as there is room for.
+//! The screen: the node, a table of all signals, and plots of as many signals as there is room for.
 
 use std::collections::VecDeque;
 
@@ -14,11 +14,11 @@ use super::{plot, table};
 use crate::acquisition::{Sample, Signal};
 use crate::cli::record::seconds_between;
 
-/// What the plots show at least and at most, in seconds. Points are kept for as long.
+/// The shortest and the longest time span of the plots in seconds. Points are kept for the longest span.
 const SHORTEST: f64 = 1.0;
 const LONGEST: f64 = 600.0;
 
-/// What the keys do.
+/// The keys and their functions.
 const KEYS: [&str; 6] = [
     "up, down  choose a signal",
     "+, -      less or more time in the plots",
@@ -28,14 +28,14 @@ const KEYS: [&str; 6] = [
     "",
 ];
 
-/// A signal and what is known of its values.
+/// A signal and the statistics of its values.
 pub(super) struct Track {
     pub(super) signal: Signal,
     pub(super) newest: String,
     pub(super) count: usize,
     pub(super) least: Option<(f64, String)>,
     pub(super) greatest: Option<(f64, String)>,
-    /// Seconds since the start, and values.
+    /// The points of the plot: seconds since the start, and value.
     pub(super) points: VecDeque<(f64, f64)>,
 }
 
@@ -44,9 +44,9 @@ pub(super) struct View {
     tracks: Vec<Track>,
     chosen: usize,
     start: Option<Instant>,
-    /// Of the newest sample, in seconds since the start.
+    /// The time of the newest sample, in seconds since the start.
     now: f64,
-    /// What the plot shows, in seconds.
+    /// The time span of the plot in seconds.
     window: f64,
     is_held: bool,
     has_help: bool,
@@ -83,18 +83,18 @@ impl View {
         self.chosen = self.chosen.saturating_add_signed(step).min(self.tracks.len().saturating_sub(1));
     }
 
-    /// Holds the picture, or lets it go on.
+    /// Freezes the screen, or continues.
     pub(super) fn hold(&mut self) {
         self.is_held = !self.is_held;
     }
 
-    /// Shows more time in the plots, or less: twice or half as much.
+    /// Doubles or halves the time span of the plots.
     pub(super) fn zoom(&mut self, is_in: bool) {
         let window = if is_in { self.window / 2.0 } else { self.window * 2.0 };
         self.window = window.clamp(SHORTEST, LONGEST);
     }
 
-    /// Shows what the keys do, or no longer.
+    /// Shows or hides the help on keys.
     pub(super) fn help(&mut self) {
         self.has_help = !self.has_help;
     }
@@ -112,7 +112,7 @@ impl View {
             );
             return;
         }
-        // The values come first: plots get what is left.
+        // The table has priority: plots get the remaining room.
         let rows = u16::try_from(self.tracks.len()).unwrap_or(u16::MAX).saturating_add(1);
         let [values, plots] = Layout::vertical([Constraint::Length(rows), Constraint::Min(0)]).areas(body);
         table::draw(frame, values, &self.tracks, self.chosen);
@@ -145,7 +145,7 @@ impl Track {
     }
 }
 
-/// Keeps a value and its text if it is further out than the one before.
+/// Replaces a bound (a value and its text) if the new value is further out.
 fn keep(bound: &mut Option<(f64, String)>, value: f64, text: &str, is_further: impl Fn(f64, f64) -> bool) {
     if bound.as_ref().is_none_or(|(kept, _)| is_further(value, *kept)) {
         *bound = Some((value, text.to_owned()));
@@ -195,7 +195,7 @@ mod tests {
         let mut view = View::new(&signals, 30.0);
         for step in 0..240_u32 {
             let (at, angle) = (Instant(u64::from(step) * 250_000), f64::from(step) / 8.0);
-            #[allow(clippy::cast_possible_truncation)] // A value with the digits of the sensor.
+            #[allow(clippy::cast_possible_truncation)] // The value has only the digits of the sensor.
             let value = (2.5 + angle.sin()) as f32;
             view.take(&Sample { at, signal: 0, value: Value::Real32(value) });
             view.take(&Sample { at, signal: 1, value: Value::Real32(25.125) });
@@ -203,7 +203,7 @@ mod tests {
         view
     }
 
-    /// The pictures lie beside the tests; SCREENS=write makes them anew.
+    /// The expected pictures are in files beside the tests; SCREENS=write writes them anew.
     #[test]
     fn pictures_from_the_smallest_terminal_to_a_large_one() {
         let status = Status { emergency: Some("8130h heartbeat or life guarding error".into()), ..status() };

@@ -1,4 +1,5 @@
-//! The recording as a stream of Apache Arrow (IPC streaming format, version 1): for recordings of days, which are too large for text.
+//! Recordings as a stream of Apache Arrow (IPC streaming format, version 1). For recordings of days, which are too
+//! large for text.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -16,10 +17,10 @@ use crate::cli::replacement::Replacement;
 use crate::object::Place;
 use crate::value::Value;
 
-/// Rows that are written at once: a few seconds of a TPDO.
+/// The number of rows in a batch: a few seconds of a TPDO.
 const BATCH: usize = 1024;
 
-/// A stream that grows by batches of rows.
+/// A stream that is written batch by batch.
 pub(super) struct Arrow {
     to: StreamWriter<Replacement>,
     schema: Arc<Schema>,
@@ -28,7 +29,7 @@ pub(super) struct Arrow {
     rows: usize,
 }
 
-/// The values of one signal; null where there is none.
+/// The values of one signal; null where a row has no value.
 enum Column {
     Signed(Int64Builder),
     Unsigned(UInt64Builder),
@@ -89,7 +90,7 @@ impl Column {
         }
     }
 
-    /// A value that is none of the column, as that of an object with fewer bytes than its type has, is null.
+    /// Appends a value. A value that does not fit the column is null, for example one with fewer bytes than its type.
     fn append(&mut self, value: Option<&Value>) {
         let integer = |value: &Value| if let Value::Integer(number) = value { Some(*number) } else { None };
         match self {

@@ -26,7 +26,7 @@ use super::replacement::Replacement;
 use super::{Failure, Session};
 use crate::acquisition::{Acquisition, Sample, Signal};
 
-/// How often the end of the recording is looked for while nothing arrives.
+/// The longest wait for a value, after which the end of the recording is checked.
 const WAKE: Duration = Duration::from_millis(50);
 
 /// Records values over time, as CSV, as a stream of Apache Arrow and as a plot.
@@ -55,7 +55,7 @@ pub(super) struct Record {
     svg: Option<PathBuf>,
 }
 
-/// Ten years are as good as for ever.
+/// Parses a duration. The limit of ten years is as good as no end.
 fn seconds(text: &str) -> Result<Duration, String> {
     const MOST: f64 = 315_360_000.0;
     let seconds = text.parse::<f64>().ok().filter(|seconds| (0.0..=MOST).contains(seconds));
@@ -66,7 +66,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 impl Record {
     pub(super) fn run(&self, session: &mut Session) -> Result<(), Failure> {
-        // All files are opened before anything is recorded: what cannot be written is told at once.
+        // Open all files before the recording, so that a file that cannot be written is reported at once.
         let files = [&self.csv, &self.arrow, &self.svg];
         let [csv, arrow, svg] = files.map(|path| path.as_deref().map(Replacement::open).transpose());
         let (csv, arrow, svg) = (csv?, arrow?, svg?);
@@ -83,12 +83,12 @@ impl Record {
             let hint = acquisition.hint().unwrap_or_else(|| "no value has come".to_owned());
             return Err(Failure::Silence(format!("nothing is recorded: {hint}")));
         }
-        // Whatever has ended the recording: what has come is kept.
+        // Keep the values even if the recording has ended with an error.
         self.tell(rows.complete()?);
         ended
     }
 
-    /// What has been written.
+    /// Prints the files that were written.
     fn tell(&self, rows: usize) {
         let tables =
             self.csv.iter().chain(&self.arrow).map(|path| format!("{rows} rows in {}", path.display()));
@@ -100,7 +100,7 @@ impl Record {
     }
 }
 
-/// Where the rows go: to all files, and to the standard output when there are none.
+/// The destinations of the rows: all files, or the standard output when there are no files.
 fn sinks(
     signals: &[Signal],
     csv: Option<Replacement>,
@@ -122,7 +122,7 @@ fn sinks(
     Ok(sinks)
 }
 
-/// Takes samples until the time is over or a signal (Ctrl-C, SIGTERM) comes.
+/// Takes samples until the time is over, or until a signal (Ctrl-C, SIGTERM) comes.
 fn acquire(
     acquisition: &mut Acquisition,
     duration: Option<Duration>,
@@ -130,7 +130,7 @@ fn acquire(
 ) -> Result<(), Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
-    // There can be one handler only; where there is one already, the recording ends by its duration.
+    // Only one handler is possible. If another one is set already, only the duration ends the recording.
     let _ = ctrlc::set_handler(move || stopped.store(true, Ordering::Relaxed));
     let start = time(acquisition);
     let end = duration.map_or(Instant::NEVER, |duration| start + duration);
@@ -144,7 +144,7 @@ fn acquire(
     Ok(())
 }
 
-/// The time of the bus.
+/// The time on the bus.
 fn time(acquisition: &Acquisition) -> Instant {
     acquisition.bus_time().unwrap_or(acquisition.now())
 }

@@ -1,4 +1,4 @@
-//! The recording as a plot: a chart for each unit, one above the other.
+//! Recordings as a plot, with a chart for each unit.
 
 use std::error::Error;
 use std::io::{self, Write};
@@ -14,7 +14,7 @@ use crate::cli::replacement::Replacement;
 use crate::value::Value;
 
 const WIDTH: u32 = 1000;
-/// Of one chart.
+/// Height of a chart in pixels.
 const HEIGHT: u32 = 320;
 
 /// A line of a chart.
@@ -23,16 +23,16 @@ struct Line {
     points: Vec<(f64, f64)>,
 }
 
-/// What shares an axis.
+/// The lines with one unit, which share an axis.
 struct Chart {
     unit: String,
     lines: Vec<Line>,
 }
 
-/// Draws all signals that are numbers, above one another on one time axis, when there are no more rows.
+/// Draws all signals with numbers in charts on one time axis, once all rows have come.
 pub(super) struct Plot {
     to: Replacement,
-    /// One for each signal.
+    /// One line for each signal.
     lines: Vec<Line>,
     units: Vec<String>,
 }
@@ -62,7 +62,7 @@ impl Sink for Plot {
     }
 }
 
-/// The text of the file.
+/// Draws the charts. Returns the text of the file.
 fn draw(charts: &[Chart]) -> Result<String, Box<dyn Error>> {
     let rows = charts.len().max(1);
     let size = (WIDTH, HEIGHT * u32::try_from(rows)?);
@@ -78,7 +78,7 @@ fn draw(charts: &[Chart]) -> Result<String, Box<dyn Error>> {
     Ok(text)
 }
 
-/// What has the same unit shares a chart.
+/// Groups the lines by their unit.
 fn charts(lines: Vec<Line>, units: Vec<String>) -> Vec<Chart> {
     let mut charts: Vec<Chart> = Vec::new();
     for (line, unit) in lines.into_iter().zip(units).filter(|(line, _)| !line.points.is_empty()) {
@@ -119,7 +119,7 @@ impl Chart {
     }
 }
 
-/// From the least to the greatest, with a margin as a share of the way between them. Never empty.
+/// The range from the least to the greatest value, with a margin on each side as a share of the span. Never empty.
 pub(in crate::cli) fn range(values: impl Iterator<Item = f64>, margin: f64) -> Range<f64> {
     let (low, high) = values
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
@@ -127,7 +127,7 @@ pub(in crate::cli) fn range(values: impl Iterator<Item = f64>, margin: f64) -> R
         return 0.0..1.0;
     }
     let span = high - low;
-    // A line that does not move is drawn in the middle.
+    // A constant line is drawn in the middle.
     let extra = if span > 0.0 { margin * span } else { low.abs().max(1.0) * 0.01 };
     low - extra..high + extra
 }

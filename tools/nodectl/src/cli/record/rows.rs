@@ -1,4 +1,4 @@
-//! The recording as rows: a row for each time, a place for each signal.
+//! Recordings as rows: a row for each time, with a place for each signal.
 
 use canopen::Instant;
 
@@ -7,26 +7,26 @@ use crate::cli::Failure;
 use crate::object::Place;
 use crate::value::Value;
 
-/// Values of the same time: usually those of one PDO.
+/// The values of one time, usually of one PDO.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub(super) at: Instant,
-    /// Since the first row.
+    /// Seconds since the first row.
     pub(super) seconds: f64,
-    /// One for each signal; `None` where the signal has no value of this time.
+    /// One value for each signal; `None` where the signal has no value at this time.
     pub(super) values: Vec<Option<Value>>,
 }
 
-/// Where rows are written.
+/// A destination of rows.
 pub(super) trait Sink {
     /// Writes a row.
     fn write(&mut self, row: &Row) -> Result<(), Failure>;
 
-    /// There are no more rows: the file takes its place.
+    /// Finishes the file after the last row, and moves it to its final path.
     fn complete(self: Box<Self>) -> Result<(), Failure>;
 }
 
-/// Makes rows of samples. A row is written as soon as one of another time follows.
+/// Makes rows of samples. A row is written when a sample of another time follows.
 pub(super) struct Rows {
     columns: usize,
     start: Option<Instant>,
@@ -60,7 +60,7 @@ impl Rows {
         self.sinks.iter_mut().try_for_each(|sink| sink.write(&row))
     }
 
-    /// Completes every file, also when another one fails. How many rows there are.
+    /// Completes every file, also when another file fails. Returns the number of rows.
     pub(super) fn complete(mut self) -> Result<usize, Failure> {
         let mut result = self.end_row();
         for sink in self.sinks {
@@ -76,7 +76,7 @@ pub(super) fn title(signal: &Signal) -> String {
     format!("{} {}{unit}", Place(signal.at), signal.name).trim().to_owned()
 }
 
-/// From one instant to another.
+/// The seconds from one instant to another.
 #[allow(clippy::cast_precision_loss)] // Microseconds of years fit.
 pub(in crate::cli) fn seconds(start: Instant, at: Instant) -> f64 {
     at.0.saturating_sub(start.0) as f64 / 1e6

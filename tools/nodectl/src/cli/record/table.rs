@@ -1,4 +1,4 @@
-//! The recording as CSV.
+//! Recordings as CSV.
 
 use std::io::Write;
 
@@ -8,7 +8,7 @@ use crate::acquisition::Signal;
 use crate::cli::Failure;
 use crate::text::visible;
 
-/// A table that grows: a row that is complete is written at once.
+/// A CSV table. Each complete row is written at once.
 pub(super) struct Table<W: Write>(csv::Writer<W>);
 
 impl<W: Write> Table<W> {

@@ -1,4 +1,4 @@
-//! Where a table goes.
+//! The destination of a table.
 
 use std::io::{self, Write};
 
@@ -12,7 +12,7 @@ pub(super) enum Target {
 }
 
 impl Target {
-    /// All is written.
+    /// Finishes the file.
     pub(super) fn complete(self) -> Result<(), Failure> {
         match self {
             Target::File(file) => file.complete(),

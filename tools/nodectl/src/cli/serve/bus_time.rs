@@ -1,19 +1,19 @@
-//! The time axis of everything that a page shows: seconds on the bus.
+//! The time axis of the pages: seconds on the bus.
 
 use canopen::Instant;
 
-/// Turns time stamps of the adapter into seconds since the first frame. An adapter that is opened anew may count from
-/// somewhere else: the axis goes on.
+/// Turns time stamps of the adapter into seconds since the first frame. The axis continues when the adapter is opened
+/// again, although its time stamps may start elsewhere then.
 #[derive(Debug, Default)]
 pub(super) struct BusTime {
-    /// A time stamp, and what it is on the axis.
+    /// A time stamp, and its time on the axis.
     origin: Option<(Instant, f64)>,
-    /// The newest time on the axis, and when it was that by the clock of this side.
+    /// The newest time on the axis, and the time of this computer's clock at that moment.
     newest: Option<(f64, Instant)>,
 }
 
 impl BusTime {
-    /// The time of a frame that arrives now.
+    /// The time of a frame that has just arrived.
     pub(super) fn of_frame(&mut self, stamp: Instant, here: Instant) -> f64 {
         let (first, base) = match self.origin {
             Some(origin) => origin,
@@ -24,18 +24,18 @@ impl BusTime {
         t
     }
 
-    /// The time now; 0 before the first frame.
+    /// The present time; 0 before the first frame.
     pub(super) fn now(&self, here: Instant) -> f64 {
         self.newest.map_or(0.0, |(t, then)| t + seconds(then, here))
     }
 
-    /// The adapter is another.
+    /// Prepares for the time stamps of another adapter.
     pub(super) fn restart(&mut self) {
         self.origin = None;
     }
 }
 
-#[allow(clippy::cast_precision_loss)] // A microsecond in a hundred years.
+#[allow(clippy::cast_precision_loss)] // The error is a microsecond in a hundred years.
 fn seconds(from: Instant, to: Instant) -> f64 {
     if to.0 >= from.0 { (to.0 - from.0) as f64 / 1e6 } else { -((from.0 - to.0) as f64 / 1e6) }
 }

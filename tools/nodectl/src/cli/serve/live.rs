@@ -1,4 +1,4 @@
-//! The signals that pages follow: every sample of theirs, as it comes.
+//! The signals that pages follow, with every sample.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
@@ -14,7 +14,7 @@ use crate::tpdo::Tpdo;
 use crate::value::Value;
 use crate::{Catalogue, meaning};
 
-/// Samples of a signal between two events. More than a bus at 1 Mbit/s can bring of one TPDO in that time.
+/// The number of samples of a signal between two events: more than one TPDO can bring in this time at 1 Mbit/s.
 const SAMPLES: usize = 4096;
 
 /// Names a signal: node and object, `5:6130:1`.
@@ -56,7 +56,7 @@ impl fmt::Display for Key {
     }
 }
 
-/// What is known of the signals of a node.
+/// The TPDOs and signals of a node.
 #[derive(Clone, Default)]
 pub(super) struct Survey {
     pub(super) tpdos: Vec<Tpdo>,
@@ -65,31 +65,31 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// The signals as pages are told of them.
+    /// The signals in the form for pages.
     pub(super) fn describe(&self, node: NodeId) -> Vec<Json> {
         self.signals.iter().map(|signal| shape(Key::new(node, signal.at), signal)).collect()
     }
 }
 
-/// A signal that somebody follows.
+/// A signal that a page follows.
 struct Track {
     signal: Signal,
     samples: Vec<(f64, Value)>,
 }
 
-/// All signals that anybody follows.
+/// All signals that pages follow.
 #[derive(Default)]
 pub(super) struct Live {
     surveys: BTreeMap<NodeId, Survey>,
     wanted: BTreeSet<Key>,
     tracks: BTreeMap<Key, Track>,
-    /// The TPDOs that have one of them, by CAN-ID.
+    /// The TPDOs that carry a followed signal, by CAN-ID.
     tpdos: HashMap<u16, Vec<(NodeId, Tpdo)>>,
-    /// Samples that came on top.
+    /// Samples that were dropped because there were too many.
     lost: u64,
 }
 
-/// The new samples of a signal, as they stand in an event.
+/// The new samples of a signal, in the form for an event.
 pub(super) struct Batch {
     pub(super) json: String,
     pub(super) samples: u64,
@@ -100,35 +100,35 @@ impl Live {
         self.surveys.get(&node)
     }
 
-    /// What a node was found to send.
+    /// Takes the survey of a node.
     pub(super) fn learn(&mut self, node: NodeId, survey: Survey) {
         self.surveys.insert(node, survey);
         self.arrange();
     }
 
-    /// Forgets what a node sends: it may send something else now.
+    /// Forgets the survey of a node, because the node may have another mapping now.
     pub(super) fn forget(&mut self, node: NodeId) {
         self.surveys.remove(&node);
     }
 
-    /// The signals that anybody wants, and no others.
+    /// Sets the signals to follow, instead of the former ones.
     pub(super) fn want(&mut self, wanted: BTreeSet<Key>) {
         self.wanted = wanted;
         self.arrange();
     }
 
-    /// The nodes that signals are wanted of.
+    /// The nodes of the followed signals.
     pub(super) fn wanted_nodes(&self) -> BTreeSet<NodeId> {
         self.wanted.iter().map(|key| key.node).collect()
     }
 
-    /// The wanted signals of a node that it sends in no TPDO.
+    /// The followed signals of a node that no TPDO carries.
     pub(super) fn polled(&self, node: NodeId) -> Vec<Multiplexer> {
         let is_polled = |key: &&Key| self.tracks.get(key).is_some_and(|track| track.signal.tpdo.is_none());
         self.wanted.iter().filter(|key| key.node == node).filter(is_polled).map(|key| key.at()).collect()
     }
 
-    /// Looks up again which TPDOs have which signals. Without a survey a signal stays as it was.
+    /// Assigns the followed signals to TPDOs. The signals of a node without a survey stay unchanged.
     fn arrange(&mut self) {
         let wanted = self.wanted.clone();
         self.tracks.retain(|key, _| wanted.contains(key));
@@ -168,7 +168,7 @@ impl Live {
         }
     }
 
-    /// Takes a sample that was read.
+    /// Takes a sample that was read by SDO.
     pub(super) fn on_reading(&mut self, key: Key, t: f64, bytes: &[u8]) {
         if let Some(track) = self.tracks.get_mut(&key).filter(|track| track.signal.tpdo.is_none()) {
             let value = track.signal.decode(bytes);
@@ -176,7 +176,7 @@ impl Live {
         }
     }
 
-    /// What has come since the last call, and how many samples were lost.
+    /// The samples since the last call, and the number of lost samples.
     pub(super) fn take(&mut self) -> (BTreeMap<Key, Batch>, u64) {
         let surveys = &self.surveys;
         let batches =
@@ -187,7 +187,7 @@ impl Live {
         (batches.collect(), std::mem::take(&mut self.lost))
     }
 
-    /// A signal as pages are told of it; `None` for one that nothing is known of yet.
+    /// A signal in the form for pages; `None` without a survey of its node.
     pub(super) fn describe(&self, key: Key) -> Option<Json> {
         let survey = self.surveys.get(&key.node)?;
         let found = survey.signals.iter().find(|signal| signal.at == key.at());

@@ -1,8 +1,8 @@
 //! `nodectl serve`: the bus in a browser. The messages are those of `tools/page/PROTOCOL.md`.
 //!
-//! One thread, the [`pump`], has the bus, and all that is known of it; pages and jobs send it orders. What takes several frames
-//! (a transfer, a search, an update) is a [`jobs`] job on a thread of its own, with a [`port`] to the bus; so a slow node holds up
-//! nobody but who asked it.
+//! One thread, the [`pump`], owns the bus and the state of all nodes; pages and jobs send it orders. Work that takes
+//! several frames (a transfer, a search, an update) is a [`jobs`] job on a thread of its own, with a [`port`] to the
+//! bus. So a slow node delays only the page that has asked the node.
 
 mod bus_time;
 mod jobs;
@@ -71,7 +71,8 @@ impl Serve {
     pub(super) fn run(&self, options: &Options, mut output: Output) -> Result<(), Failure> {
         let address = self.address.clone().unwrap_or_else(|| options.bus.clone());
         let options = Options { bus: address, ..options.clone() };
-        // A bus that is not there is told before anybody opens a page. A simulator opens it only when it knows where the page is.
+        // Open the bus first, so that a missing bus is reported before a page opens. A simulator opens its bus only
+        // when it knows the address of the page, so the pump opens the bus then.
         let bus = match self.until_end_of_input {
             true => None,
             false => Some(options.bus.open(options.bit_rate)?),
@@ -95,7 +96,7 @@ impl Serve {
     }
 }
 
-/// Ends the process when nobody holds the other end of its standard input any more.
+/// Ends the process when the standard input is closed.
 fn end_with_input() {
     let mut input = io::stdin().lock();
     let mut buffer = [0; 256];

@@ -1,4 +1,4 @@
-//! The nodes that were heard, and what is known of them.
+//! The nodes that were heard, and their state.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,12 +12,12 @@ use super::status::Count;
 use crate::heartbeat::{self, Heartbeat};
 use crate::{Catalogue, meaning};
 
-/// So many heartbeats that do not come, and a node is not there.
+/// The number of missing heartbeats after which a node counts as absent.
 const MISSED: f64 = 3.0;
-/// The same for a node without heartbeats, in seconds.
+/// The time after which a node without a heartbeat counts as absent, in seconds.
 const SILENCE: f64 = 5.0;
 
-/// What a node was asked for.
+/// The identity of a node, read by SDO.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(super) struct Identity {
     pub(super) name: Option<String>,
@@ -41,12 +41,12 @@ pub(super) struct Emergency {
     active: bool,
 }
 
-/// One node.
+/// The state of a node.
 #[derive(Default)]
 pub(super) struct Node {
     pub(super) identity: Option<Identity>,
     pub(super) catalogue: Option<Arc<Catalogue>>,
-    /// Whether it is asked what it is, and when it was last.
+    /// The time of the last request for the identity of the node; `None` if the node has to be asked.
     pub(super) asked: Option<f64>,
     pub(super) updating: bool,
     state: Option<State>,
@@ -61,7 +61,7 @@ pub(super) struct Node {
     is_new: bool,
 }
 
-/// What is to be told at once.
+/// News that pages get at once.
 #[derive(Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "lowercase")]
 pub(super) enum News {
@@ -92,7 +92,7 @@ struct Row<'n> {
     updating: bool,
 }
 
-/// All of them.
+/// All nodes.
 #[derive(Default)]
 pub(super) struct Nodes {
     nodes: BTreeMap<NodeId, Node>,
@@ -103,7 +103,7 @@ impl Nodes {
         self.nodes.get(&node)
     }
 
-    /// A node that something is known of now.
+    /// The entry of a node, marked as changed.
     pub(super) fn change(&mut self, node: NodeId) -> &mut Node {
         let entry = self.nodes.entry(node).or_default();
         entry.is_new = true;
@@ -114,7 +114,7 @@ impl Nodes {
         self.nodes.iter().map(|(node, entry)| (*node, entry))
     }
 
-    /// Takes what a frame tells of a node.
+    /// Takes the information that a frame has about its sender.
     pub(super) fn on_frame(&mut self, frame: &Frame, t: f64) -> Option<News> {
         let (node, is_proof) = sender(frame)?;
         if !is_proof && !self.nodes.contains_key(&node) {
@@ -131,7 +131,7 @@ impl Nodes {
         }
     }
 
-    /// Counts what the last `seconds` brought, and notices who is no longer there.
+    /// Counts the frames of the last `seconds`, and marks the nodes that are absent.
     pub(super) fn look(&mut self, t: f64, seconds: f64, kbit: Option<u16>) {
         for entry in self.nodes.values_mut() {
             let rate = entry.count.rate(seconds);
@@ -145,12 +145,12 @@ impl Nodes {
         }
     }
 
-    /// The event with all of them.
+    /// The event with all nodes.
     pub(super) fn all(&self) -> serde_json::Value {
         self.event(true, |_| true)
     }
 
-    /// The event with those that have changed since the last call; `None` where none has.
+    /// The event with the nodes that have changed since the last call; `None` where no node has.
     pub(super) fn changed(&mut self) -> Option<serde_json::Value> {
         let event =
             self.nodes.values().any(|entry| entry.is_new).then(|| self.event(false, |entry| entry.is_new));
@@ -198,7 +198,7 @@ impl Node {
         }
         self.is_new = true;
         if is_boot {
-            // It may have another program, or be another device.
+            // After a boot the node may have another program or be another device: ask again.
             (self.asked, self.emergency) = (None, None);
         }
         Some(News::State { node: node.get(), t, state: heartbeat::words(heard.state) })
@@ -220,20 +220,21 @@ impl Node {
     }
 }
 
-/// Whose frame it is by the pre-defined connection set, and whether nobody else can have sent it (CiA 301, 7.3.5).
+/// The sender of a frame by the pre-defined connection set, and whether no other node can have sent the frame (CiA 301,
+/// 7.3.5).
 fn sender(frame: &Frame) -> Option<(NodeId, bool)> {
     let node = NodeId::new(u8::try_from(frame.id() & 0x7F).ok()?)?;
     match frame.id() & !0x7F {
-        // A remote frame asks the node.
+        // A remote frame comes from another node, which asks this node.
         0x700 if frame.is_remote() => None,
         0x080 | 0x580 | 0x700 => Some((node, true)),
-        // TPDOs. They may have been given other COB-IDs.
+        // TPDOs. A TPDO of another node may have this COB-ID.
         0x180 | 0x280 | 0x380 | 0x480 => Some((node, false)),
         _ => None,
     }
 }
 
-/// To a hundredth of a second: what the host adds to a period is noise.
+/// Rounds to a hundredth of a second, because the host adds noise to a period.
 fn round(seconds: f64) -> f64 {
     (seconds * 100.0).round() / 100.0
 }

@@ -1,4 +1,4 @@
-//! What each page wants to be told.
+//! The pages, and the events that each page wants.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,33 +9,33 @@ use super::live::{Batch, Key};
 use super::tracer::Row;
 use crate::trace::Kind;
 
-/// Requests of a page that may wait for their answers.
+/// The number of requests of a page that may wait for their answers.
 const REQUESTS: usize = 32;
-/// So many messages that are none, and a page is let go.
+/// After more faulty messages than this, the page is disconnected.
 const MISTAKES: u32 = 64;
 
-/// The rows that a page wants. An empty set of kinds or nodes is all.
+/// The trace rows that a page wants. An empty set of kinds or nodes stands for all.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Filter {
     pub(super) kinds: Vec<Kind>,
     pub(super) nodes: BTreeSet<NodeId>,
 }
 
-/// A page.
+/// The state of a page.
 #[derive(Default)]
 pub(super) struct Page {
     pub(super) writes: bool,
     pub(super) trace: Option<Filter>,
     pub(super) follows: BTreeSet<Key>,
-    /// A file that was looked at for an update.
+    /// The file that the page has last sent for an update, with its number.
     pub(super) file: Option<(u64, Vec<u8>)>,
     requests: usize,
     mistakes: u32,
-    /// Whether it has missed a list of nodes.
+    /// Whether the page has missed a list of nodes.
     is_behind: bool,
     lost_rows: u64,
     lost_samples: u64,
-    /// Lost rows that it was not told of yet.
+    /// The number of lost rows that the page has not been told yet.
     untold: u64,
 }
 
@@ -51,7 +51,7 @@ impl Filter {
 }
 
 impl Page {
-    /// Counts a request; `false` when there are too many.
+    /// Counts a request; `false` when too many requests wait.
     pub(super) fn ask(&mut self) -> bool {
         let may = self.requests < REQUESTS;
         self.requests += usize::from(may);
@@ -62,7 +62,7 @@ impl Page {
         self.requests = self.requests.saturating_sub(1);
     }
 
-    /// Counts a message that is none; `true` when it was one too many.
+    /// Counts a faulty message; `true` when there were too many.
     pub(super) fn mistake(&mut self) -> bool {
         self.mistakes += 1;
         self.mistakes > MISTAKES
@@ -102,13 +102,13 @@ impl Pages {
         self.0.values().any(|page| page.trace.is_some())
     }
 
-    /// Sends an event to all. A page without room misses it.
+    /// Sends an event to all pages. A page whose queue is full misses the event.
     pub(super) fn tell(&self, hub: &Hub, event: &serde_json::Value) {
         let text = event.to_string();
         self.0.keys().filter(|page| hub.has_room(**page)).for_each(|page| hub.send(*page, text.clone()));
     }
 
-    /// Sends what has changed of the nodes. A page that had no room gets all of them once it has.
+    /// Sends the changed nodes. A page that has missed a list gets all nodes once its queue has room.
     pub(super) fn tell_nodes(&mut self, hub: &Hub, changed: Option<&str>, all: impl Fn() -> String) {
         for (page, entry) in &mut self.0 {
             match (hub.has_room(*page), entry.is_behind) {
@@ -121,7 +121,7 @@ impl Pages {
         }
     }
 
-    /// Sends rows to those who want them.
+    /// Sends trace rows to the pages that want them.
     pub(super) fn tell_rows(&mut self, hub: &Hub, rows: &[Row], lost: u64) {
         for (page, entry) in &mut self.0 {
             let Some(filter) = &entry.trace else { continue };
@@ -142,7 +142,7 @@ impl Pages {
         }
     }
 
-    /// Sends samples to those who follow them.
+    /// Sends samples to the pages that follow their signals.
     pub(super) fn tell_samples(&mut self, hub: &Hub, t: f64, batches: &BTreeMap<Key, Batch>, lost: u64) {
         for (page, entry) in &mut self.0 {
             let wanted: Vec<&Batch> = entry.follows.iter().filter_map(|key| batches.get(key)).collect();

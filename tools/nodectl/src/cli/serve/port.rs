@@ -1,4 +1,4 @@
-//! The bus as a job sees it: the frames that it asked for come through a queue, and what it sends goes to the pump.
+//! The bus of a job: frames that interest the job come through a queue, and frames that the job sends go to the pump.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, sync_channel};
 
@@ -7,20 +7,20 @@ use canopen::{Frame, Instant, NodeId};
 use super::pump::Order;
 use crate::bus::{Bus, BusError, NoBus, Received, clock};
 
-/// Frames that may wait for a job. One that is slower loses the newest, as at any adapter.
+/// The number of frames that may wait for a job. A slower job loses the newest frames, as with any adapter.
 const WAITING: usize = 4096;
 
-/// The frames that a job has a use for.
+/// The frames that a job receives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interest {
-    /// What this node says: answers of its SDO server, heartbeats, and what LSS slaves answer.
+    /// Frames of this node: answers of its SDO server, and heartbeats.
     Node(NodeId),
-    /// What all nodes say by SDO, heartbeat and LSS.
+    /// SDO answers and heartbeats of all nodes, and answers of LSS slaves.
     Services,
 }
 
 impl Interest {
-    /// Whether a frame is one of them.
+    /// Whether a frame belongs to this interest.
     pub(super) fn has(self, frame: &Frame) -> bool {
         let id = frame.id();
         let is_service = matches!(id, 0x581..=0x5FF | 0x701..=0x77F);
@@ -31,14 +31,14 @@ impl Interest {
     }
 }
 
-/// The pump's end.
+/// The pump's end of a port.
 pub(super) struct Outlet {
     interest: Interest,
     frames: SyncSender<Received>,
 }
 
 impl Outlet {
-    /// Hands a frame over; `false` when the job is over.
+    /// Passes a frame to the job, if the frame interests it. Returns `false` when the job has ended.
     pub(super) fn hand_over(&self, received: &Received) -> bool {
         use std::sync::mpsc::TrySendError;
         let sent = if self.interest.has(&received.frame) { self.frames.try_send(*received) } else { Ok(()) };
@@ -46,13 +46,13 @@ impl Outlet {
     }
 }
 
-/// The job's end.
+/// The job's end of a port.
 struct Port {
     orders: Sender<Order>,
     frames: Receiver<Received>,
 }
 
-/// Goes on the bus. Where there is none, the first use of the port tells.
+/// Opens a port. If there is no bus, the first use of the port fails.
 pub(super) fn open(orders: &Sender<Order>, interest: Interest) -> Box<dyn Bus> {
     let (frames, receiver) = sync_channel(WAITING);
     let _ = orders.send(Order::Open(Outlet { interest, frames }));
@@ -72,7 +72,7 @@ impl Bus for Port {
     }
 
     fn receive(&mut self, until: Instant) -> Result<Option<Received>, BusError> {
-        // What has arrived needs no waiting, and a deadline that has passed leaves no time for it.
+        // First look for a waiting frame, because a deadline in the past leaves no time to wait for one.
         match self.frames.try_recv() {
             Ok(received) => return Ok(Some(received)),
             Err(TryRecvError::Disconnected) => return NoBus.receive(until),

@@ -1,4 +1,4 @@
-//! What a page may ask for.
+//! The requests of pages.
 
 use std::collections::BTreeSet;
 
@@ -14,13 +14,13 @@ use crate::cli::store::Group;
 use crate::object::at;
 use crate::trace::Kind;
 
-/// Objects that may be read with one request.
+/// The number of objects that one request may read.
 const OBJECTS: usize = 64;
 
 /// A message of a page.
 #[derive(Debug, Deserialize)]
 pub(super) struct Request {
-    /// What the page calls it.
+    /// The ID that the page has given the request.
     pub(super) id: Json,
     #[serde(flatten)]
     pub(super) what: What,
@@ -30,7 +30,7 @@ pub(super) struct Request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Node(pub(super) NodeId);
 
-/// A node or all of them.
+/// A node or all nodes.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(untagged)]
 pub(super) enum Whom {
@@ -60,7 +60,7 @@ pub(super) struct Mapping {
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub(super) struct Object(u16, u8);
 
-/// Who an LSS slave is.
+/// The identity of an LSS slave.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub(super) struct Slave {
     vendor: u32,
@@ -198,7 +198,7 @@ fn yes() -> bool {
 }
 
 impl What {
-    /// Whether it changes something.
+    /// Whether the request changes anything on the bus.
     pub(super) fn writes(&self) -> bool {
         !matches!(
             self,
@@ -218,7 +218,7 @@ impl What {
         )
     }
 
-    /// What is wrong with it, before anything is done.
+    /// The error of a request that can be found before anything is done.
     pub(super) fn fault(&self) -> Option<String> {
         match self {
             What::Read { objects, .. } if objects.len() > OBJECTS => {
@@ -238,7 +238,7 @@ impl What {
 /// Reads a message.
 ///
 /// # Errors
-/// Its ID, where it has one, and what is wrong.
+/// The ID of the request, where there is one, and the error.
 pub(super) fn parse(text: &str) -> Result<Request, (Json, String)> {
     let json: Json = serde_json::from_str(text).map_err(|error| (Json::Null, format!("no JSON: {error}")))?;
     let id = json.get("id").cloned().unwrap_or_default();

@@ -1,8 +1,9 @@
-//! Which job runs when. An SDO server serves one transfer at a time, so a node has one job at a time, in the order of the requests.
+//! The order of jobs. An SDO server serves one transfer at a time, so a node has one job at a time, in the order of the
+//! requests.
 
 use canopen::NodeId;
 
-/// What a job needs for itself.
+/// The resource that a job needs exclusively.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lane {
     /// The SDO server of a node.
@@ -11,20 +12,20 @@ pub(super) enum Lane {
     Everything,
     /// LSS, which selects nodes.
     Lss,
-    /// Nothing: what is said once.
+    /// Nothing: the job sends a single frame.
     Nothing,
 }
 
-/// How eagerly it is waited for.
+/// The urgency of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Haste {
-    /// A page waits.
+    /// A page waits for the job.
     Asked,
-    /// It is good to know: one such job at a time, and after all others of its lane.
+    /// No page waits for the job. Such jobs run one at a time, and after all other jobs of their lane.
     Background,
 }
 
-/// Jobs that wait, and the lanes of those that run.
+/// The jobs that wait, and the lanes of the running jobs.
 pub(super) struct Schedule<J> {
     waiting: Vec<(Lane, Haste, J)>,
     running: Vec<(u64, Lane, Haste)>,
@@ -52,8 +53,8 @@ impl<J> Schedule<J> {
         self.waiting.push((lane, haste, job));
     }
 
-    /// A job that may begin now, with its number. An older one of its lane goes before it, and one that needs everything is not
-    /// overtaken for ever.
+    /// A job that may begin now, with its number. Older jobs of the same lane come first. A job that needs everything
+    /// is never overtaken by later jobs.
     pub(super) fn next(&mut self) -> Option<(u64, J)> {
         let place = (0..self.waiting.len()).find(|&place| self.may_begin(place))?;
         let (lane, haste, job) = self.waiting.remove(place);
@@ -77,7 +78,7 @@ impl<J> Schedule<J> {
         !by_running && !by_older && !by_hasty
     }
 
-    /// A job is over.
+    /// Removes a finished job.
     pub(super) fn done(&mut self, number: u64) {
         self.running.retain(|(running, ..)| *running != number);
     }

@@ -1,8 +1,8 @@
-//! How much is on the bus.
+//! The load of the bus.
 
 use canopen::Frame;
 
-/// Frames and their bits, since the last look and in all.
+/// Frames and bits since the last rate, and frames in total.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Count {
     frames: u32,
@@ -10,7 +10,7 @@ pub(super) struct Count {
     pub(super) total: u64,
 }
 
-/// What was counted in a time.
+/// The rates over a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Rate {
     /// Frames a second.
@@ -19,8 +19,8 @@ pub(super) struct Rate {
     bits: f64,
 }
 
-/// Bits of a frame with an 11-bit identifier, interframe space included, and about how many stuff bits there are: one for
-/// sixteen bits that can be stuffed, between what counters and what zeros have.
+/// Bits of a frame with an 11-bit identifier, with the interframe space and an estimate of the stuff bits. The estimate
+/// is one stuff bit for sixteen bits, which lies between the numbers for counting data and for zeros.
 fn bits(frame: &Frame) -> u64 {
     let data = if frame.is_remote() { 0 } else { 8 * frame.len() as u64 };
     47 + data + (34 + data) / 16
@@ -33,7 +33,7 @@ impl Count {
         self.total += 1;
     }
 
-    /// The rate over so many seconds; the count begins anew.
+    /// The rates over a time; the counts start again at 0.
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn rate(&mut self, seconds: f64) -> Rate {
         let (frames, bits) = (std::mem::take(&mut self.frames), std::mem::take(&mut self.bits));
@@ -45,7 +45,7 @@ impl Count {
 }
 
 impl Rate {
-    /// The share of a bus, 0 to 1.
+    /// The load as a share of the bit rate, 0 to 1.
     pub(super) fn load(self, kbit: Option<u16>) -> Option<f64> {
         let share = self.bits / (f64::from(kbit?) * 1000.0);
         Some((share.min(1.0) * 10_000.0).round() / 10_000.0)

@@ -1,4 +1,4 @@
-//! The control connection of a simulator: a line is a command, and a line of JSON the answer (docs/page.md).
+//! The control connection of a simulator. A command is a line, and the answer is a line of JSON (docs/page.md).
 
 use std::io::{self, BufRead, BufReader, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -10,22 +10,22 @@ use serde_json::Value as Json;
 
 use super::pump::Order;
 
-/// How long the simulator may take for an answer.
+/// The time-out for an answer of the simulator.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Between two attempts to reach it.
+/// The time between two attempts to connect to the simulator.
 const AGAIN: Duration = Duration::from_secs(1);
 
-/// Has every change of the stimuli told to the pump, whoever makes it. Ends with the pump.
+/// Passes every change of the stimuli to the pump, also a change by another program. Ends with the pump.
 pub(super) fn watch(control: SocketAddr, orders: Sender<Order>) {
     thread::spawn(move || {
-        // A simulator that is gone may come back.
+        // A lost simulator may come back.
         while listen(control, &orders).is_ok() {
             thread::sleep(AGAIN);
         }
     });
 }
 
-/// An error when nobody takes the news any more.
+/// Passes changes to the pump until the connection is lost. Fails when the pump has ended.
 fn listen(control: SocketAddr, orders: &Sender<Order>) -> Result<(), ()> {
     let Ok(mut stream) = TcpStream::connect_timeout(&control, PATIENCE) else { return Ok(()) };
     if stream.write_all(b"watch\n").is_err() {
@@ -40,10 +40,10 @@ fn listen(control: SocketAddr, orders: &Sender<Order>) -> Result<(), ()> {
     Ok(())
 }
 
-/// Gives a command, and returns the answer.
+/// Sends a command and returns the answer.
 ///
 /// # Errors
-/// The words of the simulator, or why it cannot be asked.
+/// The error text of the simulator, or the reason why it cannot be reached.
 pub(super) fn ask(control: SocketAddr, command: &str) -> Result<Json, String> {
     let line =
         exchange(control, command).map_err(|error| format!("the simulator does not answer: {error}"))?;
@@ -67,10 +67,10 @@ fn exchange(control: SocketAddr, command: &str) -> io::Result<String> {
 /// The command that changes a stimulus.
 ///
 /// # Errors
-/// A text that would be more than one line, or another command.
+/// The text has more than one line, or contains another command.
 pub(super) fn command(board: u8, kind: &str, spec: &str) -> Result<String, String> {
     let is_plain = |text: &str| !text.is_empty() && !text.chars().any(char::is_control);
-    // A file of the machine that the simulator runs on is none of the page's business.
+    // A page must not read files on the machine of the simulator.
     if spec.trim_start().starts_with("csv:") {
         return Err("csv: is for the command line of the simulator".to_owned());
     }

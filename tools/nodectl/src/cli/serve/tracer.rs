@@ -1,4 +1,4 @@
-//! Frames in words, for the pages that want a trace.
+//! Decodes frames for the pages that show a trace.
 
 use std::sync::Arc;
 
@@ -10,10 +10,10 @@ use crate::text::hex_digits;
 use crate::trace::{Decoder, Kind, Knowledge, Line, Shown};
 use crate::value::Value;
 
-/// Rows between two events; what comes on top is counted. A bus at 1 Mbit/s has 450 frames in that time.
+/// The number of rows between two events; further rows are only counted. A bus at 1 Mbit/s has 450 frames in this time.
 const ROWS: usize = 1000;
 
-/// A row that is ready to be sent.
+/// A row in the form for an event.
 pub(super) struct Row {
     pub(super) kind: Kind,
     pub(super) node: Option<NodeId>,
@@ -25,7 +25,7 @@ pub(super) struct Row {
 pub(super) struct Tracer {
     decoder: Decoder,
     pub(super) rows: Vec<Row>,
-    /// Rows that did not fit.
+    /// The number of rows that were dropped.
     pub(super) lost: u64,
 }
 
@@ -53,17 +53,17 @@ struct Cell<'l> {
 }
 
 impl Tracer {
-    /// Tells what a node is; what it has configured is then as after a reset, until the trace shows something else.
+    /// Takes the catalogue of a node. The decoder assumes default values until the trace shows others.
     pub(super) fn know(&mut self, node: NodeId, catalogue: &Arc<Catalogue>) {
         self.decoder.know(node, Knowledge::new(Arc::clone(catalogue)));
     }
 
-    /// Tells what a node was asked for.
+    /// Takes the values that a survey has read from a node.
     pub(super) fn learn(&mut self, node: NodeId, knowledge: Knowledge) {
         self.decoder.know(node, knowledge);
     }
 
-    /// A frame was on the bus, or was sent by this side.
+    /// Takes a frame from the bus, or one that this program has sent.
     pub(super) fn on_frame(&mut self, frame: &Frame, stamp: Instant, t: f64, sent: bool) {
         for line in self.decoder.on_frame(frame, stamp) {
             if self.rows.len() < ROWS {
@@ -74,7 +74,7 @@ impl Tracer {
         }
     }
 
-    /// The rows since the last call, and how many did not fit.
+    /// The rows since the last call, and the number of dropped rows.
     pub(super) fn take(&mut self) -> (Vec<Row>, u64) {
         (std::mem::take(&mut self.rows), std::mem::take(&mut self.lost))
     }

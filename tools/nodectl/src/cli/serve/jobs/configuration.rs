@@ -1,4 +1,4 @@
-//! The configuration of a node as a file, and back.
+//! Jobs: the configuration of a node as a file, and writing a file to a node.
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
@@ -13,7 +13,7 @@ use crate::cli::{Failure, Session};
 use crate::configuration::{Configuration, plan};
 use crate::object::at;
 
-/// The data sheet of a node, and its configuration.
+/// Reads the data sheet and the configuration of a node.
 fn read(context: &mut Context, node: NodeId) -> Result<(Eds, Configuration), Failure> {
     context.catalogue(node)?;
     let sheet = context.session.sheet_of(node)?;
@@ -30,12 +30,12 @@ fn path(sheet: &Eds, at: Multiplexer) -> Option<String> {
     sheet.get(at.index, at.sub).map(|entry| sheet.path(entry))
 }
 
-/// What differs from the defaults of the data sheet.
+/// The parameters that differ from the defaults of the data sheet.
 pub(super) fn differences(node: NodeId) -> Job {
     Job::of_node(node, move |context| {
         let (sheet, values) = read(context, node)?;
         let differences = values.differences(&Configuration::of_sheet(&sheet, node));
-        // A default that the sheet does not tell is none that a value could differ from.
+        // A parameter without a default in the data sheet cannot differ.
         let differing =
             differences.iter().filter(|difference| difference.first.is_some() && difference.second.is_some());
         let rows: Vec<Json> = differing
@@ -65,7 +65,7 @@ pub(super) fn dcf(node: NodeId, all: bool) -> Job {
     })
 }
 
-/// Brings the node to the configuration of a file, and reads it back.
+/// Writes the configuration of a file to the node, and reads it back.
 pub(super) fn apply(node: NodeId, text: &str, how: Apply) -> Result<Job, String> {
     let sheet = Eds::from_bytes(text.as_bytes()).map_err(|error| error.to_string())?;
     if sheet.objects.is_empty() {

@@ -1,4 +1,4 @@
-//! Nodes that are known by their identity (CiA 305).
+//! Jobs: LSS for nodes that are known by their identity (CiA 305).
 
 use canopen::client::lss::Fastscan;
 use canopen::lss::Identity;
@@ -10,15 +10,15 @@ use crate::cli::Failure;
 use crate::cli::lss::{self as command, scan::find};
 use crate::lss::{Master, Selection};
 
-/// How long a step of a search may take.
+/// The duration of a step of a search.
 const STEP: Duration = Duration::from_millis(100);
 
-/// Looks for a node without a node-ID.
+/// Searches for a node without a node-ID.
 pub(super) fn scan() -> Job {
     Job::of_services(|context| {
         let number = context.progress_of(Fastscan::QUESTIONS.into());
         let found = find(&mut context.session, STEP, number);
-        // Whatever came of it, no slave is left waiting for more.
+        // Release all slaves in any case, also after an error.
         let released = master(context).release();
         let found = found?;
         released?;
@@ -35,7 +35,7 @@ fn shape(Identity { vendor, product, revision, serial }: Identity) -> Json {
     json!({ "vendor": vendor, "product": product, "revision": revision, "serial": serial })
 }
 
-/// Gives a node a node-ID that nobody else has, and waits until the node has booted with it.
+/// Gives a node a free node-ID, and waits until the node has booted with it.
 pub(super) fn assign(identity: Identity, node: NodeId, store: bool) -> Job {
     Job::of_services(move |context| {
         command::free(&mut context.session, node, &identity)?;
@@ -52,7 +52,7 @@ pub(super) fn assign(identity: Identity, node: NodeId, store: bool) -> Job {
         let released = master.release();
         let had_one = had_one?;
         released?;
-        // With one already, the new one is in force after a reset of communication.
+        // A node that had a node-ID already uses the new one only after a reset of communication.
         if !had_one {
             command::booted(&mut context.session, node)?;
         }
@@ -60,7 +60,7 @@ pub(super) fn assign(identity: Identity, node: NodeId, store: bool) -> Job {
     })
 }
 
-/// Gives one node, or all, another bit rate.
+/// Sets another bit rate for one node or all nodes.
 pub(super) fn bit_rate(
     kbit: u16,
     identity: Option<Identity>,

@@ -1,4 +1,5 @@
-//! What takes several frames: each on a thread of its own, with the session that the commands of the command line have.
+//! Jobs: work that takes several frames. Each job runs on a thread of its own, with the same session as the commands of
+//! the command line.
 
 mod configuration;
 mod lss;
@@ -34,7 +35,7 @@ use crate::{Catalogue, Network};
 
 type Work = Box<dyn FnOnce(&mut Context) -> Result<Json, Failure> + Send>;
 
-/// Something to do.
+/// Work that takes several frames.
 pub(super) struct Job {
     interest: Interest,
     pub(super) is_update: bool,
@@ -45,23 +46,23 @@ pub(super) struct Job {
 pub(super) struct Task {
     pub(super) lane: Lane,
     pub(super) job: Job,
-    /// A file that the page may name later.
+    /// A file that later requests of the page may name, with its number.
     pub(super) keeps: Option<(u64, Vec<u8>)>,
 }
 
-/// What a request may need besides what it says.
+/// Further data that a request may need.
 #[derive(Default)]
 pub(super) struct Means {
     pub(super) control: Option<SocketAddr>,
-    /// The file that it names.
+    /// The file that the request names.
     pub(super) file: Option<Vec<u8>>,
     /// The number of the next file.
     pub(super) number: u64,
 }
 
-/// What a job finds out for all.
+/// Facts that a job reports to the pump, for all pages.
 pub(super) enum Learned {
-    /// The node is there.
+    /// The node exists.
     Present,
     Identity(Identity, Arc<Catalogue>),
     Catalogue(Arc<Catalogue>),
@@ -69,7 +70,7 @@ pub(super) enum Learned {
     Reading(Multiplexer, Vec<u8>),
 }
 
-/// What a job works with.
+/// The environment of a job.
 pub(super) struct Context {
     pub(super) session: Session,
     orders: Sender<pump::Order>,
@@ -81,13 +82,13 @@ impl Context {
         let _ = self.orders.send(pump::Order::Progress(self.number, progress));
     }
 
-    /// Tells all pages.
+    /// A function that sends an event to all pages.
     fn teller(&self) -> impl Fn(Json) + use<> {
         let orders = self.orders.clone();
         move |event| drop(orders.send(pump::Order::Tell(event)))
     }
 
-    /// Tells how many questions of all have been asked.
+    /// A function that reports the number of questions that have been asked, out of `all`.
     fn progress_of(&self, all: u32) -> impl FnMut(u8) + use<> {
         let (orders, number) = (self.orders.clone(), self.number);
         let mut told = None;
@@ -103,7 +104,7 @@ impl Context {
         let _ = self.orders.send(pump::Order::Learned(node, learned));
     }
 
-    /// What is known about a node; for all, once it is.
+    /// The catalogue of a node. A catalogue that the session did not have yet is reported to the pump.
     pub(super) fn catalogue(&mut self, node: NodeId) -> Result<Arc<Catalogue>, Failure> {
         let is_new = !self.session.knows(node);
         let catalogue = self.session.catalogue(node)?;
@@ -113,12 +114,12 @@ impl Context {
         Ok(catalogue)
     }
 
-    /// Tells how many of all are done.
+    /// A function that reports the number of finished items.
     fn counter(&self) -> impl FnMut(usize, usize) + use<> {
         let (orders, number) = (self.orders.clone(), self.number);
         let mut told = 0;
         move |done, all| {
-            // Twenty steps of a bar are enough.
+            // A bar of twenty steps is fine enough.
             if all > 0 && (done * 20 / all != told || done == 0) {
                 told = done * 20 / all;
                 let _ = orders.send(pump::Order::Progress(number, json!({ "done": done, "all": all })));
@@ -140,7 +141,7 @@ impl Job {
     }
 }
 
-/// Begins a job; the pump is told when it is over, whatever comes of it.
+/// Begins a job. The pump is told the result in any case, also after a panic.
 pub(super) fn begin(
     job: Job,
     number: u64,
@@ -195,7 +196,7 @@ fn refusal(failure: Failure) -> Refusal {
 /// Makes a job of a request.
 ///
 /// # Errors
-/// What is wrong with the request.
+/// The error in the request.
 pub(super) fn task(what: What, means: Means) -> Result<Task, String> {
     let of = |node: super::request::Node, job: Job| Task { lane: Lane::Node(node.0), job, keeps: None };
     let with = |lane, job| Task { lane, job, keeps: None };

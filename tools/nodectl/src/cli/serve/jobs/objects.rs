@@ -1,4 +1,4 @@
-//! The dictionary of a node: what there is, the values, and changes.
+//! Jobs: the dictionary of a node, its values, and changes.
 
 use canopen::NodeId;
 use canopen::sdo::Multiplexer;
@@ -14,10 +14,10 @@ use crate::text::hex_digits;
 use crate::value::{Value, guess};
 use crate::{Catalogue, meaning};
 
-/// Values that are told at once while all are read.
+/// The number of values that are reported together while all values are read.
 const PART: usize = 20;
 
-/// All entries, as the data sheet has them.
+/// All entries of the data sheet.
 pub(super) fn dictionary(node: NodeId) -> Job {
     Job::of_node(node, move |context| {
         let catalogue = context.catalogue(node)?;
@@ -31,7 +31,7 @@ fn shape(catalogue: &Catalogue, entry: &Entry, node: NodeId) -> Json {
     let at = crate::object::at(entry.index, entry.sub);
     let value = |formula: &Option<eds::Formula>| {
         formula.as_ref().map(|formula| match formula.evaluate(node) {
-            // A number of 64 bits is none that every reader of JSON takes whole.
+            // An integer that does not fit `i64` is sent as text, because not every reader of JSON accepts it.
             Formula::Integer(value) => {
                 i64::try_from(value).map_or_else(|_| value.to_string().into(), Json::from)
             }
@@ -54,7 +54,7 @@ fn shape(catalogue: &Catalogue, entry: &Entry, node: NodeId) -> Json {
     })
 }
 
-/// Some objects. One that cannot be read does not keep the others from it.
+/// Reads some objects. An object that cannot be read does not stop the reading of the others.
 pub(super) fn read(node: NodeId, objects: Vec<Multiplexer>) -> Job {
     Job::of_node(node, move |context| {
         let catalogue = context.catalogue(node)?;
@@ -67,7 +67,7 @@ pub(super) fn read(node: NodeId, objects: Vec<Multiplexer>) -> Job {
     })
 }
 
-/// All that can be read.
+/// Reads all readable objects.
 pub(super) fn values(node: NodeId) -> Job {
     Job::of_node(node, move |context| {
         let catalogue = context.catalogue(node)?;
@@ -89,7 +89,7 @@ pub(super) fn values(node: NodeId) -> Job {
     })
 }
 
-/// The value of an object, or why the node does not tell it.
+/// The value of an object, or the reason why the node refuses the read.
 fn reading(
     context: &mut Context,
     node: NodeId,
@@ -134,7 +134,7 @@ fn value(catalogue: &Catalogue, at: Multiplexer, bytes: &[u8], quantity: &Quanti
     })
 }
 
-/// Changes an object. What its type or its limits do not allow is not sent.
+/// Writes an object. A value that violates the type or the limits is not sent.
 pub(super) fn write(node: NodeId, at: Multiplexer, value: &Json) -> Result<Job, String> {
     let text = match value {
         Json::String(text) => text.clone(),

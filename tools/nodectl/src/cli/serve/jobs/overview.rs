@@ -1,4 +1,4 @@
-//! Who is there, what they are, and what they are told to do.
+//! Jobs: the nodes on the bus, their identities, and commands to them.
 
 use std::sync::Arc;
 
@@ -13,12 +13,12 @@ use crate::cli::store::{Group, Order, sign};
 use crate::object::at;
 use crate::{Catalogue, heartbeat, nmt};
 
-/// How long answers are listened for after the last question.
+/// How long to wait for answers after the last question.
 const LISTEN: Duration = Duration::from_millis(200);
-/// How long a node may take to show that it has obeyed.
+/// How long a node may take to show the effect of a command.
 const EFFECT: Duration = Duration::from_millis(2000);
 
-/// Asks all node-IDs who is there.
+/// Asks all node-IDs for an answer.
 pub(in crate::cli::serve) fn scan() -> Job {
     Job::of_services(|context| {
         let found = crate::scan::scan(&mut context.session.network, LISTEN)?;
@@ -28,7 +28,7 @@ pub(in crate::cli::serve) fn scan() -> Job {
     })
 }
 
-/// Asks a node what it is.
+/// Asks a node for its identity.
 pub(in crate::cli::serve) fn identify(node: NodeId) -> Job {
     Job::of_node(node, move |context| {
         context.session.begin();
@@ -48,7 +48,7 @@ fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Arc<Catalo
     let mut text = |index| session.text(node, index);
     let (name, hardware, version) = (text(0x1008)?, text(0x1009)?, text(0x100A)?);
     let [vendor, product, revision, serial] = words;
-    // The node may be another than before: what it says now counts.
+    // The device may have been exchanged, so only the present answers count.
     let file = session.options.eds.is_some();
     let known = if file { Some(session.catalogue(node)?) } else { None };
     let known = known.or_else(|| {
@@ -72,7 +72,7 @@ fn identity(context: &mut Context, node: NodeId) -> Result<(Identity, Arc<Catalo
     Ok((identity, catalogue))
 }
 
-/// Gives an NMT command, and waits for its effect on one node.
+/// Sends an NMT command, and waits for its effect if the command is for one node.
 pub(super) fn nmt(node: Option<NodeId>, command: Command) -> Job {
     let (specifier, _) = command.meaning();
     let work = move |context: &mut Context| {
@@ -92,7 +92,7 @@ pub(super) fn nmt(node: Option<NodeId>, command: Command) -> Job {
     }
 }
 
-/// Has the node keep parameters, or take those of the factory.
+/// Lets the node save parameters, or restore the defaults.
 pub(super) fn store(node: NodeId, order: Order, group: Group) -> Job {
     Job::of_node(node, move |context| {
         sign(&mut context.session, node, order, group)?;

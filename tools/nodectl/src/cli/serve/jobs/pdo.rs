@@ -1,4 +1,4 @@
-//! PDOs of a node: what they carry, and changing it.
+//! Jobs: the PDOs of a node, and changes of their mapping.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::object::at;
 use crate::pdo_parameters::walk;
 use crate::trace::Knowledge;
 
-/// Finds out what a node sends; the answer has its signals.
+/// Surveys the TPDOs of a node. The answer has the signals.
 pub(in crate::cli::serve) fn survey(node: NodeId) -> Job {
     Job::of_node(node, move |context| {
         let catalogue = context.catalogue(node)?;
@@ -35,7 +35,7 @@ pub(in crate::cli::serve) fn survey(node: NodeId) -> Job {
     })
 }
 
-/// Reads objects whose values are followed.
+/// Reads the followed objects that no TPDO carries.
 pub(in crate::cli::serve) fn poll(node: NodeId, objects: Vec<Multiplexer>) -> Job {
     Job::of_node(node, move |context| {
         context.session.begin();
@@ -50,7 +50,7 @@ pub(in crate::cli::serve) fn poll(node: NodeId, objects: Vec<Multiplexer>) -> Jo
     })
 }
 
-/// All PDOs.
+/// Reads all PDOs.
 pub(super) fn pdos(node: NodeId) -> Job {
     Job::of_node(node, move |context| {
         let catalogue = context.catalogue(node)?;
@@ -68,7 +68,7 @@ pub(super) fn pdos(node: NodeId) -> Job {
     })
 }
 
-/// A PDO as pages are told of it; `None` where the node has none of this number.
+/// A PDO in the form for pages; `None` where the node has no PDO of this number.
 fn shape(
     context: &mut Context,
     node: NodeId,
@@ -102,7 +102,7 @@ fn shape(
     })))
 }
 
-/// Changes what a PDO carries, and when.
+/// Changes the mapping and the transmission of a PDO.
 pub(super) fn map(node: NodeId, mapping: Mapping) -> Job {
     Job::of_node(node, move |context| {
         let catalogue = context.catalogue(node)?;
@@ -119,7 +119,7 @@ pub(super) fn map(node: NodeId, mapping: Mapping) -> Job {
 }
 
 fn remap(context: &mut Context, pdo: &Pdo, catalogue: &Catalogue, mapping: &Mapping) -> Result<(), Failure> {
-    // Everything is looked up before anything is changed.
+    // Look up all objects before any change, so that an error leaves the PDO unchanged.
     let objects = mapping.objects.iter().map(|object| Multiplexer::from(*object));
     let entries: Result<Vec<u32>, String> =
         objects.map(|object| map::slot(catalogue, mapping.direction, object)).collect();
@@ -138,7 +138,7 @@ fn remap(context: &mut Context, pdo: &Pdo, catalogue: &Catalogue, mapping: &Mapp
     pdo.remap(&mut context.session, &before, &wanted)
 }
 
-/// Inhibit time and event timer, while the PDO is switched off (CiA 301, 7.5.2.37).
+/// Writes inhibit time and event timer, while the PDO is off (CiA 301, 7.5.2.37).
 fn times(context: &mut Context, pdo: &Pdo, mapping: &Mapping, before: &Mapped) -> Result<(), Failure> {
     let session = &mut context.session;
     for (sub, time) in [(3, mapping.inhibit), (5, mapping.event)] {

@@ -1,4 +1,4 @@
-//! Another program for a node.
+//! Jobs: the update of the program of a node.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -10,10 +10,10 @@ use crate::cli::Failure;
 use crate::object::at;
 use crate::update::{Image, ImageInfo, Options, Outcome, Program, Step, Version, Watcher, update, version};
 
-/// How long a node that is lost may stay away.
+/// How long to wait for a node that is lost.
 const PATIENCE: Duration = Duration::from_millis(60_000);
 
-/// The bytes of a file as a message has them.
+/// The bytes of a file in base64, as in a message.
 pub(super) fn decode(data: &str) -> Result<Vec<u8>, String> {
     STANDARD.decode(data).map_err(|_| "the file has not arrived whole (it is no base64)".to_owned())
 }
@@ -22,7 +22,7 @@ fn parse(bytes: Vec<u8>) -> Result<Image, String> {
     Image::parse(bytes).map_err(|error| error.to_string())
 }
 
-/// Says what would become of an update. Nothing is changed.
+/// Checks whether an update is possible. Changes nothing.
 pub(super) fn inspect(node: NodeId, name: String, bytes: Vec<u8>, file: u64) -> Job {
     Job::of_node(node, move |context| {
         let length = bytes.len();
@@ -42,7 +42,7 @@ pub(super) fn inspect(node: NodeId, name: String, bytes: Vec<u8>, file: u64) -> 
     })
 }
 
-/// What the node says of itself.
+/// The identity of a node, as far as an update needs it.
 struct Device {
     product: Option<u32>,
     version: Option<String>,
@@ -78,7 +78,7 @@ fn checks(image: &Result<Image, String>, device: &Device, name: &str) -> Vec<Jso
     ]
 }
 
-/// An older version needs to be meant.
+/// The check of the version. An older version is allowed only if the user confirms it.
 fn version_check(new: Version, running: Option<&str>, check: impl Fn(&str, bool, String) -> Json) -> Json {
     match running {
         Some(running) if version(running) > Some(new) => {
@@ -109,7 +109,7 @@ pub(super) fn start(node: NodeId, bytes: Vec<u8>, force: bool) -> Result<Job, St
     Ok(Job { is_update: true, ..Job::of_node(node, work) })
 }
 
-/// Tells all pages how far an update is.
+/// Reports the progress of an update to all pages.
 struct Teller<T: Fn(Json)> {
     orders: T,
     told: usize,
@@ -144,7 +144,7 @@ impl<T: Fn(Json)> Watcher for Teller<T> {
     }
 
     fn progress(&mut self, node: NodeId, done: usize, total: usize) {
-        // A hundred steps are enough for a bar.
+        // A bar of a hundred steps is fine enough.
         let percent = done * 100 / total.max(1);
         if percent != self.told {
             self.told = percent;

@@ -1,4 +1,4 @@
-//! What is due: events for the pages, and questions that nobody has asked for.
+//! Periodic work of the pump: events for the pages, and jobs that no page has requested.
 
 use canopen::{Duration, Instant, NodeId};
 use serde_json::json;
@@ -49,7 +49,7 @@ impl Pump {
         self.pages.tell_nodes(&self.setup.hub, changed.as_deref(), || self.nodes.all().to_string());
     }
 
-    /// Asks the nodes that were heard and not asked yet what they are.
+    /// Requests the identities of nodes that were heard and have not been asked yet.
     pub(super) fn identify(&mut self, t: f64) {
         if self.setup.silent || self.bus.is_err() {
             return;
@@ -67,7 +67,8 @@ impl Pump {
         }
     }
 
-    /// Reads the followed signals that are in no TPDO, and surveys what could not be before.
+    /// Reads the followed signals that no TPDO carries, and surveys the nodes of followed signals that have no survey
+    /// yet.
     pub(super) fn poll(&mut self) {
         for node in self.live.wanted_nodes() {
             let is_free = !self.schedule.has(Lane::Node(node));
@@ -91,7 +92,7 @@ impl Pump {
         let seconds = now.0.saturating_sub(self.looked.0) as f64 / 1e6;
         let t = self.now();
         let reason = self.bus.as_ref().err().map(ToString::to_string);
-        // A second look at once (somebody has come) would count next to nothing.
+        // Half a second is the least time for a useful rate. This function also runs whenever a page connects.
         if seconds > 0.5 {
             self.looked = now;
             self.nodes.look(t, seconds, self.bit_rate);
@@ -108,7 +109,7 @@ impl Pump {
     }
 }
 
-/// Whether an event is due; the next one is so many milliseconds after it.
+/// Whether an event is due. If so, the next one is due `period` milliseconds later.
 fn is_due(due: &mut Instant, now: Instant, period: u64) -> bool {
     let is_due = now >= *due;
     if is_due {

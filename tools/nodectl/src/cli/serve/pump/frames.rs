@@ -1,4 +1,4 @@
-//! Frames that come and go, and the bus that they are on.
+//! Receiving and sending of frames, and the loss of the bus.
 
 use canopen::{Frame, NodeId};
 use serde_json::json;
@@ -36,7 +36,7 @@ impl Pump {
         }
     }
 
-    /// A node that boots may have another mapping.
+    /// Notes a node that boots, because it may have another PDO mapping now.
     pub(super) fn on_news(&mut self, frame: &Frame, t: f64) {
         let node = u8::try_from(frame.id() & 0x7F).ok().and_then(NodeId::new);
         if let (0x701..=0x77F, Some(node), [0]) = (frame.id(), node, frame.data()) {
@@ -44,7 +44,7 @@ impl Pump {
         }
     }
 
-    /// Somebody may write to PDO parameters of a node, this side or any other master.
+    /// Notes a node whose PDO parameters are written, by this program or by another master.
     pub(super) fn look_at_writes(&mut self, frame: &Frame, t: f64) {
         let node = frame.id().checked_sub(0x600).and_then(|id| NodeId::new(u8::try_from(id).ok()?));
         let (Some(node), &[command, low, high, ..]) = (node, frame.data()) else { return };
@@ -70,7 +70,7 @@ impl Pump {
         }
     }
 
-    /// The bus is gone: all jobs are told by their ports.
+    /// Handles the loss of the bus. All jobs notice the loss at their ports.
     pub(super) fn lose(&mut self, error: BusError) {
         self.bus = Err(error);
         self.outlets.clear();

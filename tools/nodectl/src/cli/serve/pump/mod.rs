@@ -1,4 +1,4 @@
-//! The thread that has the bus: frames come in and are handed to all who want them; what pages ask for is begun here.
+//! The thread that owns the bus. It distributes the received frames and starts the jobs that pages request.
 
 mod due;
 mod frames;
@@ -27,38 +27,39 @@ use crate::Catalogue;
 use crate::bus::{Bus, BusError, clock};
 use crate::cli::Options;
 
-/// Frames that are taken before orders are looked at.
+/// The number of frames that are taken before the next look for orders.
 const AT_ONCE: usize = 512;
-/// How long a quiet bus is listened to before orders are looked at: while jobs run they wait for their orders and not for frames.
+/// How long to listen to a quiet bus before the next look for orders. While jobs run, the pump waits for their orders,
+/// not for frames.
 const LISTEN: Duration = Duration(4000);
 const PAUSE: StdDuration = StdDuration::from_micros(400);
-/// Between two attempts to open a bus that is lost.
+/// The time between two attempts to open a lost bus.
 const REOPEN: Duration = Duration::from_millis(1000);
-/// A node that has written nothing more to its PDO parameters for so long has a new mapping.
+/// A node gets a new survey when its PDO parameters have not been written for this time, in seconds.
 const SETTLED: f64 = 0.3;
-/// A node that has not said what it is is asked again after so many seconds.
+/// The time after which a node that has not told its identity is asked again, in seconds.
 const ASK_AGAIN: f64 = 10.0;
 
-/// The version of the messages.
+/// The version of the protocol with the pages.
 const PROTOCOL: u32 = 1;
 
-/// What the pump is told.
+/// An order to the pump.
 pub(super) enum Order {
-    /// By a page.
+    /// From a page.
     Page(FromPage),
-    /// By a job: hand frames over.
+    /// From a job: a port to pass frames to.
     Open(Outlet),
-    /// By a job: send this.
+    /// From a job: a frame to send.
     Send(Frame),
-    /// By a job: how far it is.
+    /// From a job: its progress.
     Progress(u64, Json),
-    /// By a job: an event for all pages.
+    /// From a job: an event for all pages.
     Tell(Json),
-    /// By a job: what it has found out.
+    /// From a job: a fact about a node.
     Learned(NodeId, Learned),
-    /// By a job: it is over.
+    /// From a job: the result.
     Done(u64, Result<Json, Refusal>),
-    /// By the simulator.
+    /// From the simulator: a change of the stimuli.
     Stimuli(Json),
 }
 
@@ -70,21 +71,21 @@ pub(super) struct Refusal {
     pub(super) abort: Option<u32>,
 }
 
-/// Who waits for a job.
+/// The page that waits for a job.
 #[derive(Clone, Debug)]
 struct Asker {
     page: PageId,
     id: Json,
 }
 
-/// A job that waits for its turn.
+/// A job in the queue.
 struct Waiting {
     asker: Option<Asker>,
     node: Option<NodeId>,
     job: Job,
 }
 
-/// A job that runs.
+/// A running job.
 struct Running {
     number: u64,
     asker: Option<Asker>,
@@ -92,7 +93,7 @@ struct Running {
     is_update: bool,
 }
 
-/// What the pump is started with.
+/// The settings of the pump.
 pub(super) struct Setup {
     pub(super) options: Options,
     pub(super) silent: bool,
@@ -100,7 +101,7 @@ pub(super) struct Setup {
     pub(super) hub: Arc<Hub>,
 }
 
-/// When events are due.
+/// The times at which events are due.
 #[derive(Default)]
 struct Due {
     live: Instant,
@@ -111,7 +112,7 @@ struct Due {
     reopen: Instant,
 }
 
-/// The bus and all that is known of it.
+/// The bus and the state of all nodes, pages and jobs.
 pub(super) struct Pump {
     setup: Setup,
     bus: Result<Box<dyn Bus>, BusError>,
@@ -127,9 +128,9 @@ pub(super) struct Pump {
     running: Vec<Running>,
     count: Count,
     rate: Rate,
-    /// Nodes whose PDO parameters were written, and when.
+    /// Nodes whose PDO parameters were written, with the time of the last write.
     remapped: Vec<(NodeId, f64)>,
-    /// By vendor-ID and product code.
+    /// The catalogues by vendor-ID and product code.
     catalogues: BTreeMap<(Option<u32>, Option<u32>), Arc<Catalogue>>,
     stimuli: Option<Json>,
     bit_rate: Option<u16>,
@@ -139,14 +140,14 @@ pub(super) struct Pump {
 }
 
 impl Pump {
-    /// With a bus that is open, or will be.
+    /// A pump with an open bus; without one, the pump opens the bus itself.
     pub(super) fn new(
         setup: Setup,
         bus: Option<Box<dyn Bus>>,
         orders: Sender<Order>,
         inbox: Receiver<Order>,
     ) -> Pump {
-        // Adapters that have a bit rate of their own do not tell it; a simulator does.
+        // The bit rate is known only of adapters that have to be told it. A simulator reports its bit rate later.
         let bit_rate = setup.options.bus.needs_bit_rate().then_some(setup.options.bit_rate);
         Pump {
             setup,
@@ -173,7 +174,7 @@ impl Pump {
         }
     }
 
-    /// Runs for as long as there are pages that could say something: until the process ends.
+    /// Runs until the process ends.
     pub(super) fn run(mut self) {
         if self.bus.is_ok() {
             self.scan();
@@ -188,7 +189,7 @@ impl Pump {
         }
     }
 
-    /// Looks who is there.
+    /// Searches for nodes on the bus.
     fn scan(&mut self) {
         if !self.setup.silent {
             self.enqueue(None, Lane::Everything, Haste::Asked, None, jobs::scan());

@@ -1,4 +1,4 @@
-//! What pages, jobs and the simulator say.
+//! Handling of the orders of pages, jobs and the simulator.
 
 use std::collections::BTreeSet;
 use std::sync::mpsc::RecvTimeoutError;
@@ -17,9 +17,10 @@ use crate::cli::serve::request::{self, What};
 use crate::cli::serve::schedule::{Haste, Lane};
 
 impl Pump {
-    /// An error when nobody can give orders any more.
+    /// Handles the waiting orders. Fails when all senders of orders are gone.
     pub(super) fn take_orders(&mut self) -> Result<(), RecvTimeoutError> {
-        // Jobs wait for their orders to be carried out; without a bus there is nothing else to wait for.
+        // Wait a little while jobs run, because jobs depend on quick handling of their orders. Without a bus there is
+        // no other work at all.
         let mut pause = match &self.bus {
             Ok(_) if self.outlets.is_empty() => StdDuration::ZERO,
             Ok(_) => PAUSE,
@@ -44,7 +45,7 @@ impl Pump {
                 self.live.want(self.pages.follows());
             }
             Order::Page(FromPage::Said { page, text }) => self.hear(page, &text),
-            // Where there is no bus, the outlet is dropped, and the port tells the job.
+            // Without a bus the outlet is dropped, and the job notices the loss at its port.
             Order::Open(outlet) if self.bus.is_ok() => self.outlets.push(outlet),
             Order::Open(_) => {}
             Order::Send(frame) => self.send(&frame),
@@ -94,7 +95,7 @@ impl Pump {
         }
     }
 
-    /// Answers at once what needs no bus, and makes a job of the rest.
+    /// Answers a request at once if it needs no bus, else makes a job of it.
     pub(super) fn serve(&mut self, asker: Asker, what: What) {
         match what {
             What::Follow { signals } => {
@@ -180,7 +181,7 @@ impl Pump {
         Ok(json!({ "signals": known }))
     }
 
-    /// Finds out what a node sends, unless that is under way.
+    /// Surveys a node, unless a job of this node waits or runs.
     pub(super) fn survey(&mut self, node: NodeId) {
         if self.bus.is_ok() && !self.schedule.has(Lane::Node(node)) {
             self.enqueue(None, Lane::Node(node), Haste::Asked, Some(node), jobs::survey(node));

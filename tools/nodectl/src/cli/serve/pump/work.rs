@@ -1,4 +1,4 @@
-//! Jobs: when they begin, what they find out, and what comes of them.
+//! The start of jobs, their findings, and their results.
 
 use std::sync::Arc;
 
@@ -58,7 +58,7 @@ impl Pump {
         }
     }
 
-    /// Answers a request that was counted.
+    /// Answers a request, which then no longer counts as waiting.
     pub(super) fn answer(&mut self, asker: &Asker, result: Result<Json, Refusal>) {
         if let Some(page) = self.pages.get(asker.page) {
             page.answered();
@@ -79,7 +79,7 @@ impl Pump {
         match learned {
             Learned::Present => drop(self.nodes.change(node)),
             Learned::Identity(identity, catalogue) => {
-                // Nodes of a kind share one: a data sheet is large.
+                // Nodes of the same product share a catalogue, because a data sheet is large.
                 let kind = (identity.vendor, identity.product);
                 let catalogue = Arc::clone(self.catalogues.entry(kind).or_insert(catalogue));
                 self.tracer.know(node, &catalogue);
