@@ -123,7 +123,7 @@ fn object(ini: &Ini, section: Section, index: u16) -> Result<Object, Error> {
     Ok(Object { index, name, object_type, entries })
 }
 
-/// An object without an object type is a variable (CiA 306), unless it counts sub-indices.
+/// An object without an object type is a variable (CiA 306); if the object counts sub-indices, a record.
 fn object_type(section: Section) -> Result<ObjectType, Error> {
     let Some(text) = section.get("ObjectType") else {
         let has_subs = section.number::<u8>("SubNumber")? != 0;

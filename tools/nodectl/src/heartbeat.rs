@@ -8,7 +8,7 @@ use crate::bus::BusError;
 
 pub use canopen::client::heartbeat::Heartbeat;
 
-/// Waits for the next heartbeat of a node; `None` when there was none in this time.
+/// Waits for the next heartbeat of a node; `None` when none has come in this time.
 ///
 /// # Errors
 /// The bus is lost.

@@ -1,7 +1,8 @@
-//! The host's side of a CANopen bus.
+//! The host side of a CANopen bus.
 //!
-//! [`bus`] opens one, over SocketCAN, socketcand or slcan; [`Network`] is what the services share: [`sdo`], [`nmt`],
-//! [`heartbeat`], [`lss`]. On them stand [`update`] (CiA 302-3) and the command line tool of this crate.
+//! [`bus`] opens a bus over SocketCAN, socketcand or slcan. [`Network`] is the shared base of the services [`sdo`],
+//! [`nmt`], [`heartbeat`] and [`lss`]. [`update`] (CiA 302-3) and the command line tool of this crate use these
+//! services.
 //!
 //! ```no_run
 //! use nodectl::{Network, object, sdo};

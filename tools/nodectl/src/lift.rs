@@ -1,4 +1,5 @@
-//! The values in the pre-defined PDOs of a lift (CiA 417), by their catalogue: no node has to be asked what it sends.
+//! The values in the pre-defined PDOs of a lift (CiA 417). CiA 417 defines their mapping, so no node has to be asked
+//! for it.
 
 use canopen::Frame;
 use canopen::pdo::Mpdo;
@@ -12,22 +13,22 @@ use crate::value::Value;
 /// A value in a PDO.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// What the PDO is.
+    /// The meaning of the PDO.
     pub pdo: &'static str,
-    /// Node-ID of who has sent it, where the CAN-ID tells it.
+    /// The node-ID of the sender, where the CAN-ID tells it.
     pub producer: Option<u8>,
     /// The object.
     pub at: Multiplexer,
-    /// What it is; empty for one that a multiplexed PDO names and nobody knows.
+    /// The name of the object; empty for an unknown object in a multiplexed PDO.
     pub name: String,
-    /// Its value.
+    /// The value.
     pub value: Value,
 }
 
-/// Knows the objects of a lift.
+/// A decoder with the objects of a lift.
 #[derive(Clone, Debug)]
 pub struct Lift {
-    /// Of this project's device, for what it sends beyond the profile.
+    /// The data sheet of this project's lift device, for its objects beyond the profile.
     sheet: Catalogue,
 }
 
@@ -38,7 +39,8 @@ impl Default for Lift {
 }
 
 impl Lift {
-    /// The values in a frame; none in one that is no PDO of the lift. A value that is not in it whole is left out.
+    /// The values in a frame; none where the frame is no PDO of the lift. A value that the frame does not contain
+    /// completely is left out.
     #[must_use]
     pub fn readings(&self, frame: &Frame) -> Vec<Reading> {
         let Some(definition) = by_cob_id(frame.id().into()) else { return Vec::new() };
@@ -71,7 +73,7 @@ fn mapped(definition: Definition, data: &[u8]) -> Vec<Reading> {
     definition.fields().filter_map(reading).collect()
 }
 
-/// Words of more than 32 bits have a structure that is not public.
+/// Decodes a field. Fields of more than 32 bits have a structure that is not public, and stay bytes.
 fn decode(Field { object, .. }: Field, word: u64) -> Value {
     match object.bits {
         33.. => Value::Bytes(word.to_le_bytes()[..usize::from(object.bits / 8)].to_vec()),

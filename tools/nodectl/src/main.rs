@@ -20,7 +20,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A command line that is wrong, or asks for help. A script that asked for JSON gets the error as JSON too.
+/// Prints an error of the command line, or the help. With `--json` the error is JSON, too.
 fn usage(error: &clap::Error) -> ExitCode {
     let wants_json = std::env::args_os().any(|argument| argument == "--json");
     if wants_json && error.use_stderr() {

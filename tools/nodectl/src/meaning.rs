@@ -1,4 +1,4 @@
-//! Numbers that stand for something: units, emergency error codes, status bits.
+//! Numbers with a meaning: units, emergency error codes, status bits.
 
 use canopen::emcy::Message;
 use canopen::sdo::Multiplexer;
@@ -7,7 +7,7 @@ use crate::Catalogue;
 use crate::unit::symbol;
 use crate::value::Value;
 
-/// What the value of an object says in words; `None` where the number says all.
+/// The meaning of a value in words; `None` where the number itself is the meaning.
 #[must_use]
 pub fn of(catalogue: &Catalogue, at: Multiplexer, value: &Value) -> Option<String> {
     if let Value::Real32(number) = value {
@@ -36,7 +36,7 @@ fn status(bits: i128) -> String {
 const REGISTER: [&str; 8] =
     ["generic", "current", "voltage", "temperature", "communication", "profile", "reserved", "manufacturer"];
 
-/// An emergency in words: code, error register, and what the manufacturer adds.
+/// An emergency in words: code, error register, and the manufacturer's part.
 #[must_use]
 pub fn emergency(message: Message) -> String {
     let Message { code, register, detail } = message;
@@ -51,7 +51,7 @@ pub fn emergency(message: Message) -> String {
     format!("{text}, manufacturer {}", detail.join(" "))
 }
 
-/// Emergency error codes (CiA 301, table 26): those with a name of their own, then the classes.
+/// Emergency error codes (CiA 301, table 26): codes with a name of their own, then the classes.
 const CODES: [(u16, u16, &str); 31] = [
     (0x8110, 0xFFFF, "CAN overrun"),
     (0x8120, 0xFFFF, "error passive"),

@@ -1,4 +1,5 @@
-//! The bus as the services above it use it: wait for one frame without losing the others, open it again.
+//! The shared access of the services to a bus: waiting for one frame without losing the others, and opening the bus
+//! again.
 
 use std::collections::VecDeque;
 
@@ -9,13 +10,14 @@ use canopen::{Duration, Frame, Instant, NodeId};
 
 use crate::bus::{Bus, BusError, Received};
 
-/// Frames that are kept for later; the oldest go first.
+/// The number of frames that are kept for later; the oldest frames are dropped first.
 const KEPT: usize = 4096;
 
-/// Frames that a service is handed between two of its steps. A bus that is flooded must not hold up its deadline.
+/// The number of frames that a service gets between two of its steps. The limit keeps a flooded bus from delaying the
+/// deadline.
 const AT_ONCE: usize = 256;
 
-/// Frames that a log takes; what comes later is not written down.
+/// The number of frames in a log; later frames are not logged.
 const LOGGED: usize = 100_000;
 
 /// A frame of the log.
@@ -23,29 +25,30 @@ const LOGGED: usize = 100_000;
 pub struct Logged {
     /// The frame.
     pub frame: Frame,
-    /// When it was on the bus, by the clock of the adapter; when this side sent the frame, by the clock of this side.
+    /// Time of the frame on the bus, by the clock of the adapter. For a frame that this program has sent, by the clock
+    /// of this computer.
     pub at: Instant,
-    /// When it was received or sent, by the clock of this side.
+    /// Time of receiving or sending, by the clock of this computer.
     pub here: Instant,
-    /// Whether this side sent it.
+    /// Whether this program has sent the frame.
     pub is_sent: bool,
 }
 
-/// A bus that can be opened again when it is lost.
+/// A bus that can be opened again after it is lost.
 pub struct Network {
     opener: Box<dyn FnMut() -> Result<Box<dyn Bus>, BusError>>,
     bus: Box<dyn Bus>,
     kept: VecDeque<Received>,
-    /// Time stamp of the newest frame and when it arrived.
+    /// Time stamp of the newest frame, and the time of its arrival.
     newest: Option<(Instant, Instant)>,
     log: Option<Vec<Logged>>,
 }
 
 impl Network {
-    /// Goes on the bus that `opener` opens, now and whenever [`reopen`](Network::reopen) is called.
+    /// Opens the bus by `opener`, which is called again for each [`reopen`](Network::reopen).
     ///
     /// # Errors
-    /// Those of `opener`.
+    /// The errors of `opener`.
     pub fn open(
         mut opener: impl FnMut() -> Result<Box<dyn Bus>, BusError> + 'static,
     ) -> Result<Network, BusError> {
@@ -53,10 +56,10 @@ impl Network {
         Ok(Network { opener: Box::new(opener), bus, kept: VecDeque::new(), newest: None, log: None })
     }
 
-    /// Opens the bus anew. What is kept of the old one is dropped.
+    /// Opens the bus again. The kept frames of the old bus are dropped.
     ///
     /// # Errors
-    /// Those of the opener; the network is as it was.
+    /// The errors of the opener; the network is unchanged then.
     pub fn reopen(&mut self) -> Result<(), BusError> {
         self.bus = (self.opener)()?;
         self.kept.clear();
@@ -64,33 +67,33 @@ impl Network {
         Ok(())
     }
 
-    /// The time of this side.
+    /// The time of this computer.
     #[must_use]
     pub fn now(&self) -> Instant {
         self.bus.now()
     }
 
-    /// The time on the bus by the clock of the adapter: the newest time stamp and what has passed since. `None` before
+    /// The time on the bus by the clock of the adapter: the newest time stamp and the time since then. `None` before
     /// the first frame.
     #[must_use]
     pub fn bus_time(&self) -> Option<Instant> {
         self.newest.map(|(at, arrival)| at + Duration(self.now().0.saturating_sub(arrival.0)))
     }
 
-    /// The time stamp of the newest frame. `None` before the first.
+    /// The time stamp of the newest frame; `None` before the first frame.
     #[must_use]
     pub fn newest_stamp(&self) -> Option<Instant> {
         self.newest.map(|(at, _)| at)
     }
 
-    /// The state that the newest heartbeat of a node told, of those that were passed over.
+    /// The state in the newest heartbeat of a node, among the kept frames.
     #[must_use]
     pub fn last_state(&self, node: NodeId) -> Option<State> {
         let heartbeats = self.kept.iter().rev().filter_map(|received| Heartbeat::parse(&received.frame));
         heartbeats.filter(|heard| heard.node == node).map(|heard| heard.state).next()
     }
 
-    /// The oldest of the frames that were passed over.
+    /// The oldest kept frame.
     pub fn take_kept(&mut self) -> Option<Received> {
         self.kept.pop_front()
     }
@@ -106,7 +109,7 @@ impl Network {
         Ok(())
     }
 
-    /// Begins a log of all frames, sent and received. One that was begun before is dropped.
+    /// Begins a log of all frames, sent and received. A former log is dropped.
     pub fn begin_log(&mut self) {
         self.log = Some(Vec::new());
     }
@@ -128,7 +131,8 @@ impl Network {
         }
     }
 
-    /// The next frame; `None` when there was none until then. First come those that [`wait`](Network::wait) passed over.
+    /// The next frame; `None` when none has come until then. The frames that [`wait`](Network::wait) has kept come
+    /// first.
     ///
     /// # Errors
     /// The bus is lost.
@@ -139,12 +143,12 @@ impl Network {
         }
     }
 
-    /// Forgets the frames that were passed over.
+    /// Drops the kept frames.
     pub fn forget(&mut self) {
         self.kept.clear();
     }
 
-    /// The first frame from now on that `pick` takes; `None` when there was none until then. The others are kept.
+    /// The first new frame that `pick` accepts; `None` when none has come until then. The other frames are kept.
     ///
     /// # Errors
     /// The bus is lost.
@@ -158,7 +162,7 @@ impl Network {
                 return Ok(Some(picked));
             }
             self.keep(received);
-            // A busy bus must not hold up the deadline.
+            // A busy bus must not delay the deadline.
             if self.now() >= until {
                 break;
             }
@@ -166,7 +170,7 @@ impl Network {
         Ok(None)
     }
 
-    /// Runs a service of crate `canopen` to its end. Frames that it has no use for are kept.
+    /// Runs a service of the crate `canopen` to its end. Frames that the service does not use are kept.
     ///
     /// # Errors
     /// The bus is lost.
@@ -174,7 +178,7 @@ impl Network {
         self.run_with(service, |_| ())
     }
 
-    /// The same; `progress` looks at the service whenever something has come of it.
+    /// Runs a service to its end. `progress` is called with the service after each step.
     ///
     /// # Errors
     /// The bus is lost.
@@ -199,7 +203,7 @@ impl Network {
         }
     }
 
-    /// Hands over what has arrived.
+    /// Passes the frames that have arrived to the service.
     fn hand_over(&mut self, service: &mut impl Service) -> Result<(), BusError> {
         for _ in 0..AT_ONCE {
             let Some(received) = self.fetch(self.now())? else { break };
@@ -221,7 +225,7 @@ impl Network {
         self.kept.push_back(received);
     }
 
-    /// Lets time pass; what arrives is kept.
+    /// Lets time pass; the frames that arrive are kept.
     ///
     /// # Errors
     /// The bus is lost.

@@ -15,8 +15,8 @@ pub fn send(network: &mut Network, specifier: Command, node: Option<NodeId>) -> 
     network.send(&command(specifier, node))
 }
 
-/// Sends a command to one node and waits for the heartbeat or boot-up message that shows its effect: the state, or
-/// `None` when nothing showed it in this time.
+/// Sends a command to one node and waits for the heartbeat or boot-up message that shows its effect. Returns the state,
+/// or `None` when no such message has come in this time.
 ///
 /// # Errors
 /// The bus is lost.

@@ -1,4 +1,4 @@
-//! How an object is written.
+//! The notation of objects.
 
 use std::fmt;
 

@@ -1,30 +1,30 @@
-//! Which PDOs a node has: the records from 1400h and 1800h on, and the mapping of each 200h above.
+//! Search for the PDOs of a node: the records from 1400h and 1800h on, and their mappings 200h above.
 
 use std::ops::RangeInclusive;
 
 use crate::Catalogue;
 use crate::object::at;
 
-/// So many PDOs in a row that do not exist, and there are no more but those of the data sheet. Devices may leave gaps.
+/// After this number of missing PDOs in a row, only PDOs of the data sheet are looked for. Devices may leave gaps.
 const GAP: u16 = 4;
-/// As many as there can be of each kind (CiA 301, 7.5.2.35 and 7.5.2.37).
+/// The greatest number of PDOs of each kind (CiA 301, 7.5.2.35 and 7.5.2.37).
 pub(crate) const PDOS: u16 = 512;
-/// More mapped objects than this are no mapping but a kind of MPDO (CiA 301, 7.5.2.36).
+/// A larger number of mapped objects stands for a kind of MPDO (CiA 301, 7.5.2.36).
 const SLOTS: u8 = 64;
 
 /// Indices of the parameters of one PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Parameters {
-    /// From 0.
+    /// The number of the PDO, from 0.
     pub(crate) number: u16,
     pub(crate) communication: u16,
     pub(crate) mapping: u16,
 }
 
-/// Visits the PDOs of a kind until there are no more. `first` is 1400h or 1800h; `visit` answers whether there is such a PDO.
+/// Visits the PDOs of a kind. `first` is 1400h or 1800h; `visit` returns whether the PDO exists.
 ///
 /// # Errors
-/// Those of `visit`.
+/// The errors of `visit`.
 pub(crate) fn walk<E>(
     catalogue: &Catalogue,
     first: u16,

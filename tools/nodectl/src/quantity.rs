@@ -1,4 +1,4 @@
-//! What the number of an object means: its unit and where its decimal point is.
+//! The unit and the decimal point of the number in an object.
 
 use canopen::sdo::Multiplexer;
 use eds::{Class, DataType};
@@ -9,16 +9,16 @@ use crate::sdo::{Client, Error};
 use crate::unit::symbol;
 use crate::value::{Value, ValueError};
 
-/// The unit of a value, and what its number is multiplied with.
+/// The unit of a value, and the scale of its number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Quantity {
     /// The unit; empty where there is none.
     pub unit: String,
-    /// What the number is multiplied with; `None` where it is the value.
+    /// The scale; `None` where the number is the value.
     scale: Option<Scale>,
 }
 
-/// Times `factor`, the point so many digits from the right.
+/// Multiplication by `factor`, with the decimal point `digits` digits from the right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Scale {
     factor: u32,
@@ -26,31 +26,32 @@ struct Scale {
 }
 
 impl Quantity {
-    /// A number that is the value.
+    /// A quantity whose number is the value.
     #[must_use]
     pub fn plain(unit: &str) -> Quantity {
         Quantity { unit: unit.to_owned(), scale: None }
     }
 
-    /// Whether the number of an object is multiplied to be the value.
+    /// Whether the number has to be multiplied to get the value.
     #[must_use]
     pub fn is_scaled(&self) -> bool {
         self.scale.is_some()
     }
 
-    /// What the data sheet says, or the objects of the node that it names: the unit (6131h in CiA 404) and the decimal
-    /// digits beside it (6132h), or a measuring step (6384h in CiA 417).
+    /// The quantity of an object, from the data sheet or from the objects of the node that the data sheet names: the
+    /// unit (6131h in CiA 404) and the decimal digits beside it (6132h), or a measuring step (6384h in CiA 417).
     ///
     /// # Errors
-    /// Those of SDO, but for a node that has no such object.
+    /// SDO errors, except where the node has no such object.
     pub fn of(client: &mut Client, catalogue: &Catalogue, of: Multiplexer) -> Result<Quantity, Error> {
         Quantity::by(catalogue, of, |at| word(client, at))
     }
 
-    /// The same, where `word` reads the numbers of those objects; `None` for an object that the node does not have.
+    /// The quantity of an object. `word` reads the number of an object, or returns `None` where the node does not have
+    /// it.
     ///
     /// # Errors
-    /// Those of `word`.
+    /// The errors of `word`.
     pub fn by<E>(
         catalogue: &Catalogue,
         of: Multiplexer,
@@ -71,7 +72,7 @@ impl Quantity {
         Ok(Quantity { unit: symbol(code), scale: Scale::new(1, digits) })
     }
 
-    /// So many steps of `10 um` or `0.1 mm/s`.
+    /// A number of steps, each of a size such as `10 um` or `0.1 mm/s`.
     fn of_steps(steps: u32, step: &str) -> Quantity {
         let (number, unit) = step.split_once(' ').unwrap_or(("1", step));
         let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
@@ -81,7 +82,7 @@ impl Quantity {
         Quantity { unit: unit.to_owned(), scale: Scale::new(factor, digits) }
     }
 
-    /// The value as it is meant.
+    /// The value of a number, with the scale applied.
     #[must_use]
     pub fn apply(&self, value: Value) -> Value {
         match (self.scale, value) {
@@ -92,8 +93,8 @@ impl Quantity {
         }
     }
 
-    /// The number on the wire of a value that somebody has typed: with a point the value is as it is meant, without one the
-    /// number itself.
+    /// The number on the wire for a value that a person has typed. A text with a decimal point is a scaled value; a
+    /// text without one is the number itself.
     ///
     /// # Errors
     /// The text is no value of this type.
@@ -104,8 +105,8 @@ impl Quantity {
         }
     }
 
-    /// The number of a value that is given with a point, as `2.5`; `None` for any other text, and where the number is the
-    /// value.
+    /// The number for a text with a decimal point, for example `2.5`; `None` for any other text, and where there is no
+    /// scale.
     #[must_use]
     pub fn number(&self, text: &str) -> Option<i128> {
         let Scale { factor, digits } = self.scale?;
@@ -118,7 +119,7 @@ impl Quantity {
 }
 
 impl Scale {
-    /// `None` for the scale that changes nothing. Zeros behind the point that are always there are left out.
+    /// A scale; `None` where it would change nothing. Decimal places that are always 0 are left out.
     fn new(mut factor: u32, digits: u32) -> Option<Scale> {
         let mut digits = u8::try_from(digits.min(38)).unwrap_or(38);
         while digits > 0 && factor != 0 && factor.is_multiple_of(10) {
@@ -128,7 +129,7 @@ impl Scale {
     }
 }
 
-/// The object with the decimal digits of an integer: beside the unit, where the data sheet says that it is that.
+/// The object with the decimal digits of an integer: the object beside the unit, if its name in the data sheet says so.
 fn digits_object(catalogue: &Catalogue, unit: u16, of: Multiplexer) -> Option<Multiplexer> {
     let object = at(unit.checked_add(1)?, of.sub);
     let is_integer = matches!(catalogue.data_type(of)?.class(), Class::Signed(_) | Class::Unsigned(_));
@@ -136,7 +137,7 @@ fn digits_object(catalogue: &Catalogue, unit: u16, of: Multiplexer) -> Option<Mu
     (is_integer && name.contains("decimal digits")).then_some(object)
 }
 
-/// A number of up to four bytes; `None` where the node has none for us.
+/// A number of up to four bytes; `None` where the node refuses the object.
 fn word(client: &mut Client, at: Multiplexer) -> Result<Option<u32>, Error> {
     match client.upload(at) {
         Ok(bytes) => Ok(Some(bytes.iter().take(4).rev().fold(0, |word, &byte| word << 8 | u32::from(byte)))),

@@ -1,4 +1,4 @@
-//! Who is on the bus.
+//! Search for the nodes on the bus.
 
 use std::collections::BTreeMap;
 
@@ -11,15 +11,15 @@ use crate::bus::BusError;
 use crate::heartbeat::Heartbeat;
 use crate::object::at;
 
-/// Between two questions, so that no queue on the way overflows.
+/// The time between two requests, so that no queue overflows.
 const PACE: Duration = Duration::from_millis(2);
 
-/// What was heard of a node.
+/// The signs of a node that were heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Presence {
-    /// Its device type (1000h), where it answered.
+    /// The device type (1000h), where the node has answered.
     pub device_type: Option<u32>,
-    /// Its state, where a heartbeat was heard.
+    /// The state, where a heartbeat was heard.
     pub state: Option<State>,
 }
 
@@ -58,7 +58,7 @@ fn listen(
     Ok(())
 }
 
-/// Who answers and what; an abort is an answer too.
+/// The node of an answer, and its device type. An abort is an answer, too.
 fn answer(frame: &Frame) -> Option<(NodeId, Option<u32>)> {
     let node = u8::try_from(frame.id().checked_sub(0x580)?).ok().and_then(NodeId::new)?;
     let device_type = match Response::parse(frame.data().try_into().ok()?)? {

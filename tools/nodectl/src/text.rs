@@ -1,9 +1,9 @@
-//! Text that comes from a device, a file or a network, made fit for a terminal.
+//! Makes text from a device, a file or a network safe for a terminal.
 
 use std::fmt::Write as _;
 
-/// The text with its control characters made visible: `\n`, `\x1b`. What turns the direction of a line or hides in it
-/// counts as control character too. A terminal obeys such characters, and a line break fakes a line of its own.
+/// The text with its control characters made visible: `\n`, `\x1b`. Characters that change the text direction or are
+/// invisible count as control characters, too. A terminal obeys such characters, and a line break would fake a line.
 #[must_use]
 pub fn visible(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -24,7 +24,7 @@ pub fn visible(text: &str) -> String {
     out
 }
 
-/// The same for several lines that are our own: each of them stays one.
+/// Makes control characters visible in a text of several lines of our own. The line breaks stay.
 #[must_use]
 pub fn visible_lines(text: &str) -> String {
     let lines: Vec<String> = text.split('\n').map(visible).collect();

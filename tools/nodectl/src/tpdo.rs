@@ -1,4 +1,4 @@
-//! The TPDOs of a node as it has them configured, and the values in their frames.
+//! The TPDOs of a node as they are configured, and the values in their frames.
 
 use canopen::CobId;
 use canopen::pdo::MappedObject;
@@ -12,16 +12,16 @@ use crate::sdo::{Client, Error};
 /// A TPDO that is switched on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tpdo {
-    /// From 1.
+    /// The number of the TPDO, from 1.
     pub number: u16,
-    /// Its CAN-ID.
+    /// The CAN-ID.
     pub id: u16,
-    /// What is in it, from the first bit on.
+    /// The mapped objects, from the first bit on.
     pub mapping: Vec<MappedObject>,
 }
 
 impl Tpdo {
-    /// The bytes of each value in a frame; a value that is not in it whole is left out.
+    /// The bytes of each value in a frame. A value that the frame does not contain completely is left out.
     pub fn values<'a>(&'a self, data: &'a [u8]) -> impl Iterator<Item = (Multiplexer, Vec<u8>)> + 'a {
         let mut offset = 0;
         self.mapping.iter().filter_map(move |mapped| {
@@ -32,7 +32,7 @@ impl Tpdo {
     }
 }
 
-/// Bits of a frame, the first one the lowest of the first byte, in as many bytes as they need.
+/// Bits of a frame in as few bytes as possible. The first bit is the lowest bit of the first byte.
 fn bits(data: &[u8], from: usize, length: usize) -> Option<Vec<u8>> {
     if from + length > 8 * data.len() || length == 0 {
         return None;
@@ -48,7 +48,7 @@ fn bits(data: &[u8], from: usize, length: usize) -> Option<Vec<u8>> {
 /// The TPDOs of a node that are switched on.
 ///
 /// # Errors
-/// Those of SDO.
+/// SDO errors.
 pub fn read(client: &mut Client, catalogue: &Catalogue) -> Result<Vec<Tpdo>, Error> {
     let mut found = Vec::new();
     walk(catalogue, 0x1800, |pdo| {
@@ -62,7 +62,7 @@ pub fn read(client: &mut Client, catalogue: &Catalogue) -> Result<Vec<Tpdo>, Err
 }
 
 fn read_one(client: &mut Client, pdo: Parameters, cob_id: u32) -> Result<Option<Tpdo>, Error> {
-    // Bit 31 switches it off; one with an extended identifier is none for us.
+    // With bit 31 the PDO is off. A PDO with a 29-bit identifier is not supported here.
     let Some(cob_id) = CobId::parse(cob_id).filter(|cob_id| !cob_id.bit31) else { return Ok(None) };
     let count = client.upload(at(pdo.mapping, 0))?.first().copied().unwrap_or(0);
     let mut mapping = Vec::new();

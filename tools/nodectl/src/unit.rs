@@ -9,7 +9,7 @@ pub fn symbol(code: u32) -> String {
         0x22 => "Pa",
         0x2D => "\u{b0}C",
         0x4E => "bar",
-        // Codes that CiA leaves to profiles, as CiA 404 uses them.
+        // Codes that CiA 303-2 leaves to the profiles, with their meaning in CiA 404.
         0xA0 => "mmHg",
         0xA1 => "at",
         0xA2 => "mmH2O",

@@ -21,24 +21,24 @@ pub struct Configuration {
     pub values: BTreeMap<(u16, u8), Value>,
 }
 
-/// A parameter that has two values, or only one.
+/// A parameter whose values differ, or that only one configuration has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// The parameter.
     pub at: Multiplexer,
-    /// Its value in the first configuration.
+    /// The value in the first configuration.
     pub first: Option<Value>,
-    /// Its value in the second.
+    /// The value in the second configuration.
     pub second: Option<Value>,
 }
 
-/// Objects that are written to make the device do something.
+/// Whether an object is a command: a write makes the device act.
 fn is_command(index: u16) -> bool {
     matches!(index, 0x1003 | 0x1010 | 0x1011 | 0x1F50..=0x1F5F)
 }
 
-/// Whether an entry is a parameter: it can be read and written, is no command, no domain, and no process value that an
-/// RPDO brings.
+/// Whether an entry is a parameter: readable and writable, and neither a command nor a domain nor a process value of an
+/// RPDO.
 #[must_use]
 pub fn is_parameter(entry: &Entry) -> bool {
     let is_process_value = entry.mappable && entry.is_rpdo_mappable();
@@ -48,7 +48,7 @@ pub fn is_parameter(entry: &Entry) -> bool {
 }
 
 impl Configuration {
-    /// What a data sheet or a configuration file says: the value, and where there is none the default.
+    /// The values of a data sheet or a configuration file. Where there is no value, the default.
     #[must_use]
     pub fn of_sheet(sheet: &Eds, node: NodeId) -> Configuration {
         let value = |entry: &Entry| {
@@ -60,10 +60,11 @@ impl Configuration {
         }
     }
 
-    /// What a device has: `read` reads an object. `progress` is told how many parameters of all have been read.
+    /// The values of a device. `read` reads an object. `progress` is called with the number of parameters read and the
+    /// total.
     ///
     /// # Errors
-    /// Those of SDO, but for what the device does not have or does not tell.
+    /// SDO errors, except refusals of objects that the device does not have or does not tell.
     pub fn of_node(
         mut read: impl FnMut(Multiplexer) -> Result<Vec<u8>, Error>,
         sheet: &Eds,
@@ -84,7 +85,7 @@ impl Configuration {
         Ok(Configuration { values })
     }
 
-    /// Where this one differs from another.
+    /// The parameters in which this configuration differs from another.
     #[must_use]
     pub fn differences(&self, other: &Configuration) -> Vec<Difference> {
         let mut keys: Vec<(u16, u8)> = self.values.keys().chain(other.values.keys()).copied().collect();
@@ -101,7 +102,7 @@ impl Configuration {
         keys.into_iter().filter_map(difference).collect()
     }
 
-    /// A configuration file: the data sheet with the values that differ from its defaults, or with all of them.
+    /// The data sheet with values: the values that differ from the defaults, or all values.
     #[must_use]
     pub fn to_sheet(&self, sheet: &Eds, node: NodeId, all: bool) -> Eds {
         let (mut file, defaults) = (sheet.clone(), Configuration::of_sheet(sheet, node));
@@ -115,7 +116,7 @@ impl Configuration {
     }
 }
 
-/// Whether two values are the same. A number that is none (NaN) is the same as another such.
+/// Whether two values are equal. NaN is equal to NaN.
 fn same(first: Option<&Value>, second: Option<&Value>) -> bool {
     match (first, second) {
         (Some(Value::Real32(a)), Some(Value::Real32(b))) => a.to_bits() == b.to_bits() || a == b,
@@ -126,7 +127,7 @@ fn same(first: Option<&Value>, second: Option<&Value>) -> bool {
 fn decode(formula: &Formula, entry: &Entry, node: NodeId) -> Option<Value> {
     Some(match (formula.evaluate(node), entry.data_type.class()) {
         (eds::Value::Integer(value), _) => Value::Integer(value),
-        #[allow(clippy::cast_possible_truncation)] // It was a REAL32 in the file.
+        #[allow(clippy::cast_possible_truncation)] // The number was a REAL32 in the file.
         (eds::Value::Real(value), Class::Real(32)) => Value::Real32(value as f32),
         (eds::Value::Real(value), _) => Value::Real64(value),
         (eds::Value::Text(text), Class::Text) => Value::Text(text),
@@ -134,7 +135,7 @@ fn decode(formula: &Formula, entry: &Entry, node: NodeId) -> Option<Value> {
     })
 }
 
-/// As a file has it; `None` for a text that breaks its line.
+/// The value in the form of a file; `None` for a text with a line break.
 fn encode(value: &Value) -> Option<Formula> {
     let value = match value {
         Value::Integer(value) | Value::Decimal(value, _) => eds::Value::Integer(*value),

@@ -1,4 +1,4 @@
-//! In which order parameters are written, so that the device takes them.
+//! The order in which parameters are written, so that the device accepts them.
 
 use std::collections::BTreeSet;
 
@@ -14,17 +14,18 @@ use crate::value::Value;
 pub struct Write {
     /// The parameter.
     pub at: Multiplexer,
-    /// Its new value.
+    /// The new value.
     pub value: Value,
 }
 
 /// Bit 31 of a COB-ID: the PDO is switched off.
 const OFF: i128 = 1 << 31;
-/// More entries than this in a mapping stand for a multiplexed PDO (CiA 301, 7.5.2.36).
+/// A larger number of entries stands for a multiplexed PDO (CiA 301, 7.5.2.36).
 const SLOTS: i128 = 64;
 
-/// The writes that bring a device from one configuration to another. First comes what is no PDO, then the PDOs of which
-/// something differs, each in five steps (CiA 301, 7.5.2.36): off, mapping empty, mapping, number of entries, on.
+/// The writes that bring a device from one configuration to another. Parameters outside of PDOs come first. Then come
+/// the PDOs with differences, each in five steps (CiA 301, 7.5.2.36): off, mapping empty, mapping, number of entries,
+/// on.
 #[must_use]
 pub fn plan(sheet: &Eds, from: &Configuration, to: &Configuration) -> Vec<Write> {
     let differs =
@@ -33,7 +34,7 @@ pub fn plan(sheet: &Eds, from: &Configuration, to: &Configuration) -> Vec<Write>
         sheet.entries().map(|entry| (entry.index, entry.sub)).filter(differs).collect();
     let is_pdo = |index: u16| (0x1400..=0x1BFF).contains(&index);
     let others = changed.iter().filter(|key| !is_pdo(key.0)).filter_map(|key| write(to, *key));
-    // The mapping of 1400h is at 1600h, that of 1800h at 1A00h.
+    // The mapping of 1400h is at 1600h, and the mapping of 1800h is at 1A00h.
     let pdos: BTreeSet<u16> = changed.iter().filter(|key| is_pdo(key.0)).map(|key| key.0 & !0x0200).collect();
     let steps = pdos.into_iter().flat_map(|pdo| pdo_steps(pdo, &changed, from, to));
     others.chain(steps).collect()
@@ -58,7 +59,7 @@ fn pdo_steps(pdo: u16, changed: &[(u16, u8)], from: &Configuration, to: &Configu
     steps
 }
 
-/// Empty, each object, their number.
+/// The steps of the mapping: clear it, write each object, write their number.
 fn mapping_steps(mapping: u16, changed: &[(u16, u8)], to: &Configuration) -> Vec<Write> {
     let count = match to.values.get(&(mapping, 0)) {
         Some(Value::Integer(count)) => *count,

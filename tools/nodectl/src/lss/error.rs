@@ -1,14 +1,14 @@
-//! Why a service failed.
+//! The errors of LSS services.
 
 use canopen::client::lss;
 use thiserror::Error;
 
 use crate::bus::BusError;
 
-/// A service that failed.
+/// Why a service failed.
 #[derive(Debug, Error)]
 pub enum Error {
-    /// No slave answered, or one refused.
+    /// No slave has answered, or a slave has refused.
     #[error(transparent)]
     Service(#[from] lss::Error),
     /// The bus failed.

@@ -11,9 +11,9 @@ use crate::Network;
 /// The slaves that the services are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Selection {
-    /// All on the bus. What they answer is of use only where there is one.
+    /// All slaves on the bus. Their answers are only of use where there is a single slave.
     All,
-    /// The one with this identity.
+    /// The slave with this identity.
     One(Identity),
 }
 
@@ -24,15 +24,15 @@ pub struct Master<'n> {
 }
 
 impl<'n> Master<'n> {
-    /// A master that waits this long for answers, and asks again as often as is usual.
+    /// A master with this time-out for answers, and the usual number of retries.
     pub fn new(network: &'n mut Network, timeout: Duration) -> Master<'n> {
         Master { network, options: Options { timeout, ..Options::default() } }
     }
 
-    /// Brings slaves into the state configuration.
+    /// Switches slaves to the state Configuration.
     ///
     /// # Errors
-    /// No slave has this identity, or the bus is lost. All slaves together do not answer.
+    /// No slave has this identity, or the bus is lost. The selection of all slaves is not answered.
     pub fn select(&mut self, selection: Selection) -> Result<(), Error> {
         self.release()?;
         match selection {
@@ -41,7 +41,7 @@ impl<'n> Master<'n> {
         }
     }
 
-    /// Brings all slaves back into the state waiting. Those that have got a node-ID boot with it.
+    /// Switches all slaves back to the state Waiting. Slaves without a node-ID boot with their new one.
     ///
     /// # Errors
     /// The bus is lost.
@@ -62,7 +62,7 @@ impl<'n> Master<'n> {
         Ok(Identity { vendor, product, revision, serial })
     }
 
-    /// The node-ID of the selected slave; `None` when it has none.
+    /// The node-ID of the selected slave; `None` when the slave has none.
     ///
     /// # Errors
     /// No answer, or the bus is lost.
@@ -70,32 +70,33 @@ impl<'n> Master<'n> {
         self.run(lss::inquire_node_id(self.options))
     }
 
-    /// Gives the selected slave a node-ID, or takes it away.
+    /// Sets the node-ID of the selected slave; `None` takes it away.
     ///
     /// # Errors
-    /// It is refused, no answer, or the bus is lost.
+    /// The slave refuses, no slave answers, or the bus is lost.
     pub fn set_node_id(&mut self, node_id: Option<NodeId>) -> Result<(), Error> {
         self.run(lss::set_node_id(node_id, self.options))
     }
 
-    /// Gives the selected slave a bit rate, for [`activate`](Master::activate) or its next start.
+    /// Sets the bit rate of the selected slave. The bit rate is used after [`activate`](Master::activate) or at the
+    /// next start.
     ///
     /// # Errors
-    /// It is refused, no answer, or the bus is lost.
+    /// The slave refuses, no slave answers, or the bus is lost.
     pub fn set_bit_rate(&mut self, bit_rate: BitRate) -> Result<(), Error> {
         self.run(lss::set_bit_rate(bit_rate, self.options))
     }
 
-    /// Makes the selected slave keep its configuration.
+    /// Makes the selected slave store its configuration.
     ///
     /// # Errors
-    /// It is refused, no answer, or the bus is lost.
+    /// The slave refuses, no slave answers, or the bus is lost.
     pub fn store(&mut self) -> Result<(), Error> {
         self.run(lss::store(self.options))
     }
 
-    /// Makes the selected slaves change to their new bit rate, `delay` ms from now; they are silent for twice that time.
-    /// The bus of this host has to change too.
+    /// Makes the selected slaves change to their new bit rate, `delay` ms from now. The slaves are silent for twice
+    /// that time. The caller has to change the bit rate of this host's bus, too.
     ///
     /// # Errors
     /// The bus is lost.
@@ -103,12 +104,12 @@ impl<'n> Master<'n> {
         Ok(self.network.send(&lss::activate_bit_rate(delay))?)
     }
 
-    /// Finds a slave without a node-ID, and selects it; `None` when there is none. It takes up to 133 times the time-out.
+    /// Finds a slave without a node-ID, and selects it; `None` when there is none. Takes up to 133 times the time-out.
     ///
-    /// `progress` is told how many of [`Fastscan::QUESTIONS`] have been asked.
+    /// `progress` is called with the number of questions asked, out of [`Fastscan::QUESTIONS`].
     ///
     /// # Errors
-    /// The bus is lost, or a slave that answered before does no more.
+    /// The bus is lost, or a slave that has answered before stops answering.
     pub fn fastscan(&mut self, mut progress: impl FnMut(u8)) -> Result<Option<Identity>, Error> {
         let mut scan = Fastscan::new(self.options);
         Ok(self.network.run_with(&mut scan, |scan| progress(scan.asked()))??)

@@ -9,7 +9,7 @@ use super::memory::Memory;
 use super::{Cause, Error, Options};
 use crate::network::Network;
 
-/// A segment and its answer at 10 kbit/s.
+/// The time of a segment and its answer at 10 kbit/s.
 const SEGMENT: Duration = Duration::from_millis(30);
 
 /// The SDO client of one node.
@@ -26,13 +26,13 @@ impl<'n> Client<'n> {
         Client { network, node, options, deadline: Instant::NEVER }
     }
 
-    /// The same for several transfers that have to be over by then together, besides what the options say of each.
+    /// The client with a common deadline for several transfers, besides the time limit of each transfer.
     #[must_use]
     pub fn by(self, deadline: Instant) -> Client<'n> {
         Client { deadline, ..self }
     }
 
-    /// Reads an object, expedited or segmented as the server likes.
+    /// Reads an object, expedited or segmented as the server chooses.
     ///
     /// # Errors
     /// The node, the object and the reason.
@@ -42,7 +42,8 @@ impl<'n> Client<'n> {
         Ok(upload.into_sink().0)
     }
 
-    /// Writes an object: up to four bytes expedited, else segmented. `progress` is told the bytes that have arrived.
+    /// Writes an object: up to four bytes expedited, else segmented. `progress` is called with the bytes that have
+    /// arrived.
     ///
     /// # Errors
     /// The node, the object and the reason.
@@ -67,9 +68,9 @@ impl<'n> Client<'n> {
         Ok(upload.into_sink().0)
     }
 
-    /// Writes an object in blocks. `progress` is told the bytes that have arrived.
+    /// Writes an object in blocks. `progress` is called with the bytes that have arrived.
     ///
-    /// No bytes at all go out segmented: not every server takes a block without data.
+    /// An empty value is written segmented, because not every server accepts a block without data.
     ///
     /// # Errors
     /// The node, the object and the reason.
@@ -87,7 +88,7 @@ impl<'n> Client<'n> {
         self.run(at, &mut download, |download| progress(download.transferred()))
     }
 
-    /// What takes long to write may take long: a segment in a frame of its own, and its answer, on the slowest bus.
+    /// Extends the time limit for a long value, by the time of one frame and its answer per segment on the slowest bus.
     fn patience(&self, value: &[u8]) -> Options {
         let segments = u64::try_from(value.len() / 7).unwrap_or(u64::MAX);
         let options = self.options();
@@ -110,7 +111,7 @@ impl<'n> Client<'n> {
     }
 }
 
-/// Tells only what is new.
+/// Calls `tell` only when the number has changed.
 fn news(mut tell: impl FnMut(usize)) -> impl FnMut(usize) {
     let mut told = 0;
     move |done| {

@@ -1,4 +1,4 @@
-//! What goes wrong with a transfer, and with which.
+//! Errors of transfers, with node and object.
 
 use std::fmt;
 
@@ -18,11 +18,11 @@ pub struct Error {
     pub node: NodeId,
     /// The object.
     pub at: Multiplexer,
-    /// Its name, where it is known.
+    /// The name of the object, where it is known.
     pub name: Option<String>,
-    /// What helps, where that is known.
+    /// A hint for the user, where there is one.
     pub hint: Option<String>,
-    /// Why.
+    /// The cause.
     #[source]
     pub cause: Cause,
 }
@@ -30,7 +30,7 @@ pub struct Error {
 /// Why a transfer failed.
 #[derive(Debug, Error)]
 pub enum Cause {
-    /// The transfer itself.
+    /// The transfer itself failed.
     #[error(transparent)]
     Transfer(#[from] sdo::Error),
     /// The bus failed.
@@ -39,7 +39,7 @@ pub enum Cause {
 }
 
 impl Error {
-    /// The abort code, where the server refused.
+    /// The abort code, where the transfer was aborted.
     #[must_use]
     pub fn abort(&self) -> Option<AbortCode> {
         match self.cause {
@@ -54,7 +54,7 @@ impl Error {
         self.abort().is_some_and(AbortCode::is_absent)
     }
 
-    /// Whether the node or the bus was not there: later it may work.
+    /// Whether the node or the bus was silent, so that a later try may succeed.
     #[must_use]
     pub fn is_silence(&self) -> bool {
         matches!(self.cause, Cause::Transfer(sdo::Error::NoAnswer) | Cause::Bus(BusError::Lost(_)))

@@ -1,4 +1,4 @@
-//! Where the bytes of an upload go: memory that grows as they come, whatever the server announces.
+//! The buffer of an upload. The buffer grows with the data that arrives, whatever size the server announces.
 
 use canopen::client::sdo::Sink;
 

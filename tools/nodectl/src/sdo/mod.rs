@@ -8,5 +8,5 @@ pub use canopen::client::sdo::{AbortCode, Options};
 pub use client::Client;
 pub use error::{Cause, Error};
 
-/// More bytes than this are no value but a fault of the server.
+/// The greatest size of a value in bytes. A larger size is a fault of the server.
 pub const LARGEST: usize = 16 << 20;

@@ -1,18 +1,18 @@
-//! Records of candump: a line of its log (`candump -l`), or of its output.
+//! Records of candump: lines of its log (`candump -l`) or of its output.
 
 use canopen::{Frame, Instant};
 
 use crate::bus::clock;
 
-/// A line that is no record.
+/// The line is no record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no record of candump, as (1.000000) can0 701#05 or can0 701 [1] 05")]
 pub struct NotARecord;
 
-/// The frame of a line; `Ok(None)` for a frame that CANopen has no use for: an extended identifier, CAN FD, an error frame.
+/// The frame of a line; `Ok(None)` for a frame that is not CANopen: a 29-bit identifier, CAN FD, an error frame.
 ///
 /// # Errors
-/// For anything else.
+/// The line is no record.
 pub fn parse(line: &str) -> Result<Option<(Instant, Frame)>, NotARecord> {
     let mut words = line.split_ascii_whitespace().peekable();
     let at = match words.peek().and_then(|word| word.strip_prefix('(')?.strip_suffix(')')) {

@@ -1,4 +1,4 @@
-//! What is known of a node before its frames are read: its data sheet, and what it was asked or seen to answer.
+//! The knowledge about a node that decoding needs: its data sheet, and values that the node has told.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
@@ -13,35 +13,36 @@ use crate::pdo_parameters::{PDOS, slots, walk};
 use crate::quantity::Quantity;
 use crate::sdo::{Client, Error};
 
-/// The first communication parameters of RPDOs and of TPDOs.
+/// The first communication parameter of RPDOs and the first of TPDOs.
 const COMMUNICATION: [u16; 2] = [0x1400, 0x1800];
 
-/// The data sheet of a node and the numbers that it has told.
+/// The data sheet of a node, and the numbers that the node has told.
 #[derive(Clone, Debug)]
 pub struct Knowledge {
     catalogue: Arc<Catalogue>,
-    /// Numbers of up to four bytes.
+    /// The numbers of up to four bytes.
     numbers: BTreeMap<(u16, u8), u32>,
 }
 
 impl Default for Knowledge {
-    /// Of a node of which nothing is known.
+    /// The knowledge about an unknown node.
     fn default() -> Knowledge {
         Knowledge::new(Catalogue::unknown())
     }
 }
 
 impl Knowledge {
-    /// Of a node with a data sheet: what the node has not told is as after a reset with nothing saved.
+    /// The knowledge about a node with a data sheet. Until the node tells its values, the defaults of the data sheet
+    /// apply.
     #[must_use]
     pub fn new(catalogue: impl Into<Arc<Catalogue>>) -> Knowledge {
         Knowledge { catalogue: catalogue.into(), numbers: BTreeMap::new() }
     }
 
-    /// Asks a node for the PDOs in force and the units of what they carry.
+    /// Reads the PDOs in force from a node, and the units of their objects.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn ask(client: &mut Client, catalogue: impl Into<Arc<Catalogue>>) -> Result<Knowledge, Error> {
         let mut known = Knowledge::new(catalogue);
         for first in COMMUNICATION {
@@ -67,7 +68,7 @@ impl Knowledge {
         })
     }
 
-    /// The objects that [`Quantity::of`] asks for.
+    /// Reads the objects that [`Quantity::of`] needs.
     fn ask_quantity(&mut self, client: &mut Client, of: Multiplexer) -> Result<(), Error> {
         let catalogue = Arc::clone(&self.catalogue);
         Quantity::by(&catalogue, of, |at| self.fetch(client, at)).map(drop)
@@ -84,8 +85,8 @@ impl Knowledge {
         }
     }
 
-    /// A value that the node has. What is no number, or of no object that is known, is forgotten: a trace of any length
-    /// takes so much memory and no more.
+    /// Takes a value that the node has told. Values of more than four bytes and values of unknown objects are ignored,
+    /// so that a trace of any length needs limited memory.
     pub(super) fn tell(&mut self, at: Multiplexer, bytes: &[u8]) {
         let is_pdo = (0x1400..0x1C00).contains(&at.index);
         if bytes.len() <= 4 && (is_pdo || self.catalogue.entry(at).is_some()) {
@@ -102,7 +103,7 @@ impl Knowledge {
     /// The number that the node has told, else the default of its data sheet.
     pub(super) fn number(&self, at: Multiplexer, node: NodeId) -> Option<u32> {
         self.told(at).or_else(|| {
-            // Of a device without a data sheet only what is the same in all devices is known: no value.
+            // Without a data sheet the objects are known, but not their defaults.
             let entry = self.catalogue.entry(at).filter(|_| self.catalogue.is_of_a_device())?;
             match entry.default.as_ref()?.evaluate(node) {
                 eds::Value::Integer(number) => u32::try_from(number).ok(),
@@ -121,7 +122,7 @@ impl Knowledge {
         &self.catalogue
     }
 
-    /// The PDO parameters that are known, of the data sheet or told: index of the communication parameter.
+    /// The known PDOs, from the data sheet or told by the node: the indices of their communication parameters.
     pub(super) fn pdos(&self) -> BTreeSet<u16> {
         let is_one = |index: &u16| COMMUNICATION.iter().any(|first| (*first..first + PDOS).contains(index));
         let told = self.numbers.keys().filter(|(_, sub)| *sub == 1).map(|(index, _)| *index);

@@ -1,7 +1,7 @@
-//! What the frames on a bus mean: service by service, with the names, values and units of the objects.
+//! Decoding of the frames on a bus, service by service, with the names, values and units of the objects.
 //!
-//! A [`Decoder`] takes the frames in their order and says what each is. A transfer of several frames is one [`Line`], made when the
-//! transfer ends; a heartbeat is one when its state is new. Nothing is sent.
+//! A [`Decoder`] takes the frames in their order and describes each. A transfer of several frames is one [`Line`], made
+//! when the transfer ends. A heartbeat makes a line only when its state is new. The decoder sends nothing.
 
 mod candump;
 mod knowledge;
@@ -49,7 +49,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// As on the command line.
+    /// The name on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -66,43 +66,43 @@ impl Kind {
     }
 }
 
-/// A value that was on the bus.
+/// A value on the bus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
     /// The object.
     pub at: Multiplexer,
-    /// Its name; empty where none is known.
+    /// The name of the object; empty where none is known.
     pub name: String,
-    /// The value as it is meant; `None` for an object that was asked for and not answered.
+    /// The scaled value; `None` for an object that was requested and not answered.
     pub value: Option<Value>,
-    /// Its unit; empty where none is known.
+    /// The unit; empty where none is known.
     pub unit: String,
-    /// What the number stands for.
+    /// The meaning of the number.
     pub meaning: Option<String>,
 }
 
-/// What a frame, or a transfer of several, says.
+/// The description of a frame, or of a transfer of several frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// When the frame was on the bus; of a transfer, its last frame.
+    /// Time of the frame on the bus; for a transfer, the time of its last frame.
     pub at: Instant,
     /// The CAN-ID of the frame.
     pub id: u16,
     /// The service.
     pub kind: Kind,
-    /// The node that the frame is of or for; `None` where the CAN-ID tells none.
+    /// The node that sends or receives the frame; `None` where the CAN-ID does not tell it.
     pub node: Option<NodeId>,
-    /// In words.
+    /// The description in words.
     pub text: String,
-    /// The values in it.
+    /// The values in the frame.
     pub values: Vec<Shown>,
-    /// The abort code of a transfer that was refused or given up.
+    /// The abort code of an aborted transfer.
     pub abort: Option<u32>,
     /// The data of the frame.
     pub data: Vec<u8>,
 }
 
-/// What the decoded part of a line consists of.
+/// The decoded part of a line.
 #[derive(Debug, Default)]
 struct Said {
     text: String,
@@ -116,7 +116,7 @@ impl Said {
     }
 }
 
-/// Takes frames, says what they mean.
+/// Decodes frames.
 #[derive(Debug, Default)]
 pub struct Decoder {
     nodes: BTreeMap<NodeId, Knowledge>,
@@ -126,14 +126,14 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// Tells what is known of a node.
+    /// Sets the knowledge about a node.
     pub fn know(&mut self, node: NodeId, knowledge: Knowledge) {
         self.nodes.insert(node, knowledge);
         self.pdos.forget(node);
     }
 
-    /// What a frame says. Nothing for a part of a transfer that goes on, and for a heartbeat that brings nothing new; two lines where a
-    /// transfer begins before the one before has ended.
+    /// The lines of a frame. There is no line for a part of an unfinished transfer, and for a heartbeat without a
+    /// change. There are two lines where a transfer begins before the former one has ended.
     pub fn on_frame(&mut self, frame: &Frame, at: Instant) -> Vec<Line> {
         let id = frame.id();
         let said = |kind, node, said: Said| Line {
@@ -175,7 +175,7 @@ impl Decoder {
     }
 }
 
-/// A value as people read it: ` = 3.25 bar`; nothing where there is none.
+/// A value as people read it: ` = 3.25 bar`; empty without a value.
 fn equals(shown: &Shown) -> String {
     let Some(value) = &shown.value else { return String::new() };
     let unit = if shown.unit.is_empty() { String::new() } else { format!(" {}", shown.unit) };
@@ -191,7 +191,7 @@ fn hex(frame: &Frame) -> String {
     hex_digits(frame.data(), " ")
 }
 
-/// The value in these bytes of an object, with what is known about the object.
+/// The value of an object in these bytes, with its name, unit and meaning.
 fn value(known: &Knowledge, catalogue: &Catalogue, node: NodeId, at: Multiplexer, bytes: &[u8]) -> Shown {
     let data_type = catalogue.data_type(at).unwrap_or_else(|| crate::value::guess(bytes));
     let quantity = known.quantity(at, node);

@@ -1,4 +1,4 @@
-//! PDOs, by the mapping in force.
+//! Decoding of PDOs by the mapping in force.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,15 +11,15 @@ use super::{Knowledge, Said, Shown, equals, hex, value};
 use crate::object::{Place, at};
 use crate::tpdo::Tpdo;
 
-/// Numbers of mapped objects that are kinds of MPDO (CiA 301, 7.5.2.36).
+/// The numbers of mapped objects that stand for the kinds of MPDO (CiA 301, 7.5.2.36).
 const MPDO: [u32; 2] = [0xFE, 0xFF];
 
-/// A PDO with a CAN-ID.
+/// A PDO of a node.
 #[derive(Debug)]
 struct Pdo {
     node: NodeId,
     name: String,
-    /// A TPDO.
+    /// Whether the PDO is a TPDO.
     is_sent: bool,
     content: Content,
 }
@@ -30,23 +30,23 @@ enum Content {
     Multiplexed,
 }
 
-/// The PDOs of all nodes that are known.
+/// The PDOs of all known nodes.
 #[derive(Debug, Default)]
 pub(super) struct Pdos {
     by_node: BTreeMap<NodeId, BTreeMap<u16, Pdo>>,
-    /// Whose PDO a CAN-ID is.
+    /// The node that owns the PDO of a CAN-ID.
     owners: BTreeMap<u16, NodeId>,
-    /// Nodes of which something has changed: their PDOs are looked up again with the next frame.
+    /// Nodes with changed knowledge. Their PDOs are looked up again with the next frame.
     changed: BTreeSet<NodeId>,
 }
 
 impl Pdos {
-    /// What is known of a node has changed.
+    /// Notes that the knowledge about a node has changed.
     pub(super) fn forget(&mut self, node: NodeId) {
         self.changed.insert(node);
     }
 
-    /// A transfer has shown a value of a node.
+    /// Takes the value that a transfer has shown.
     pub(super) fn note(&mut self, node: NodeId, known: &mut Knowledge, event: &Event) {
         if let Some(bytes) = event.value() {
             known.tell(event.at, bytes);
@@ -56,7 +56,7 @@ impl Pdos {
         }
     }
 
-    /// Whether a PDO that is known has this CAN-ID.
+    /// Whether a known PDO has this CAN-ID.
     pub(super) fn has(&mut self, id: u16, nodes: &BTreeMap<NodeId, Knowledge>) -> bool {
         if !self.changed.is_empty() {
             for node in std::mem::take(&mut self.changed) {
@@ -68,7 +68,7 @@ impl Pdos {
         self.owners.contains_key(&id)
     }
 
-    /// What the frame carries, and whose PDO it is.
+    /// The content of a frame, and the node that owns the PDO.
     pub(super) fn on_frame(
         &mut self,
         frame: &Frame,
@@ -92,12 +92,12 @@ impl Pdos {
     }
 }
 
-/// The name of an object without that of its record, or its address.
+/// The name of an object without the name of its record; where it is unknown, its address.
 fn short(known: &Knowledge, at: Multiplexer) -> String {
     known.catalogue().entry(at).map_or_else(|| Place(at).to_string(), |entry| entry.name.clone())
 }
 
-/// A PDO that nothing is known of, by the pre-defined connection set (CiA 301, 7.3.5).
+/// An unknown PDO, by the pre-defined connection set (CiA 301, 7.3.5).
 pub(super) fn unknown(frame: &Frame) -> Said {
     let group = frame.id() >> 7;
     let name = match group % 2 {
@@ -107,13 +107,14 @@ pub(super) fn unknown(frame: &Frame) -> Said {
     Said::text(format!("{name}: {}", hex(frame)))
 }
 
-/// The PDOs of a node by CAN-ID. Who sends a PDO tells more about it than who receives it.
+/// The PDOs of a node by CAN-ID. Where an RPDO and a TPDO share a CAN-ID, the TPDO counts, because the sender knows the
+/// content best.
 fn look_up(node: NodeId, known: &Knowledge) -> BTreeMap<u16, Pdo> {
-    // RPDOs come first.
+    // RPDOs come first, so that TPDOs replace them.
     known.pdos().into_iter().filter_map(|index| pdo(node, known, index)).collect()
 }
 
-/// Of several nodes with a PDO of one CAN-ID, the one that sends it.
+/// The owner of each CAN-ID. Where several nodes have a PDO with the CAN-ID, the sender owns it.
 fn owners(by_node: &BTreeMap<NodeId, BTreeMap<u16, Pdo>>) -> BTreeMap<u16, NodeId> {
     let all = |is_sent: bool| {
         let pdos = by_node.values().flat_map(BTreeMap::iter);
@@ -122,7 +123,7 @@ fn owners(by_node: &BTreeMap<NodeId, BTreeMap<u16, Pdo>>) -> BTreeMap<u16, NodeI
     all(false).chain(all(true)).collect()
 }
 
-/// The PDO of a communication parameter; `None` for one that is switched off, or empty.
+/// The PDO of a communication parameter; `None` where the PDO is off or empty.
 fn pdo(node: NodeId, known: &Knowledge, index: u16) -> Option<(u16, Pdo)> {
     let cob_id = CobId::parse(known.number(at(index, 1), node)?).filter(|cob_id| !cob_id.bit31)?;
     let mapping = index + 0x200;
@@ -140,12 +141,12 @@ fn pdo(node: NodeId, known: &Knowledge, index: u16) -> Option<(u16, Pdo)> {
 }
 
 fn mapped_values(node: NodeId, mapped: &Tpdo, known: &Knowledge, frame: &Frame) -> Vec<Shown> {
-    // Below 0020h there are no objects but data types, which fill gaps.
+    // Indices below 0020h are data types, which fill gaps.
     let values = mapped.values(frame.data()).filter(|(at, _)| at.index >= 0x20);
     values.map(|(at, bytes)| value(known, known.catalogue(), node, at, &bytes)).collect()
 }
 
-/// What a multiplexed PDO carries, and for whom.
+/// The content of a multiplexed PDO, and its addressee.
 fn multiplexed(node: NodeId, known: &Knowledge, frame: &Frame) -> (String, Vec<Shown>) {
     let Some(mpdo) = frame.data().try_into().ok().and_then(Mpdo::parse) else { return Default::default() };
     let what = match mpdo.address {
@@ -156,7 +157,7 @@ fn multiplexed(node: NodeId, known: &Knowledge, frame: &Frame) -> (String, Vec<S
     (what, vec![value(known, known.catalogue(), node, mpdo.at, size_of(known, mpdo.at, &mpdo.data))])
 }
 
-/// An MPDO has four bytes of data, whatever the object has.
+/// The bytes of the object in an MPDO, whose data field always has four bytes.
 fn size_of<'a>(known: &Knowledge, at: Multiplexer, data: &'a [u8; 4]) -> &'a [u8] {
     let bits = match known.catalogue().data_type(at).map(eds::DataType::class) {
         Some(eds::Class::Signed(bits) | eds::Class::Unsigned(bits) | eds::Class::Real(bits)) => bits,

@@ -1,4 +1,4 @@
-//! SDO transfers as a third party sees them: each is one event, when it has ended.
+//! SDO transfers as a listener on the bus sees them. Each transfer is one event when it has ended.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use canopen::{Frame, Instant, NodeId};
 use super::{Knowledge, Said, Shown, equals, value};
 use crate::object::Place;
 
-/// So many bytes of a transfer are kept; of the others only the number.
+/// The number of bytes of a transfer that are kept. Further bytes are only counted.
 const KEPT: usize = 256;
 
-/// How the data travelled.
+/// The kind of transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     Expedited,
@@ -20,10 +20,10 @@ enum Way {
     Blocks,
 }
 
-/// A value of a block transfer is shown up to this length.
+/// The greatest length up to which the value of a block transfer is shown.
 const SHORT: usize = 64;
 
-/// Whose frames are segments of a block now, with no command specifier of their own.
+/// The side whose frames are segments of a block at the moment, and have no command specifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Raw {
     Nobody,
@@ -41,10 +41,10 @@ struct Transfer {
     data: Vec<u8>,
     length: usize,
     raw: Raw,
-    /// Segments of the block under way, and whether the last of all is among them.
+    /// Segments of the present block, and whether the last segment of the transfer is among them.
     block: Vec<[u8; 7]>,
     has_last: bool,
-    /// The client has sent all of a segmented download.
+    /// Whether the client has sent all segments of a segmented download.
     is_sent: bool,
 }
 
@@ -65,11 +65,11 @@ pub(super) struct Event {
     end: End,
     data: Vec<u8>,
     length: usize,
-    /// In microseconds.
+    /// Duration in microseconds.
     took: u64,
 }
 
-/// The transfers with the default SDO servers, one at a time for each.
+/// The transfers with the default SDO servers, one at a time for each server.
 #[derive(Debug, Default)]
 pub(super) struct Transfers(BTreeMap<NodeId, Transfer>);
 
@@ -185,10 +185,10 @@ impl Transfer {
         })
     }
 
-    /// Takes a segment of a block; `false` for an abort, which no segment looks like.
+    /// Takes a segment of a block; `false` for an abort, which cannot be mistaken for a segment.
     fn segment(&mut self, data: [u8; 8]) -> bool {
         let Some(segment) = BlockSegment::parse(data) else { return false };
-        // Segments before this one were lost: what follows a gap comes again.
+        // After a gap, the segments are ignored, because the sender repeats them.
         if usize::from(segment.sequence.get()) == self.block.len() + 1 {
             self.block.push(segment.data);
             self.has_last = segment.last;
@@ -196,7 +196,7 @@ impl Transfer {
         true
     }
 
-    /// The receiver has the block up to this segment; the others come again.
+    /// Takes the acknowledged segments of the block; the sender repeats the others.
     fn acknowledge(&mut self, sequence: u8) {
         let whole = usize::from(sequence) == self.block.len();
         for segment in std::mem::take(&mut self.block).iter().take(sequence.into()) {
@@ -213,7 +213,7 @@ impl Transfer {
         self.data.extend(bytes.iter().take(room));
     }
 
-    /// The last segment of the last block was not full.
+    /// Removes the unused bytes of the last segment.
     fn trim(&mut self, end: BlockEnd) {
         self.raw = Raw::Nobody;
         self.length = self.length.saturating_sub(end.unused.into());
@@ -227,7 +227,7 @@ impl Transfer {
 }
 
 impl Event {
-    /// The bytes that the object has now; `None` where the transfer failed or was long.
+    /// The bytes that the object has now; `None` where the transfer failed or was too long to keep.
     pub(super) fn value(&self) -> Option<&[u8]> {
         (self.end == End::Done && self.length == self.data.len()).then_some(&self.data)
     }
@@ -255,7 +255,7 @@ impl Event {
         Said { text, values: vec![value], abort }
     }
 
-    /// The way, and the time where it matters.
+    /// The kind of transfer, with the duration if there were several frames.
     fn how(&self) -> String {
         let time = format!("{}.{:03} ms", self.took / 1000, self.took % 1000);
         match self.way {

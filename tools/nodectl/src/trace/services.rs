@@ -1,4 +1,4 @@
-//! The services whose frames say all by themselves.
+//! Decoding of the services whose frames need no further knowledge.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,7 @@ pub(super) fn emcy(frame: &Frame) -> Said {
     Said::text(emergency(Message::parse(data)))
 }
 
-/// The states that nodes have told.
+/// The last known state of each node.
 #[derive(Debug, Default)]
 pub(super) struct States(BTreeMap<Option<NodeId>, State>);
 

@@ -1,4 +1,4 @@
-//! Answers nodes that want to know who changes their program (2003h of nodes of this project).
+//! The authorisation of an update: the answer to the challenge of a node (2003h of nodes of this project).
 
 use std::str::FromStr;
 
@@ -9,7 +9,7 @@ use ::update::response;
 pub struct AuthorisationKey([u8; 32]);
 
 impl AuthorisationKey {
-    /// What a node with this serial number wants to hear.
+    /// The expected response of a node with this serial number to a challenge.
     #[must_use]
     pub fn response(&self, challenge: [u8; 8], serial_number: u32) -> [u8; 8] {
         response(&self.0, challenge, serial_number)
@@ -26,7 +26,7 @@ impl FromStr for AuthorisationKey {
     }
 }
 
-/// The key is not for a log.
+/// Hides the key, so that no log can contain it.
 impl std::fmt::Debug for AuthorisationKey {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.write_str("AuthorisationKey")

@@ -1,4 +1,4 @@
-//! Why a node was not updated.
+//! Errors of an update.
 
 use canopen::NodeId;
 use thiserror::Error;
@@ -7,7 +7,7 @@ use super::Status;
 use crate::bus::BusError;
 use crate::sdo;
 
-/// Why a node was not updated. Unless it says otherwise, the node can be reached and tried again.
+/// Why a node was not updated. If not stated otherwise, the node can be reached and the update can be tried again.
 #[derive(Debug, Error)]
 pub enum Error {
     /// A transfer failed.
@@ -26,7 +26,7 @@ pub enum Error {
         /// Product code of the node, 1018h:2.
         device: u32,
     },
-    /// The node runs something newer. Nothing was changed.
+    /// The node runs a newer version. Nothing was changed.
     #[error("node {}: the node runs version {device}, which is newer than {image}", .node.get())]
     Older {
         /// The node.
@@ -36,15 +36,15 @@ pub enum Error {
         /// Version of the node, 100Ah.
         device: String,
     },
-    /// The node did not take the program: 1F57h.
+    /// The node has rejected the program: 1F57h.
     #[error("node {}, 1F57h:1 \"Flash status identification\": {status}", .node.get())]
     Flash {
         /// The node.
         node: NodeId,
-        /// What the node says.
+        /// The status that the node tells.
         status: Status,
     },
-    /// The node has another program than it was given: 1F56h.
+    /// The node has another program than the one that was downloaded: 1F56h.
     #[error(
         "node {}, 1F56h:1 \"Program software identification\": {found:08X}h after the download, not {expected:08X}h",
         .node.get()
@@ -52,37 +52,37 @@ pub enum Error {
     Identification {
         /// The node.
         node: NodeId,
-        /// Of the image.
+        /// The identification of the image.
         expected: u32,
-        /// Of the node.
+        /// The identification of the node.
         found: u32,
     },
-    /// The node wants to know who changes its program, and there is no key to answer it with. Nothing was changed.
+    /// The node demands an authorisation, and there is no key. Nothing was changed.
     #[error("node {}: it changes its program only for the holder of its key: --authorisation-key", .node.get())]
     Closed {
         /// The node.
         node: NodeId,
     },
-    /// The node did not stop, start or finish in time.
+    /// The node has not stopped, started or finished in time.
     #[error("node {}: it does not {what}", .node.get())]
     Stuck {
         /// The node.
         node: NodeId,
-        /// What it does not do.
+        /// The action that the node has not done.
         what: &'static str,
     },
-    /// The node went away and did not come back.
+    /// The node was lost and has not come back.
     #[error("node {}: lost, and not back within {patience} s", .node.get())]
     Lost {
         /// The node.
         node: NodeId,
-        /// How long was waited, in seconds.
+        /// The time waited, in seconds.
         patience: u64,
     },
 }
 
 impl Error {
-    /// Whether the node or the bus went away: going on may help.
+    /// Whether the node or the bus was lost, so that continuing may succeed.
     pub(super) fn is_silence(&self) -> bool {
         match self {
             Error::Sdo(error) => error.is_silence(),

@@ -1,4 +1,4 @@
-//! Many nodes, one after the other: the bus is the limit.
+//! The update of many nodes, one after the other, because the bus is the bottleneck.
 
 use std::collections::VecDeque;
 
@@ -8,10 +8,10 @@ use super::job::Job;
 use super::{Error, Image, Options, Outcome, Watcher};
 use crate::Network;
 
-/// How long a lost node may stay away while others wait for their turn. It gets another one after them.
+/// How long to wait for a lost node while others wait for their turn. The lost node gets a second turn after them.
 const SHORT: Duration = Duration::from_millis(5000);
 
-/// Updates nodes. One that fails does not keep the others from it; one that is lost is gone on with at the end.
+/// Updates nodes. After a failed node the others are still updated. The update of a lost node continues at the end.
 pub fn update(
     network: &mut Network,
     nodes: &[NodeId],

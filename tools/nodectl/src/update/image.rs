@@ -4,26 +4,26 @@ use ::update::{HEADER_LEN, Header, Version};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use thiserror::Error;
 
-/// A file that is no image, or no longer a whole one.
+/// Why a file is no complete image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ImageError {
-    /// It is what the compiler has made: not signed, and of no format that a node takes.
+    /// The file is an ELF file of the compiler: it has no signature, and no node accepts it.
     #[error(
         "it is an ELF file; nodes take the signed image that `cargo xtask sign` makes of it (firmware.img)"
     )]
     Elf,
-    /// It does not begin with the header of an image.
+    /// The file does not begin with the header of an image.
     #[error("it is no image of this project: {0}")]
     Header(::update::Refusal),
-    /// It has another length than its header says.
+    /// The image has another length than its header says.
     #[error("it has {found} bytes and should have {expected}")]
     Length {
-        /// What the header says.
+        /// The length in the header.
         expected: usize,
-        /// What there is.
+        /// The length of the file.
         found: usize,
     },
-    /// Its content is not what the header says.
+    /// The content does not match the checksum in the header.
     #[error("its checksum is wrong")]
     Checksum,
 }
@@ -33,32 +33,32 @@ pub enum ImageError {
 pub struct Image {
     /// The content of the file.
     pub bytes: Vec<u8>,
-    /// What it says of itself; `None` for one of a format that is not known here.
+    /// The data of the header; `None` for a file of an unknown format.
     pub info: Option<ImageInfo>,
 }
 
-/// What an image says of itself.
+/// The data in the header of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageInfo {
-    /// The product that it is for, 1018h:2.
+    /// The product code that the image is for, 1018h:2.
     pub product: u32,
-    /// Its version.
+    /// The version of the image.
     pub version: Version,
-    /// What 1F56h:1 reads once the node has it.
+    /// The value of 1F56h:1 once the node has the image.
     pub identification: u32,
 }
 
 impl Image {
-    /// An image of this project, which must be whole. Whether its signature is good, the node decides.
+    /// Reads a complete image of this project. The signature is not checked here, but by the node.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The error in the image.
     pub fn parse(bytes: Vec<u8>) -> Result<Image, ImageError> {
         let info = info(&bytes)?;
         Ok(Image { bytes, info: Some(info) })
     }
 
-    /// An image of any format: nothing about it can be checked here.
+    /// An image of another format, of which nothing can be checked here.
     #[must_use]
     pub fn opaque(bytes: Vec<u8>) -> Image {
         Image { bytes, info: None }

@@ -1,4 +1,4 @@
-//! The update of one node. What it has learned survives the loss of the node, so that it can be gone on with.
+//! The update of one node. The job keeps its state while the node is lost, so that the update can continue afterwards.
 
 use canopen::sdo::Multiplexer;
 use canopen::{Duration, NodeId};
@@ -10,69 +10,70 @@ use crate::object::at;
 use crate::sdo::{self, Client};
 use crate::{Network, value};
 
-/// Between two questions to a node that is busy.
+/// The time between two requests to a busy node.
 const POLL: Duration = Duration::from_millis(100);
 /// How long a node may take to restart.
 const RESTART: Duration = Duration::from_millis(15_000);
-/// How long it may take to erase, or to check.
+/// How long a node may take to erase the flash, or to check the program.
 const FLASH: Duration = Duration::from_millis(60_000);
-/// How long it may take to end a trial.
+/// How long a node may take to end a trial.
 const CONFIRM: Duration = Duration::from_millis(5_000);
-/// How often clearing is tried, when it is refused although the flash is not busy.
+/// The number of tries to clear the flash when the node refuses although its flash is not busy.
 const CLEARS: usize = 5;
-/// How often one run goes on with a node that was lost.
+/// How often a run continues after the node was lost.
 const RESUMES: usize = 10;
 
-/// How an update is done.
+/// The options of an update.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// How patient the transfers are.
+    /// Time-outs and retries of the transfers.
     pub sdo: sdo::Options,
-    /// How long a node that is lost may stay away.
+    /// How long to wait for a node that is lost.
     pub patience: Duration,
     /// Update also where the node runs this program already, or a newer one.
     pub force: bool,
-    /// For nodes that change their program for its holder only.
+    /// The key for nodes that demand an authorisation.
     pub key: Option<AuthorisationKey>,
-    /// End the trial of the new program once it runs. Else the node does so, or takes the program back.
+    /// Whether to confirm the new program once it runs. Otherwise the program stays on trial, and the node may take it
+    /// back.
     pub confirm: bool,
 }
 
-/// What has become of a node.
+/// The result of the update of a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
-    /// Version before (100Ah), where a program ran.
+    /// Version before the update (100Ah), where a program ran.
     pub old_version: Option<String>,
-    /// Identification before (1F56h).
+    /// Identification before the update (1F56h).
     pub old_identification: Option<u32>,
-    /// Version now.
+    /// Version after the update.
     pub new_version: Option<String>,
-    /// Identification now.
+    /// Identification after the update.
     pub new_identification: Option<u32>,
-    /// Whether something was downloaded: the node had this program already if not.
+    /// Whether a program was downloaded. `false` when the node had this program already.
     pub is_changed: bool,
     /// Whether the node may still take the program back.
     pub is_on_trial: bool,
 }
 
-/// A program as it is on a node.
+/// The state of the program on a node.
 #[derive(Clone, Debug, Default)]
 struct State {
     is_running: bool,
     version: Option<String>,
     identification: Option<u32>,
-    /// What the loader says of it.
+    /// Whether the program is valid, by the status that the loader tells.
     is_valid: bool,
 }
 
-/// How far a job has come.
+/// The progress of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Progress {
-    /// The node is as it was.
+    /// The node is unchanged.
     Untouched,
-    /// The old program is gone.
+    /// The old program is erased.
     Cleared,
-    /// The new program has arrived and is good.
+    /// The new program is downloaded and valid.
     Complete,
 }
 
@@ -90,7 +91,7 @@ impl<'a> Job<'a> {
         Job { node, image, options, before: None, progress: Progress::Untouched }
     }
 
-    /// Does it, and goes on when the node was away for no longer than `patience`.
+    /// Runs the update, and continues after each loss of the node that is not longer than `patience`.
     pub(super) fn run(
         &mut self,
         network: &mut Network,
@@ -100,7 +101,7 @@ impl<'a> Job<'a> {
         let mut resumes = RESUMES;
         loop {
             match self.attempt(network, watcher) {
-                // What was never there is not lost.
+                // A node that has never answered does not count as lost.
                 Err(error) if error.is_silence() && self.before.is_some() && resumes > 0 => {
                     resumes -= 1;
                     watcher.step(self.node, Step::Lost);
@@ -136,14 +137,14 @@ impl<'a> Job<'a> {
         Ok(Outcome { is_on_trial, ..self.outcome(after) })
     }
 
-    /// Confirms the new program if that is wanted. Whether it is still on trial.
+    /// Confirms the new program if the options say so. Returns whether the program is still on trial.
     fn end_trial(
         &self,
         network: &mut Network,
         after: &State,
         watcher: &mut dyn Watcher,
     ) -> Result<bool, Error> {
-        // What other devices have at 2002h is not known here.
+        // Object 2002h is only known for nodes of this project.
         let Some(info) = &self.image.info else { return Ok(false) };
         if let Some(found) = after.identification.filter(|found| *found != info.identification) {
             return Err(self.is_another(network, info.identification, found)?);
@@ -165,9 +166,9 @@ impl<'a> Job<'a> {
         Ok(false)
     }
 
-    /// Answers the challenge of a node that wants to know who changes its program.
+    /// Answers the challenge of a node that demands an authorisation.
     fn open(&self, network: &mut Network) -> Result<(), Error> {
-        // What other devices have at 2003h is not known here.
+        // Object 2003h is only known for nodes of this project.
         if self.image.info.is_none() || !self.program(network).is_closed()? {
             return Ok(());
         }
@@ -175,7 +176,8 @@ impl<'a> Job<'a> {
         Ok(self.program(network).open(key)?)
     }
 
-    /// Why the node runs another program than the new one: it says so where it has taken the new one back.
+    /// The error of a node that runs another program than the new one. A node that has taken the new program back tells
+    /// the reason in its status.
     fn is_another(&self, network: &mut Network, expected: u32, found: u32) -> Result<Error, Error> {
         let node = self.node;
         Ok(match self.program(network).status()? {
@@ -184,7 +186,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Refuses what would do harm, before anything is changed.
+    /// Refuses a wrong image before anything is changed.
     fn check(&self, network: &mut Network, now: &State) -> Result<(), Error> {
         let Some(info) = &self.image.info else { return Ok(()) };
         let device = self.word(network, at(0x1018, 2))?;
@@ -200,7 +202,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Puts the new program into the place of the old one.
+    /// Replaces the old program by the new one.
     fn replace(
         &mut self,
         network: &mut Network,
@@ -232,7 +234,8 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Clears the program. A node that was interrupted may still be busy with its flash; it refuses until it is done.
+    /// Clears the program. A node whose update was interrupted may still be busy with its flash, and refuses the
+    /// command until it is done.
     fn clear(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
         self.wait_while_busy(network, watcher)?;
         watcher.step(self.node, Step::Clear);
@@ -250,7 +253,7 @@ impl<'a> Job<'a> {
         self.wait_for_flash(network, is_cleared)
     }
 
-    /// Waits until the flash is no longer busy, whatever it was busy with.
+    /// Waits until the flash is no longer busy with an earlier command.
     fn wait_while_busy(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
         let is_busy = self.program(network).status()?.is_some_and(|status| status.busy);
         if is_busy {
@@ -260,7 +263,7 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// In blocks; in segments where the node does not know those.
+    /// Downloads the program in blocks; in segments where the node does not support blocks.
     fn download(&self, network: &mut Network, watcher: &mut dyn Watcher) -> Result<(), Error> {
         let (node, total) = (self.node, self.image.bytes.len());
         watcher.step(node, Step::Download);
@@ -281,7 +284,7 @@ impl<'a> Job<'a> {
         Ok(self.program(network).download_segments(&self.image.bytes, progress)?)
     }
 
-    /// Waits until the flash is no longer busy, and then for nothing but a status that `is_fine`.
+    /// Waits until the flash is no longer busy. Fails unless the status then `is_fine`.
     fn wait_for_flash(&self, network: &mut Network, is_fine: impl Fn(Status) -> bool) -> Result<(), Error> {
         let until = network.now() + FLASH;
         while network.now() < until {
@@ -294,7 +297,7 @@ impl<'a> Job<'a> {
         Err(Error::Stuck { node: self.node, what: "get done with its flash" })
     }
 
-    /// Waits for the node to be back from a restart.
+    /// Waits until the node is back from a restart, with or without a running program as `wanted`.
     fn wait_until_running(
         &self,
         network: &mut Network,
@@ -312,7 +315,7 @@ impl<'a> Job<'a> {
         Err(Error::Stuck { node: self.node, what })
     }
 
-    /// Waits for a node that is lost; opens the bus again when it is that.
+    /// Waits for a lost node. Opens the bus again if the bus is lost, too.
     fn wait_for_return(&self, network: &mut Network, patience: Duration) -> Result<(), Error> {
         let until = network.now() + patience;
         loop {
@@ -331,7 +334,7 @@ impl<'a> Job<'a> {
     fn state(&self, network: &mut Network) -> Result<State, Error> {
         let is_running = self.program(network).is_running()?;
         let identification = self.program(network).identification()?;
-        // The version of a loader is not that of the program.
+        // 100Ah of a loader is the version of the loader, not of the program.
         let version = if is_running { self.text(network, at(0x100A, 0))? } else { None };
         let is_valid = is_running || self.program(network).status()?.is_none_or(is_good);
         Ok(State { is_running, version, identification, is_valid })
@@ -349,8 +352,8 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Whether the node has the new program. A forced update finds it there after it has downloaded it; a loader that does not
-    /// say which program it has (1F56h reads 0) is believed to have what it was given.
+    /// Whether the node has the new program. A forced update has to download first, even if the node has the program
+    /// already. If a loader does not tell its program (1F56h reads 0), the download is trusted.
     fn is_there(&self, now: &State) -> bool {
         let is_complete = self.progress == Progress::Complete;
         match &self.image.info {
@@ -381,19 +384,19 @@ impl<'a> Job<'a> {
     }
 }
 
-/// A bus that cannot be opened may be there later; the time to wait is the caller's.
+/// Tries to open the bus. After a failure it pauses, because the bus may come back; the caller limits the whole time.
 fn reopen(network: &mut Network) {
     if network.reopen().is_err() {
         std::thread::sleep(std::time::Duration::from_micros(POLL.0));
     }
 }
 
-/// Whether there is a program that can be started.
+/// Whether a status means a valid program that can be started.
 fn is_good(status: Status) -> bool {
     status == Status::GOOD
 }
 
-/// Whether it is that of a flash without a program: nothing wrong, or no valid program.
+/// Whether a status means a flash without a program: no error, or no valid program.
 fn is_cleared(status: Status) -> bool {
     !status.busy && status.code <= 1
 }

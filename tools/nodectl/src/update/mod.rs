@@ -1,8 +1,8 @@
 //! Replaces the program of nodes over the bus (CiA 302-3).
 //!
-//! The sequence is what masters in the field do: stop the program, clear it, download the new one, wait until the node
-//! has checked it, compare its identification, start it. Stopping and starting need not be acknowledged: the node
-//! restarts, and answers in its new state.
+//! The sequence is the one of masters in the field: stop the program, clear it, download the new program, wait until
+//! the node has checked it, compare its identification, start it. The node need not acknowledge stopping and starting:
+//! it restarts, and answers in its new state.
 
 mod authorisation;
 mod error;

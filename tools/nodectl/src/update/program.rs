@@ -1,5 +1,5 @@
-//! The objects of the program (CiA 302-3): 1F50h, 1F51h, 1F56h, 1F57h, each at sub-index 1; and of nodes of this project alone 2002h,
-//! the trial of a new program, and 2003h, who may change the program.
+//! The objects of the program (CiA 302-3): 1F50h, 1F51h, 1F56h, 1F57h, each at sub-index 1. Only nodes of this project
+//! have 2002h, the trial of a new program, and 2003h, the authorisation of a change.
 
 use canopen::NodeId;
 use canopen::client::sdo;
@@ -36,7 +36,7 @@ const NAMES: [(Multiplexer, &str); 9] = [
     (RESPONSE, "Program authorisation: response"),
 ];
 
-/// What 1F51h takes. More is not portable.
+/// The portable values of 1F51h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Command {
@@ -61,18 +61,18 @@ impl<'n> Program<'n> {
         Program { network, node, options }
     }
 
-    /// Whether it runs; if not, the loader answers.
+    /// Whether the program runs. If not, the loader answers.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn is_running(&mut self) -> Result<bool, Error> {
         Ok(self.read(CONTROL)?.first() == Some(&1))
     }
 
-    /// What identifies the program. `None` where the node does not say: no such object, or 0.
+    /// The identification of the program. `None` where the node does not tell it: no such object, or 0.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn identification(&mut self) -> Result<Option<u32>, Error> {
         Ok(self.word(IDENTIFICATION)?.filter(|&id| id != 0))
     }
@@ -80,66 +80,67 @@ impl<'n> Program<'n> {
     /// The status of the flash. `None` where the node has no such object.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn status(&mut self) -> Result<Option<Status>, Error> {
         Ok(self.word(STATUS)?.map(Status::from_word))
     }
 
-    /// Whether the program that runs is on trial: the one before comes back unless it is confirmed. Of nodes of this project only.
+    /// Whether the running program is on trial: without a confirmation the former program comes back. Only for nodes of
+    /// this project.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn is_on_trial(&mut self) -> Result<bool, Error> {
         match self.read(TRIAL_STATE) {
             Ok(state) => Ok(state.first() == Some(&1)),
-            // A program from before there were trials.
+            // Programs of the time before trials have no such object.
             Err(error) if error.is_absent() => Ok(false),
             Err(error) => Err(error),
         }
     }
 
-    /// Whether the node wants to know who changes its program, and nobody has told it since its start. Of nodes of this project only.
+    /// Whether the node demands an authorisation that it has not had since its start. Only for nodes of this project.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn is_closed(&mut self) -> Result<bool, Error> {
         match self.read(AUTHORISATION_STATE) {
             Ok(state) => Ok(state.first() == Some(&1)),
-            // A program from before there were challenges, or a bootloader without a key.
+            // Programs of the time before authorisations, and bootloaders without a key, have no such object.
             Err(error) if error.is_absent() => Ok(false),
             Err(error) => Err(error),
         }
     }
 
-    /// Answers the challenge of the node: it takes commands until its next start.
+    /// Answers the challenge of the node. The node then accepts commands until its next start.
     ///
     /// # Errors
-    /// Those of SDO: the node refuses the response of another key.
+    /// SDO errors. The node refuses the response of a wrong key.
     pub fn open(&mut self, key: &AuthorisationKey) -> Result<(), Error> {
         let serial_number = self.word(SERIAL_NUMBER)?.unwrap_or_default();
-        // A challenge of another length has no answer: the node will say so.
+        // A challenge of a wrong length has no valid answer, so that the node will refuse the response.
         let challenge = self.read(CHALLENGE)?.try_into().unwrap_or_default();
         let response = key.response(challenge, serial_number);
         self.client(self.options).download(RESPONSE, &response, |_| ()).map_err(named)
     }
 
-    /// Confirms the program that runs. The node ends the trial a moment later.
+    /// Confirms the running program. The node ends the trial a moment later.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn confirm(&mut self) -> Result<(), Error> {
         self.client(self.options).download(TRIAL_COMMAND, b"conf", |_| ()).map_err(named)
     }
 
-    /// A command that is acknowledged.
+    /// Sends a command that the node acknowledges.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn command(&mut self, command: Command) -> Result<(), Error> {
         self.client(self.options).download(CONTROL, &[command as u8], |_| ()).map_err(named)
     }
 
-    /// A command that restarts the node: it is given once, and silence is fine.
+    /// Sends a command that restarts the node. The command is sent once, and a missing answer is no error.
     ///
     /// # Errors
     /// The node refuses, or the bus is lost.
@@ -151,10 +152,10 @@ impl<'n> Program<'n> {
         }
     }
 
-    /// Downloads the program in blocks. It is not begun anew: half a program has to be cleared first.
+    /// Downloads the program in blocks. The download is not repeated, because half a program has to be cleared first.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn download_blocks(&mut self, bytes: &[u8], progress: impl FnMut(usize)) -> Result<(), Error> {
         let once = Options { retries: 0, ..self.options };
         self.client(once).block_download(DATA, bytes, progress).map_err(named)
@@ -163,7 +164,7 @@ impl<'n> Program<'n> {
     /// Downloads the program in segments.
     ///
     /// # Errors
-    /// Those of SDO.
+    /// SDO errors.
     pub fn download_segments(&mut self, bytes: &[u8], progress: impl FnMut(usize)) -> Result<(), Error> {
         let once = Options { retries: 0, ..self.options };
         self.client(once).download(DATA, bytes, progress).map_err(named)

@@ -1,42 +1,42 @@
-//! What an update tells while it goes on.
+//! The reports of an update while it runs.
 
 use std::fmt;
 
 use canopen::NodeId;
 
-/// Who wants to know.
+/// A receiver of the reports of an update.
 pub trait Watcher {
-    /// A node is at this step.
+    /// The update of a node has begun this step.
     fn step(&mut self, node: NodeId, step: Step);
 
-    /// So many bytes of all have arrived.
+    /// `done` of `total` bytes have arrived.
     fn progress(&mut self, node: NodeId, done: usize, total: usize);
 }
 
 /// A step of the update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The running program is asked what it is.
+    /// Reading the identification of the running program.
     Identify,
-    /// It is stopped.
+    /// Stopping the program.
     Stop,
-    /// The flash is busy with what an earlier master has begun.
+    /// Waiting while the flash is busy with a command of an earlier master.
     Busy,
-    /// It is cleared.
+    /// Clearing the program.
     Clear,
-    /// The new one is on its way.
+    /// Downloading the new program in blocks.
     Download,
-    /// The same, by the slower transfer: the node does not take blocks.
+    /// Downloading the new program in segments, which is slower, because the node does not accept blocks.
     DownloadSegments,
-    /// The node checks it.
+    /// The node checks the new program.
     Verify,
-    /// It is started.
+    /// Starting the new program.
     Start,
-    /// It runs, and its trial is ended.
+    /// The new program runs; ending its trial.
     Confirm,
-    /// The node or the bus is gone.
+    /// The node or the bus is lost.
     Lost,
-    /// It is there again.
+    /// The node is back.
     Back,
 }
 
