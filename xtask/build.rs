@@ -1,4 +1,4 @@
-//! Tells xtask the triple of the machine it runs on.
+//! Passes the triple of this machine to xtask.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

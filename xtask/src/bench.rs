@@ -10,7 +10,7 @@ use crate::own_tool::Tools;
 use crate::progress;
 use crate::target::{TRIPLE, Toolchain};
 
-/// What to do with the figures.
+/// The flags of the command.
 #[derive(Args, Default)]
 pub(crate) struct Options {
     /// Optimise for speed (opt-level 2), not for size as the firmware is
@@ -28,13 +28,13 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The profile that the programs are built with, also the name of its directory.
+    /// The cargo profile for the programs, which is also the name of its directory.
     fn cargo_profile(&self) -> &'static str {
         if self.speed { "speed" } else { "release" }
     }
 }
 
-/// Measures and prints.
+/// Builds the programs and runs the bench tool on them.
 pub(crate) fn measure(options: &Options, tools: Tools) -> Result<()> {
     let images = build(options)?;
     let page = root().join("docs/performance.md");
@@ -55,12 +55,12 @@ pub(crate) fn measure(options: &Options, tools: Tools) -> Result<()> {
     run(&mut command)
 }
 
-/// The step of the test command: what is flashed has not become worse than stated.
+/// The step of the test command: fails when the flashed code has become worse than docs/performance.md states.
 pub(crate) fn check() -> Result<()> {
     measure(&Options { check: true, ..Options::default() }, Tools::Built)
 }
 
-/// Builds the programs whose instructions are counted; returns their directory.
+/// Builds the measured programs. Returns their directory.
 pub(crate) fn build(options: &Options) -> Result<PathBuf> {
     let profile = options.cargo_profile();
     let mut command = Toolchain::ensure()?.cargo("build", &["--profile", profile, "-p", "bench-images"]);

@@ -1,4 +1,4 @@
-//! `cargo xtask panics` and `cargo xtask stack`: what tools/callgraph reads in the images.
+//! `cargo xtask panics` and `cargo xtask stack`: checks of the images by tools/callgraph.
 
 use std::process::Command;
 
@@ -9,13 +9,13 @@ use crate::images;
 use crate::own_tool::Tools;
 use crate::target::Toolchain;
 
-/// Prints which code of the images can panic; fails when some of it is not known.
+/// Prints the code of the images that can panic; fails when some of it is not known.
 pub(crate) fn panics(tools: Tools) -> Result<()> {
     images::compile_node(&Toolchain::ensure()?, images::CHIP)?;
     run(tool(tools)?.arg("panics"))
 }
 
-/// The same, and shows that it can fail.
+/// The check of the test command, which also shows that the check can fail.
 pub(crate) fn check_panics() -> Result<()> {
     panics(Tools::Built)?;
     let forgetful = tool(Tools::Built)?.args(["panics", "--forget", "defmt_rtt"]).output()?;
@@ -27,7 +27,7 @@ pub(crate) fn check_panics() -> Result<()> {
     Ok(())
 }
 
-/// Prints how deep the stack of each image can get; fails when that is more than is reserved for it.
+/// Prints the bound of each image's stack; fails when the bound exceeds the reserved size.
 pub(crate) fn stack(paths: bool, tools: Tools) -> Result<()> {
     images::compile_node(&Toolchain::ensure()?, images::CHIP)?;
     let paths = if paths { &["--paths"][..] } else { &[] };

@@ -1,4 +1,4 @@
-//! Running other programs.
+//! Calls of other programs.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -9,7 +9,7 @@ use std::process::{Command, ExitCode, Stdio};
 use anyhow::{Context, Result, bail};
 
 thread_local! {
-    /// Where the programs that this thread runs print to; the terminal when there is none.
+    /// The file that the programs of this thread print to; without one, they print to the terminal.
     static LOG: RefCell<Option<File>> = const { RefCell::new(None) };
 }
 
@@ -28,14 +28,14 @@ pub(crate) fn built(name: &str) -> PathBuf {
     target_dir().join("sim").join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// The cargo that runs xtask.
+/// The cargo that has started xtask.
 pub(crate) fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
     command
 }
 
-/// Lets everything that `action` runs on this thread print into a file.
+/// Runs `action`. The output of all programs that it runs on this thread goes into a file.
 pub(crate) fn with_log<T>(log: File, action: impl FnOnce() -> T) -> T {
     LOG.set(Some(log));
     let result = action();
@@ -43,16 +43,16 @@ pub(crate) fn with_log<T>(log: File, action: impl FnOnce() -> T) -> T {
     result
 }
 
-/// A line for the log, or the terminal where there is none.
+/// Prints a line to the log; without a log, to the terminal.
 pub(crate) fn say(line: &str) {
     LOG.with_borrow_mut(|log| match log {
-        // A full disk ends the program that is run; a line about the program may be lost before.
+        // A full disk makes the program fail that is run; a lost line before does not matter.
         Some(log) => drop(writeln!(log, "{line}")),
         None => eprintln!("{line}"),
     });
 }
 
-/// Runs to the end; an error names the program when it cannot start or fails.
+/// Runs a program to its end. The error names the program when it cannot start or fails.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let name = line(command);
     if let Some((out, err)) = streams()? {
@@ -72,7 +72,7 @@ fn streams() -> Result<Option<(File, File)>> {
     })
 }
 
-/// Goes on as another program, so that a signal to `cargo xtask` reaches that one.
+/// Replaces this process by another program, so that a signal to `cargo xtask` reaches the program.
 pub(crate) fn become_program(command: &mut Command) -> Result<ExitCode> {
     start::become_program(command)
         .with_context(|| format!("cannot start {}", command.get_program().display()))

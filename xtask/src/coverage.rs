@@ -1,4 +1,4 @@
-//! `cargo xtask coverage`: which lines of the pure crates the tests run, by cargo-llvm-cov.
+//! `cargo xtask coverage`: the lines of the pure crates that the tests run, by cargo-llvm-cov.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,20 +10,21 @@ use crate::command::{cargo, root, run};
 use crate::setup::system;
 use crate::tools;
 
-/// The crates that are measured, and those whose tests count as well.
+/// The measured crates, and below them the crates whose tests run as well.
 const PURE: [&str; 5] = ["canopen-device", "profiles", "storage", "update", "node"];
 const TESTS: [&str; 2] = ["host-tests", "fuzz"];
 
-/// Not measured: what is no part of the five, their mocks, and the tables of objects with what makes dictionaries of
-/// them. Those are evaluated by the compiler, which counts no lines; what they come to is compared with `host-tests/tables`.
+/// Excluded files: files outside of the five crates, mocks, and the tables of objects with the code that makes
+/// dictionaries of them. The compiler evaluates these tables and counts no lines there; the results are compared with
+/// `host-tests/tables`.
 const IGNORED: &str = "(tests?|mock|host-tests|emulator|bsp|tools)(/|\\.rs)\
     |dictionary/(compile|filling|object)\\.rs\
     |node/src/(pressure|encoder|combined|lift|communication)/(pdos|profile|manufacturer|shift|start_up|objects|mod)\\.rs";
 
-/// Debian's tools, of the LLVM that this compiler comes with.
+/// Debian's LLVM tools, in the version of this compiler.
 const DEBIAN_LLVM: &str = "/usr/lib/llvm-22/bin";
 
-/// Prints a line for each file, and the sum.
+/// Prints a line for each file, and the total.
 pub(crate) fn print() -> Result<()> {
     let mut command = cargo();
     command.args(["llvm-cov", "test", "--quiet", "--profile", "sim", "--summary-only"]);

@@ -1,4 +1,4 @@
-//! `cargo xtask eds`: what is generated from the dictionary tables.
+//! `cargo xtask eds`: the files that are generated from the dictionary tables.
 
 use anyhow::Result;
 

@@ -1,4 +1,5 @@
-//! `cargo xtask fault-injection`: builds the bootloader as its owner does, and has the emulated board skip its instructions.
+//! `cargo xtask fault-injection`: builds the bootloader in the configuration for an owner, and lets the emulated board
+//! skip its instructions.
 
 use std::ffi::OsString;
 
@@ -9,7 +10,7 @@ use crate::images;
 use crate::own_tool::Tools;
 use crate::target::Toolchain;
 
-/// Builds what is disturbed, then disturbs it as the flags say.
+/// Builds the programs, then runs the fault injection with the flags.
 pub(crate) fn try_all(flags: &[OsString]) -> Result<()> {
     let bootloader = images::compile_owners(&Toolchain::ensure()?)?;
     run(Tools::ByCargo.get("glitch")?.arg("--bootloader").arg(bootloader).args(flags))

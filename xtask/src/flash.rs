@@ -1,5 +1,5 @@
-//! `cargo xtask flash`: build bootloader and application, then become the program that writes them to a board on a bench. It is
-//! the runner of `cargo run` in `firmware` too, which has built the application then.
+//! `cargo xtask flash`: builds bootloader and application, then becomes the program that writes them to a board on a
+//! bench. This command is also the runner of `cargo run` in `firmware`, which has built the application already.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -15,7 +15,7 @@ use crate::setup;
 use crate::target::Toolchain;
 use crate::{images, progress};
 
-/// What probe-rs prints where there is nothing to connect to.
+/// The output of probe-rs when no probe is connected.
 const NO_PROBE: &str = "No debug probes were found";
 
 #[derive(Args)]
@@ -36,7 +36,8 @@ pub(crate) struct Flags {
 }
 
 impl Flags {
-    /// Whoever has no probe, or no board at it, waits for no build.
+    /// Refuses before the build when no probe or no board is connected, so that nobody waits for a build that is of no
+    /// use.
     fn check(&self) -> Result<()> {
         setup::check(if self.dry_run { setup::IMAGES } else { setup::FLASH })?;
         if !self.dry_run && output("probe-rs", &["list"]).is_none_or(|list| list.contains(NO_PROBE)) {
@@ -75,7 +76,7 @@ pub(crate) fn run(flags: &Flags) -> Result<ExitCode> {
     become_program(&mut flags.tool(&bootloader, &application))
 }
 
-/// The public half of the key in this file, as digits.
+/// The public half of the key in this file, as hexadecimal digits.
 fn variable(key: &Path) -> Result<String> {
     let path = key.to_str().context("a path that is no text")?;
     let line = output(built("sign"), &["public", path])

@@ -1,4 +1,4 @@
-//! `cargo xtask fuzz`: libFuzzer looks for inputs that break a rule.
+//! `cargo xtask fuzz`: libFuzzer searches for inputs that break a rule.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,19 +9,19 @@ use clap::{Args, ValueEnum};
 
 use crate::command::{cargo, root, run, target_dir};
 
-/// What the instrumentation needs, as cargo-fuzz sets it; no sanitizer, for the code under test has no `unsafe`. All of
-/// it is stable.
+/// The flags for the instrumentation, the same as cargo-fuzz sets. There is no sanitizer, because the code under test
+/// has no `unsafe`. All flags are stable.
 const INSTRUMENTED: &str = "--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
     -Cllvm-args=-sanitizer-coverage-trace-compares -Cdebug-assertions -Coverflow-checks -Ccodegen-units=1";
 
-/// Longest input: some hundred steps.
+/// The greatest length of an input: some hundred steps.
 const LONGEST: &str = "-max_len=2000";
 
-/// The host, named so that build scripts are not instrumented.
+/// The target triple of the host. With an explicit target, build scripts are not instrumented.
 const HOST: &str = env!("XTASK_HOST");
 
-/// Flags of the command.
+/// The flags of the command.
 #[derive(Args)]
 pub(crate) struct Flags {
     /// What to fuzz
@@ -48,7 +48,7 @@ enum Target {
     Sheet,
 }
 
-/// Fuzzes one target. What breaks a rule ends in target/fuzz, and the command fails.
+/// Fuzzes one target. An input that breaks a rule is written to target/fuzz, and the command fails.
 pub(crate) fn run_fuzzer(flags: &Flags) -> Result<()> {
     let value = flags.target.to_possible_value().context("a target has a name")?;
     let name = value.get_name();
@@ -66,7 +66,7 @@ pub(crate) fn run_fuzzer(flags: &Flags) -> Result<()> {
     if flags.keep { keep(&program, &found, &corpus) } else { Ok(()) }
 }
 
-/// The corpus as libFuzzer wants it, a file for each input.
+/// Unpacks the corpus into a file for each input, as libFuzzer needs it.
 fn unpack(corpus: &Path, found: &Path) -> Result<()> {
     fs::create_dir_all(found).with_context(|| format!("cannot make {}", found.display()))?;
     let text = fs::read_to_string(corpus).with_context(|| format!("cannot read {}", corpus.display()))?;
@@ -97,7 +97,7 @@ fn fuzzer(program: &Path) -> Command {
     command
 }
 
-/// The smallest set of inputs that covers as much, in the corpus' place: a line for each, the shortest first.
+/// Replaces the corpus by the smallest set of inputs with the same coverage: a line for each input, the shortest first.
 fn keep(program: &Path, found: &Path, corpus: &Path) -> Result<()> {
     let smallest = found.with_extension("smallest");
     fs::create_dir_all(&smallest)?;

@@ -1,8 +1,8 @@
-//! Examples that the stm32f4xx-hal package brings, compiled from the published source as it is: the emulated board runs programs
-//! that nobody has written for it.
+//! Examples of the stm32f4xx-hal package, compiled unchanged from the published source. With them the emulated board
+//! runs programs that were not written for it.
 //!
-//! A package is made for them in the build directory, for its own dependencies are those of these few examples; the package of
-//! the HAL needs some hundred for all of its own.
+//! The examples get a package of their own in the build directory, with the few dependencies that they need. The
+//! package of the HAL needs some hundred dependencies for all of its examples.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -15,12 +15,13 @@ use crate::command::{cargo, root, target_dir};
 use crate::progress;
 use crate::target::Toolchain;
 
-/// The examples, by the names of their files. Their programs are called the same after `hal-`.
+/// The file names of the examples. The programs have the same names after `hal-`.
 const EXAMPLES: [&str; 4] = ["blinky-timer-irq", "delay-timer-blinky", "dwt-blinky", "timer-syst"];
 
 const HAL: &str = "stm32f4xx-hal";
 
-/// What the examples need beside the HAL. They are compiled as the images are, so that what both need is compiled once.
+/// The dependencies of the examples besides the HAL. The profile is the one of the images, so that common dependencies
+/// are compiled once.
 const MANIFEST: &str = r#"
 [dependencies]
 cortex-m = { version = "0.7.7", features = ["critical-section-single-core"] }
@@ -40,7 +41,7 @@ panic = "abort"
 overflow-checks = false
 "#;
 
-/// Has the programs linked as those of a microcontroller.
+/// The build script, which links the programs for a microcontroller.
 const BUILD: &str = "fn main() {\n    println!(\"cargo::rustc-link-search={}\", env!(\"CARGO_MANIFEST_DIR\"));\n    println!(\"cargo::rustc-link-arg=-Tlink.x\");\n}\n";
 
 /// Flash and RAM of an STM32F446xE.
@@ -58,7 +59,7 @@ struct Package {
     manifest_path: PathBuf,
 }
 
-/// Compiles the examples; their ELF files lie with those of the images.
+/// Compiles the examples. Their ELF files are beside those of the images.
 pub(crate) fn build(toolchain: &Toolchain) -> Result<()> {
     let hal = published()?;
     let source = hal.manifest_path.parent().context("a manifest lies in a folder")?.join("examples");
@@ -75,7 +76,7 @@ pub(crate) fn build(toolchain: &Toolchain) -> Result<()> {
     progress::build("HAL examples", &mut command)
 }
 
-/// The HAL, of the version that the firmware is built with.
+/// The HAL package in the version of the firmware.
 fn published() -> Result<Package> {
     let output = cargo().args(["metadata", "--format-version", "1", "--locked"]).output()?;
     ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -96,7 +97,7 @@ fn manifest(version: &str, source: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Cargo compiles again what is newer than what it has compiled.
+/// Writes a file only when its text changes, because cargo compiles again after a write.
 fn write_if_new(path: &Path, text: &str) -> Result<()> {
     if fs::read_to_string(path).ok().as_deref() == Some(text) {
         return Ok(());

@@ -10,22 +10,23 @@ use crate::own_tool::Tools;
 use crate::progress;
 use crate::target::{TRIPLE, Toolchain};
 
-/// Where the ELF files lie.
+/// The directory of the ELF files.
 pub(crate) fn dir() -> PathBuf {
     target_dir().join(TRIPLE).join("release")
 }
 
-/// A bootloader that starts what nobody has signed, and trusts the key that everybody knows: for a board on a desk, emulated or not.
+/// A bootloader for a board on a desk, emulated or not: it starts unsigned images, and trusts the development key,
+/// which everybody knows.
 pub(crate) const DEVELOPMENT: [&str; 2] = ["--features", "bootloader/development"];
 
-/// The chip that the images are compiled for where nothing else is said.
+/// The default chip of the images.
 pub(crate) const CHIP: &str = "stm32f446";
 
-/// The others. The second is the first with Ethernet and a camera, which the images do not use: the first stands for both where time
-/// is short.
+/// The other chips. The second is the first with Ethernet and a camera, which the images do not use. So the first
+/// stands for both in quick tests.
 pub(crate) const OTHER_CHIPS: [&str; 2] = ["stm32f405", "stm32f407"];
 
-/// Compiles the firmware and the bootloader for development, and says where they are.
+/// Compiles the firmware and the bootloader for development. Returns their directory.
 pub(crate) fn compile_node(toolchain: &Toolchain, chip: &str) -> Result<PathBuf> {
     if chip != CHIP {
         return compile_for(toolchain, chip);
@@ -34,8 +35,8 @@ pub(crate) fn compile_node(toolchain: &Toolchain, chip: &str) -> Result<PathBuf>
     Ok(dir())
 }
 
-/// Compiles the firmware and the bootloader for development and for another chip, and puts them into a folder with the chip's name:
-/// cargo itself has one place for all.
+/// Compiles the firmware and the bootloader for development and for another chip, and copies them into a folder with
+/// the chip's name, because cargo has one place for all chips.
 pub(crate) fn compile_for(toolchain: &Toolchain, chip: &str) -> Result<PathBuf> {
     call_cargo_for(toolchain, "build", chip)?;
     let folder = dir().join(chip);
@@ -46,7 +47,7 @@ pub(crate) fn compile_for(toolchain: &Toolchain, chip: &str) -> Result<PathBuf> 
     Ok(folder)
 }
 
-/// Whether the firmware and the bootloader compile for another chip.
+/// Checks that the firmware and the bootloader compile for another chip.
 pub(crate) fn check_for(toolchain: &Toolchain, chip: &str) -> Result<()> {
     call_cargo_for(toolchain, "check", chip)
 }
@@ -57,13 +58,13 @@ fn call_cargo_for(toolchain: &Toolchain, verb: &str, chip: &str) -> Result<()> {
     progress::build(chip, command.args(features).args(DEVELOPMENT))
 }
 
-/// Compiles the application alone, and says where it is.
+/// Compiles the application alone. Returns its path.
 pub(crate) fn compile_application(toolchain: &Toolchain) -> Result<PathBuf> {
     progress::build("firmware", &mut toolchain.cargo("build", &["--release", "-p", "firmware"]))?;
     Ok(dir().join("firmware"))
 }
 
-/// Compiles the bootloader alone, and says where it is: one for development, or one that trusts nothing but this key.
+/// Compiles the bootloader alone, for development or with this key as the only trusted key. Returns its path.
 pub(crate) fn compile_bootloader(toolchain: &Toolchain, key: Option<String>) -> Result<PathBuf> {
     let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
     match key {
@@ -74,12 +75,12 @@ pub(crate) fn compile_bootloader(toolchain: &Toolchain, key: Option<String>) -> 
     Ok(dir().join("bootloader"))
 }
 
-/// Compiles everything that the tests run on the emulated core, for development.
+/// Compiles all programs that the tests run on the emulated core, for development.
 pub(crate) fn compile_all(toolchain: &Toolchain) -> Result<()> {
     compile(toolchain, "images", &["firmware", "bootloader", "mechanics-images"])
 }
 
-/// Compiles the firmware and the bootloader for the owner of the keys in the environment. The owner signs the firmware.
+/// Compiles the firmware and the bootloader with the keys in the environment. The owner of the keys signs the firmware.
 pub(crate) fn build_for_owner() -> Result<()> {
     ensure!(
         std::env::var_os("UPDATE_PUBLIC_KEY").is_some(),
@@ -92,22 +93,22 @@ pub(crate) fn build_for_owner() -> Result<()> {
     Ok(())
 }
 
-/// Compiles the bootloader as its owner does, with keys that only the tests know, and puts the file beside the one for
-/// development.
+/// Compiles the bootloader with keys that only the tests know, in the configuration for an owner, and puts the file
+/// beside the bootloader for development.
 pub(crate) fn compile_owners(toolchain: &Toolchain) -> Result<PathBuf> {
     let mut command = owners(toolchain)?;
     command.env_remove(AUTHORISATION_KEY);
     put_beside(&mut command, "bootloader-owner")
 }
 
-/// The same, for an owner who wants to know who changes the program.
+/// Compiles the bootloader of an owner whose nodes demand an authorisation for an update.
 fn compile_guarded(toolchain: &Toolchain) -> Result<PathBuf> {
     let mut command = owners(toolchain)?;
     command.env(AUTHORISATION_KEY, of_tests("authorisation-key.hex")?.trim());
     put_beside(&mut command, "bootloader-guarded")
 }
 
-/// How an owner builds the bootloader.
+/// The build of the bootloader in the configuration for an owner.
 fn owners(toolchain: &Toolchain) -> Result<Command> {
     let mut command = toolchain.cargo("build", &["--release", "-p", "bootloader"]);
     command.envs(KEYS.into_iter().zip(of_tests("owner-keys.hex")?.lines()));
@@ -125,7 +126,7 @@ fn put_beside(build: &mut Command, name: &str) -> Result<PathBuf> {
     Ok(place)
 }
 
-/// Both; and without a key, and not for development, there is no bootloader.
+/// Checks both bootloaders of owners, and that the build fails without a key and without the feature for development.
 pub(crate) fn check_owners(toolchain: &Toolchain) -> Result<()> {
     compile_guarded(toolchain)?;
     compile_owners(toolchain)?;
@@ -142,9 +143,9 @@ pub(crate) fn check_owners(toolchain: &Toolchain) -> Result<()> {
     Ok(())
 }
 
-/// The variables that the keys come in.
+/// The environment variables with the public keys.
 const KEYS: [&str; 2] = ["UPDATE_PUBLIC_KEY", "UPDATE_PUBLIC_KEY_2"];
-/// The variable of the key that opens a node for an update.
+/// The environment variable with the key that authorises an update.
 const AUTHORISATION_KEY: &str = "UPDATE_AUTHORISATION_KEY";
 
 fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {
@@ -157,12 +158,12 @@ fn compile(toolchain: &Toolchain, what: &str, packages: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// Has the tool make the image that a programmer writes and `nodectl update` takes, signed with the development key.
+/// Lets the tool make the image for programmers and `nodectl update`, signed with the development key.
 pub(crate) fn sign(mut tool: Command, images: &Path) -> Result<()> {
     run(tool.arg("image").arg(images.join("firmware")))
 }
 
-/// Compiles and signs everything that the tests run on the emulated core.
+/// Compiles and signs all programs that the tests run on the emulated core.
 pub(crate) fn build(tools: Tools) -> Result<()> {
     compile_all(&Toolchain::ensure()?)?;
     sign(tools.get("sign")?, &dir())

@@ -1,6 +1,6 @@
-//! `cargo xtask mutants`: whether the tests of the pure crates notice a change of the code, by cargo-mutants.
+//! `cargo xtask mutants`: checks by cargo-mutants whether the tests of the pure crates notice changes of the code.
 //!
-//! What is changed and what is not: `.cargo/mutants.toml`.
+//! `.cargo/mutants.toml` tells which code is changed.
 
 use anyhow::Result;
 use clap::Args;
@@ -8,13 +8,13 @@ use clap::Args;
 use crate::command::{cargo, run, target_dir};
 use crate::tools;
 
-/// The crates that are mutated when none is named.
+/// The crates that are mutated by default.
 const PACKAGES: [&str; 3] = ["profiles", "storage", "update"];
 
-/// The same inputs for every mutant, and no search for a smaller one that fails too.
+/// The same inputs for every mutant, and no search for a smaller failing input.
 const PROPTEST: [(&str, &str); 2] = [("PROPTEST_RNG_SEED", "1"), ("PROPTEST_MAX_SHRINK_ITERS", "0")];
 
-/// Flags of the command.
+/// The flags of the command.
 #[derive(Args)]
 pub(crate) struct Flags {
     /// The crates to mutate [default: profiles storage update]
@@ -24,7 +24,7 @@ pub(crate) struct Flags {
     shard: Option<String>,
 }
 
-/// Prints the mutants that no test notices; the logs are in target/mutants.out. Fails when there is one.
+/// Prints the mutants that no test notices, and fails when there is one. The logs are in target/mutants.out.
 pub(crate) fn print(flags: &Flags) -> Result<()> {
     let mut command = cargo();
     command.args(["mutants", "--colors", "never", "--output"]).arg(target_dir());

@@ -1,4 +1,4 @@
-//! Tools of the project: by cargo, or as the test command has built them.
+//! Tools of the project, run by cargo or as the test command has built them.
 
 use std::ffi::OsString;
 use std::process::Command;
@@ -8,18 +8,18 @@ use anyhow::{Context, Result};
 use crate::command::{self, built, root};
 use crate::setup::emulator;
 
-/// Where the arguments of a tool go to.
+/// The way to run a tool of the project.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tools {
     /// Cargo builds the tool first.
     ByCargo,
-    /// The test command has built all of them: cargo would compile some crates again, with the features that one tool
+    /// The test command has built all tools. Cargo would compile some crates again, with the features that one tool
     /// alone needs.
     Built,
 }
 
 impl Tools {
-    /// The tool, ready for its arguments.
+    /// The call of a tool, without its arguments.
     pub(crate) fn get(self, name: &str) -> Result<Command> {
         if self == Tools::Built {
             let mut tool = Command::new(built(name));
@@ -32,7 +32,7 @@ impl Tools {
     }
 }
 
-/// Runs a tool that has flags of its own in the directory of the caller, so that paths mean what they say.
+/// Runs a tool with flags of its own in the directory of the caller, so that relative paths keep their meaning.
 pub(crate) fn run(tool: &str, arguments: &[OsString]) -> Result<()> {
     let here = std::env::current_dir().context("there is no current directory")?;
     let manifest = root().join("Cargo.toml");

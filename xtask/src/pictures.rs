@@ -1,4 +1,4 @@
-//! `cargo xtask pictures`: the page in a browser and the screen of the simulator, as pictures for the documentation.
+//! `cargo xtask pictures`: pictures of the page in a browser and of the simulator's screen, for the documentation.
 
 use std::process::Command;
 
@@ -10,7 +10,7 @@ use crate::setup::{self, emulator, python};
 use crate::test::suite::{with_images, with_programs};
 use crate::{images, progress};
 
-/// Builds the programs and the images, and has the page drawn by a browser.
+/// Builds the programs and the images, and takes the pictures with a browser.
 pub(crate) fn take() -> Result<()> {
     setup::check(setup::PICTURES)?;
     setup::install(setup::PICTURES)?;

@@ -1,4 +1,4 @@
-//! `cargo xtask plots`: what is computed with the measurement chain for its documentation.
+//! `cargo xtask plots`: plots and tables of the measurement chain for its documentation.
 
 use anyhow::Result;
 

@@ -1,4 +1,5 @@
-//! What a build says while it works: a line now and then instead of one for each crate, and everything that is wrong.
+//! The output of a build while it runs: a line now and then instead of a line for each crate, and all warnings and
+//! errors.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
@@ -9,10 +10,10 @@ use anyhow::{Context, Result, ensure};
 
 use crate::command::say;
 
-/// The longest time without a line.
+/// The longest time without an output.
 const PERIOD: Duration = Duration::from_secs(10);
 
-/// Words with which cargo begins a line that is no message of the compiler.
+/// First words of cargo's lines that are no message of the compiler.
 const ROUTINE: [&str; 12] = [
     "Adding",
     "Blocking",
@@ -28,10 +29,10 @@ const ROUTINE: [&str; 12] = [
     "Updating",
 ];
 
-/// Runs a cargo command to its end. While it compiles, lines that begin with `what` tell how far it is.
+/// Runs a cargo command to its end. While it compiles, lines that begin with `what` tell the progress.
 ///
 /// # Errors
-/// It cannot start, or it fails; what the compiler said has been printed.
+/// The command cannot start, or it fails. The messages of the compiler have been printed.
 pub(crate) fn build(what: &str, command: &mut Command) -> Result<()> {
     let begin = Instant::now();
     let mut child = command.stderr(Stdio::piped()).spawn().context("cannot start cargo")?;
@@ -52,7 +53,7 @@ pub(crate) fn build(what: &str, command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Prints until cargo has ended. Returns the number of crates that were compiled.
+/// Prints the progress until cargo has ended. Returns the number of compiled crates.
 fn tell(what: &str, begin: Instant, lines: &Receiver<String>) -> u32 {
     let (mut crates, mut doing, mut told) = (0, String::from("starting"), begin);
     loop {
@@ -73,7 +74,7 @@ fn tell(what: &str, begin: Instant, lines: &Receiver<String>) -> u32 {
     }
 }
 
-/// The first word of cargo's routine lines and what follows.
+/// The first word of a routine line of cargo, and the rest of the line.
 fn routine(line: &str) -> Option<(&str, &str)> {
     let (word, rest) = line.trim_start().split_once(' ')?;
     ROUTINE.contains(&word).then(|| (word, rest.split(" (").next().unwrap_or(rest)))

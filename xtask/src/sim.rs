@@ -1,4 +1,4 @@
-//! `cargo sim`: build both images and the simulator, then become the simulator.
+//! `cargo sim`: builds both images and the simulator, then becomes the simulator.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,8 @@ fn build() -> Result<()> {
     progress::build("emulator 2/2", &mut command)
 }
 
-/// Builds at the same time what the Cortex-M4 and what this machine runs: each of the two leaves a core idle when it links.
+/// Builds the programs for the Cortex-M4 and for this machine at the same time, because each build leaves a core idle
+/// while it links.
 fn build_all(chip: &str) -> Result<PathBuf> {
     thread::scope(|scope| {
         let images = scope.spawn(|| images::compile_node(&Toolchain::ensure()?, chip));
@@ -28,7 +29,7 @@ fn build_all(chip: &str) -> Result<PathBuf> {
     })
 }
 
-/// The chip that is asked for. The simulator says what is wrong with a name that is none.
+/// The chip that the flags name. The simulator itself refuses an unknown name.
 fn chip(flags: &[OsString]) -> &str {
     let mut flags = flags.iter().filter_map(|flag| flag.to_str());
     let found = flags.find_map(|flag| match flag.strip_prefix("--chip") {
@@ -40,8 +41,7 @@ fn chip(flags: &[OsString]) -> &str {
     named.filter(|name| images::OTHER_CHIPS.contains(name)).unwrap_or(images::CHIP)
 }
 
-/// Runs the simulator with the user's flags in the place of this process, so that a signal to `cargo sim` reaches the
-/// simulator.
+/// Replaces this process by the simulator with the user's flags, so that a signal to `cargo sim` reaches the simulator.
 pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     setup::check(setup::SIM)?;
     eprintln!("images for development: the bootloader starts what nobody has signed (docs/update.md)");
@@ -50,8 +50,8 @@ pub(crate) fn run(flags: &[OsString]) -> Result<ExitCode> {
     become_program(with_images(&built("sim"), &images).args(flags))
 }
 
-/// The simulator with the two ELF files it loads, and the program that it has serve the page. That is a program of its own: the
-/// simulator's licence is not that of the tools.
+/// The call of the simulator with the two ELF files and the program that serves the page. The page has a program of its
+/// own, because the simulator has another licence than the tools.
 fn with_images(program: &Path, images: &Path) -> Command {
     let mut command = Command::new(program);
     command.arg("--bootloader").arg(images.join("bootloader"));

@@ -1,4 +1,4 @@
-//! The Rust of the embedded target: which compiler builds the images on this machine.
+//! The toolchain for the embedded target: the compiler that builds the images on this machine.
 //!
 //! An installed target comes first. Where rustup must not download (`RUSTUP_AUTO_INSTALL=0`) Debian's packages
 //! build the core library from its source. Everywhere else rustup adds the target.
@@ -14,13 +14,13 @@ pub(crate) use start::target::TRIPLE;
 use crate::command::{cargo, root, run};
 use crate::setup::system;
 
-/// Has the compiler note what each function takes of the stack, in a section that is not flashed; `cargo xtask stack` adds it
-/// up. A stable compiler knows the flag with `RUSTC_BOOTSTRAP` only.
+/// Makes the compiler note the stack use of each function, in a section that is not flashed; `cargo xtask stack` adds
+/// it up. A stable compiler accepts the flag only with `RUSTC_BOOTSTRAP`.
 const STACK_SIZES: &str = "target.thumbv7em-none-eabihf.rustflags = ['-Zemit-stack-sizes']";
 
 /// A toolchain that can build for [`TRIPLE`].
 pub(crate) enum Toolchain {
-    /// The cargo that runs us has the target.
+    /// The cargo that has started xtask has the target.
     Installed,
     /// Debian's compiler with the source of its core library.
     Debian {
@@ -30,7 +30,7 @@ pub(crate) enum Toolchain {
 }
 
 impl Toolchain {
-    /// Finds one, or installs it, or says what to type.
+    /// Finds a toolchain or installs one. The error names the command to type.
     pub(crate) fn ensure() -> Result<Toolchain> {
         if has_target() {
             return Ok(Toolchain::Installed);
@@ -51,8 +51,8 @@ impl Toolchain {
 
     /// A cargo call for the target, `cargo <verb> --target ... <args>`.
     ///
-    /// The images are the same whatever the surroundings say of builds: incremental code is 2 % longer, which is more than the flash has
-    /// left, and flags of the surroundings replace those of `.cargo/config.toml`.
+    /// The images do not depend on build settings of the environment. Incremental code is 2 % longer, which is more
+    /// than the flash has left, and flags of the environment would replace those of `.cargo/config.toml`.
     pub(crate) fn cargo(&self, verb: &str, args: &[&str]) -> Command {
         let mut command = match self {
             Toolchain::Installed => cargo(),

@@ -1,4 +1,4 @@
-//! `cargo xtask timing`: how long each task takes, and the response-time analysis.
+//! `cargo xtask timing`: the execution time of each task, and the response-time analysis.
 
 use anyhow::Result;
 
@@ -7,7 +7,7 @@ use crate::images;
 use crate::own_tool::Tools;
 use crate::setup::emulator;
 
-/// Prints the table of the test that measures it.
+/// Prints the table of the test that measures the times.
 pub(crate) fn print() -> Result<()> {
     images::build(Tools::ByCargo)?;
     run(emulator::cargo_with_emulator()?

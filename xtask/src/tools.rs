@@ -1,4 +1,4 @@
-//! Commands of cargo that are no part of it.
+//! Cargo commands that have to be installed.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use crate::command::{cargo, run, target_dir};
 
-/// The search path with this command in it, which is installed below the build directory when it is missing.
+/// The search path with this command, which is installed below the build directory if it is missing.
 pub(crate) fn with(name: &str) -> Result<OsString> {
     let tools = target_dir().join("tools");
     if !tools.join("bin").join(name).exists() {

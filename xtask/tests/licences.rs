@@ -1,5 +1,5 @@
-//! Everything that is shipped as MIT or Apache-2.0 depends on nothing under a licence that asks for more, but for what the
-//! README states.
+//! Tests that the products under MIT or Apache-2.0 have no dependency under a stricter licence, except those that the
+//! README names.
 
 use std::collections::{BTreeSet, HashMap};
 use std::process::Command;
@@ -16,7 +16,7 @@ const SHIPPED: [(&str, &str); 5] = [
     ("canopen-device", HOST),
     ("nodectl", HOST),
 ];
-/// Licences that ask for their text, and for no source code.
+/// Licences that demand their text to be included, but no source code.
 const PERMISSIVE: [&str; 13] = [
     "0BSD",
     "Apache-2.0",
@@ -65,7 +65,7 @@ struct Dependency {
 
 #[derive(Deserialize)]
 struct Kind {
-    /// `None` for a dependency that is linked; `build` and `dev` are not.
+    /// `None` for a dependency that is linked, else `build` or `dev`.
     kind: Option<String>,
 }
 
@@ -77,7 +77,7 @@ impl Metadata {
         serde_json::from_slice(&output.stdout).unwrap()
     }
 
-    /// What is linked into a package of the workspace, itself included.
+    /// The packages that are linked into a package of the workspace, including that package.
     fn linked(&self, root: &str) -> Vec<&Package> {
         let packages: HashMap<&str, &Package> =
             self.packages.iter().map(|own| (own.id.as_str(), own)).collect();
@@ -99,7 +99,7 @@ impl Metadata {
     }
 }
 
-/// Whether an SPDX expression leaves a choice that is permissive. A slash is an old way to write OR.
+/// Whether an SPDX expression allows the choice of a permissive licence. A slash is an old form of OR.
 fn is_permissive(expression: &str) -> bool {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let mut words = spaced.split_whitespace().peekable();
@@ -133,7 +133,7 @@ fn one(words: &mut Words<'_>) -> bool {
         assert_eq!(words.next(), Some(")"));
         return allowed;
     }
-    // An exception allows more than the licence does.
+    // An exception only adds permissions to the licence.
     if words.next_if_eq(&"WITH").is_some() {
         words.next();
     }

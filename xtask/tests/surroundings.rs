@@ -1,5 +1,5 @@
-//! What `cargo xtask` says and does on machines that nobody prepared. The machines are faked: programs are scripts on a search
-//! path of their own, and what they are called with is written down.
+//! Tests of `cargo xtask` on unprepared machines. The machines are faked: programs are scripts on a search path of
+//! their own, which note the arguments of their calls.
 #![cfg(unix)]
 
 use std::fs;
@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 const NOTHING: &str = "nothing is missing";
-/// A program that is there and works.
+/// A program that exists and works.
 const WORKS: &str = "exit 0";
-/// A name that leads to no working program, as `python3 -c "import venv, ensurepip"` on a Debian without python3-venv.
+/// A program that fails, as `python3 -c "import venv, ensurepip"` does on a Debian without python3-venv.
 const FAILS: &str = "exit 1";
 
 /// A machine with some programs.
@@ -23,7 +23,7 @@ impl Machine {
     /// A machine with a C compiler, make and rustup, on which the user is not root.
     fn new(name: &str) -> Machine {
         let root = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
-        // What an earlier run left.
+        // Remove the files of an earlier run.
         let _ = fs::remove_dir_all(&root);
         fs::create_dir_all(root.join("bin")).unwrap();
         fs::create_dir_all(root.join("libclang")).unwrap();
@@ -37,14 +37,14 @@ impl Machine {
         machine.with("rustc", &sysroot).with("id", "echo 1000").with("dpkg-query", FAILS)
     }
 
-    /// Debian as it comes from the shop: no cmake, a libclang-cpp that is no libclang, no python3-venv.
+    /// A new Debian: no cmake, a libclang-cpp that is no libclang, no python3-venv.
     fn debian(name: &str) -> Machine {
         let machine = Machine::new(name).with("apt-get", WORKS).with("python3", FAILS);
         fs::write(machine.root.join("libclang/libclang-cpp.so.14"), "").unwrap();
         machine
     }
 
-    /// Puts a program there that notes each call.
+    /// Adds a program that notes each of its calls.
     fn with(self, program: &str, does: &str) -> Machine {
         let path = self.root.join("bin").join(program);
         let calls = self.root.join("calls");
@@ -77,14 +77,14 @@ impl Machine {
         command.output().unwrap()
     }
 
-    /// What `cargo xtask setup --dry-run` says.
+    /// The output of `cargo xtask setup --dry-run`.
     fn says(&self) -> String {
         let output = self.xtask(&["setup", "--dry-run"]);
         assert!(output.status.success());
         String::from_utf8(output.stdout).unwrap().trim().to_owned()
     }
 
-    /// The last line that it says: the command to type.
+    /// The last line of the output: the command to type.
     fn command(&self) -> String {
         self.says().lines().last().unwrap_or_default().trim().to_owned()
     }
@@ -200,7 +200,8 @@ fn without_a_board_nothing_is_built() {
     }
 }
 
-/// What follows is the program that writes, which is not there on this machine: the tools and both programs were built.
+/// Both programs and the tools are built. Then the command fails, because the program that writes the flash does not
+/// exist on this machine.
 #[test]
 fn with_a_board_both_programs_are_built() {
     let machine = Machine::new("board").with("probe-rs", "echo '[0]: STLink V2-1'");
@@ -211,7 +212,7 @@ fn with_a_board_both_programs_are_built() {
     assert_eq!((builds("-p flash"), builds("-p firmware"), builds("-p bootloader")), (1, 1, 1), "{calls:?}");
 }
 
-/// As the runner of `cargo run` the command gets the application.
+/// As the runner of `cargo run`, the command gets the path of the application.
 #[test]
 fn an_application_that_is_given_is_not_built() {
     let machine = Machine::new("runner").with("probe-rs", WORKS);

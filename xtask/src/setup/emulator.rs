@@ -1,7 +1,7 @@
-//! What the emulator's CPU library, a C program with cmake, needs to be built: a C compiler, make, cmake, libclang.
+//! The build tools of the emulator's CPU library, a C program with cmake: a C compiler, make, cmake, libclang.
 //!
-//! The build finds these in its own way; so each is asked for as the build asks. What the machine does not have comes from
-//! PyPI into the build directory, without root.
+//! Each tool is looked for in the way of the build itself. Missing tools come from PyPI into the build directory,
+//! without root.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -22,17 +22,17 @@ pub(crate) fn cargo_with_emulator() -> Result<Command> {
     Ok(command)
 }
 
-/// The variables of the environment with which the build finds what it needs; brings what is missing.
+/// The environment variables by which the build finds its tools. Missing tools are installed.
 ///
 /// # Errors
-/// Something can be had neither from PyPI nor, by this user, from the package manager.
+/// A tool can neither come from PyPI nor be installed by this user with the package manager.
 pub(crate) fn environment() -> Result<&'static [(OsString, OsString)]> {
     static ENVIRONMENT: OnceLock<Result<Vec<(OsString, OsString)>, String>> = OnceLock::new();
     let made = ENVIRONMENT.get_or_init(|| make().map_err(|error| format!("{error:#}")));
     made.as_deref().map_err(|error| anyhow!("{error}"))
 }
 
-/// What only the package manager can bring, beyond what is known before this program is compiled.
+/// The missing packages that only the package manager can install, beyond those that the first step knows.
 pub(super) fn missing() -> Vec<Package> {
     let needs_python = find().is_none() && !start::python::makes_environments();
     if needs_python { vec![Package::Python] } else { Vec::new() }
@@ -54,7 +54,7 @@ fn make() -> Result<Vec<(OsString, OsString)>> {
     find().ok_or_else(|| anyhow!("cmake or libclang does not work here, although it is installed; LIBCLANG_PATH can name the directory of another libclang"))
 }
 
-/// The system's tools where they work, else those that came from PyPI earlier.
+/// The system's tools where they work, else the tools from PyPI of an earlier run.
 fn find() -> Option<Vec<(OsString, OsString)>> {
     let tools = from_pypi();
     let path = cmake(&tools)?;
@@ -64,7 +64,7 @@ fn find() -> Option<Vec<(OsString, OsString)>> {
     Some(path.into_iter().chain(libclang).collect())
 }
 
-/// The search path on which cmake is found; `None` in it where the user's own path leads there.
+/// The variable with the search path to cmake; `Some(None)` where the user's own path leads to cmake.
 fn cmake(tools: &Path) -> Option<Option<(OsString, OsString)>> {
     if runs("cmake") {
         return Some(None);
@@ -93,7 +93,7 @@ fn from_pypi() -> PathBuf {
     target_dir().join("build-tools")
 }
 
-/// Where an environment keeps its packages: below a directory named after the version of Python.
+/// The directory of an environment's packages, whose parent is named after the version of Python.
 fn packages_in(environment: &Path) -> Option<PathBuf> {
     let versions = environment.join("lib").read_dir().ok()?;
     versions.flatten().map(|version| version.path().join("site-packages")).find(|path| path.is_dir())

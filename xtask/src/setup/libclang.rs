@@ -1,4 +1,4 @@
-//! Whether bindgen will find a libclang that works: asked with the library that bindgen itself uses.
+//! Checks that bindgen will find a working libclang, with the library that bindgen itself uses.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -9,15 +9,15 @@ use clang::{Clang, Index, Unsaved};
 
 use start::output;
 
-/// Where bindgen looks for libclang.
+/// The variable with the directory in which bindgen looks for libclang.
 pub(super) const LIBRARY: &str = "LIBCLANG_PATH";
-/// What bindgen hands to libclang beside the header.
+/// The variable with further arguments of bindgen to libclang.
 pub(super) const ARGUMENTS: &str = "BINDGEN_EXTRA_CLANG_ARGS";
 
-/// A header that needs those of the compiler and those of the C library, as the headers of the CPU library do.
+/// A header that includes headers of the compiler and of the C library, as the headers of the CPU library do.
 const HEADER: &str = "#include <stdarg.h>\n#include <stdbool.h>\n#include <stdint.h>\n#include <stdlib.h>\n";
 
-/// Loads libclang and has it read a header, both as bindgen does.
+/// Loads libclang and reads a header, in the same way as bindgen.
 ///
 /// # Errors
 /// No library can be loaded, or a header is missing.
@@ -35,8 +35,8 @@ pub(crate) fn probe() -> Result<()> {
 }
 
 /// The variables with which the probe succeeds, tried from none to all: a libclang of this directory instead of the
-/// system's, and the headers of the C compiler, which libclang has none of where it came alone. A process of its own
-/// tries: a broken library ends the process that loads it.
+/// system's, and the headers of the C compiler, which a libclang from PyPI lacks. The probe runs in a process of its
+/// own, because a broken library ends the process that loads it.
 pub(super) fn variables(directory: Option<&Path>) -> Option<Vec<(&'static str, String)>> {
     let library = directory.map(|directory| (LIBRARY, directory.display().to_string()));
     let headers = headers_of_compiler().map(|headers| (ARGUMENTS, headers));
@@ -53,7 +53,7 @@ fn succeeds(variables: &[(&str, String)]) -> Result<bool> {
     Ok(status?.success())
 }
 
-/// The argument that adds the headers which the C compiler brings (`stdbool.h` and the like), after those of the user.
+/// The argument that adds the headers of the C compiler (`stdbool.h` and the like), after those of the user.
 fn headers_of_compiler() -> Option<String> {
     let include = output("cc", &["-print-file-name=include"])?;
     let own = std::env::var(ARGUMENTS).unwrap_or_default();

@@ -1,8 +1,9 @@
-//! What a command needs of the machine beyond Rust: found, brought without root where that is possible, else named.
+//! The needs of a command beyond Rust. Each need is found on the machine, or installed without root where that is
+//! possible, or named in an error.
 //!
-//! A command first calls [`check`] with all its needs. The check takes no time and changes nothing. When something can be
-//! had from the system's package manager only, and this user may not install it, the error holds the one command that
-//! installs everything that is missing. After that each need is brought where it is used.
+//! A command first calls [`check`] with all its needs. The check takes no time and changes nothing. If something can
+//! only be installed by the system's package manager, and this user may not run it, the error contains the one command
+//! that installs everything. After the check each need is installed where it is used.
 
 pub(crate) mod emulator;
 mod libclang;
@@ -17,12 +18,12 @@ pub(crate) use start::needs::{FLASH, IMAGES, Need, PICTURES, SIM, TEST, THOROUGH
 
 use crate::target;
 
-/// Ends with the one command that installs what is missing, where this user cannot go on without it.
+/// Fails with the one command that installs the missing packages, if this user cannot install them.
 pub(crate) fn check(needs: &[Need]) -> Result<()> {
     Ok(start::check(&missing(needs))?)
 }
 
-/// What only the system's package manager can bring; with what is known of libclang only here.
+/// The missing packages that only the package manager can install. They include libclang, which only xtask can check.
 fn missing(needs: &[Need]) -> Vec<Package> {
     let known = start::missing(needs);
     let mut packages = known.clone();
@@ -32,12 +33,12 @@ fn missing(needs: &[Need]) -> Vec<Package> {
     packages
 }
 
-/// Brings what the needs lack from the package manager.
+/// Installs the missing packages with the package manager.
 pub(crate) fn install(needs: &[Need]) -> Result<()> {
     system::install(&missing(needs))
 }
 
-/// `cargo xtask setup`: brings everything that the test command needs, or only says what is missing.
+/// `cargo xtask setup`: installs everything that the test command needs, or only prints what is missing.
 pub(crate) fn run(dry: bool) -> Result<()> {
     if dry {
         println!("{}", start::describe(&missing(TEST)));

@@ -10,13 +10,14 @@ use start::python::missing;
 use super::system;
 use crate::command::{root, run, target_dir};
 
-/// The interpreter with the CANopen clients that judge the node.
+/// The Python interpreter with the CANopen clients that test the node.
 pub(crate) fn clients() -> Result<PathBuf> {
     system::install(&missing())?;
     ensure(&target_dir().join("venv"), "host-tests/python/requirements.txt")
 }
 
-/// The interpreter of an environment with the packages of a list; made anew when the list has changed.
+/// The interpreter of an environment with the packages of a list. The environment is made anew when the list has
+/// changed.
 pub(super) fn ensure(environment: &Path, list: &str) -> Result<PathBuf> {
     let python = environment.join("bin/python");
     let stamp = environment.join("requirements.txt");

@@ -1,4 +1,4 @@
-//! The system's package manager, where this user may call it.
+//! The system's package manager, for users who may call it.
 
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
@@ -8,9 +8,9 @@ use start::Package;
 
 use crate::command::run;
 
-/// Installs packages as root on Debian; for anyone else the error holds the one command.
+/// Installs packages as root on Debian; for other users the error contains the command.
 pub(crate) fn install(packages: &[Package]) -> Result<()> {
-    /// One at a time: the package manager has a lock of its own and does not wait for it.
+    /// Serialises the calls, because the package manager fails instead of waiting for its lock.
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     if packages.is_empty() {
         return Ok(());

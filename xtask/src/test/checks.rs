@@ -1,4 +1,4 @@
-//! What is compiled before the tests, and what is looked at beside them: lints and documentation.
+//! The builds before the tests, and the checks beside them: lints and documentation.
 
 use anyhow::{Result, ensure};
 
@@ -10,7 +10,7 @@ use crate::setup::{self, Need, python};
 use crate::target::Toolchain;
 use crate::{bench, callgraph, hal_examples, images, progress};
 
-/// What the tests need, for this machine.
+/// The builds for this machine that the tests need.
 pub(super) fn builds_for_host() -> Vec<Step> {
     vec![
         Step::new("format", || run(cargo().args(["fmt", "--all", "--check"]))),
@@ -19,13 +19,13 @@ pub(super) fn builds_for_host() -> Vec<Step> {
     ]
 }
 
-/// What the tests need, for the Cortex-M4.
+/// The builds for the Cortex-M4 that the tests need.
 pub(super) fn builds_for_target(needs: &'static [Need], thorough: bool) -> Vec<Step> {
     let mut steps = vec![Step::new("system packages", move || setup::install(needs))];
     if thorough {
-        // By its name, so that `--only qemu` does.
+        // The name contains the tool's name, so that `--only qemu` runs the step.
         steps.push(Step::new("install qemu", || setup::install(&[Need::Qemu])));
-        // Before those of the default chip, which cargo puts into the same place.
+        // Before the images of the default chip, because cargo puts both into the same place.
         steps.push(Step::new("build other_chips", build_other_chips));
         steps.push(Step::new("build hal_examples", || hal_examples::build(&Toolchain::ensure()?)));
     }
@@ -37,7 +37,8 @@ pub(super) fn builds_for_target(needs: &'static [Need], thorough: bool) -> Vec<S
     steps
 }
 
-/// What no test waits for, for this machine. Cargo does one at a time.
+/// The checks for this machine that no test waits for. They run one after the other, as cargo runs only one build at a
+/// time.
 pub(super) fn checks_for_host() -> Vec<Step> {
     vec![
         Step::new("lint host", lint_host),
@@ -46,7 +47,8 @@ pub(super) fn checks_for_host() -> Vec<Step> {
     ]
 }
 
-/// What no test waits for, for the Cortex-M4. Cargo does one at a time.
+/// The checks for the Cortex-M4 that no test waits for. They run one after the other, as cargo runs only one build at a
+/// time.
 pub(super) fn checks_for_target() -> Vec<Step> {
     vec![
         Step::new("no panic in the images", callgraph::check_panics),
@@ -63,7 +65,7 @@ fn lint_host() -> Result<()> {
     progress::build("lint host", host::cargo("clippy")?.args(["--all-targets", "--", "-D", "warnings"]))
 }
 
-/// With the examples: cargo then takes the features that the tests have, and compiles no crate a second time.
+/// With the examples, so that cargo uses the same features as for the tests and compiles no crate a second time.
 fn document_host() -> Result<()> {
     let mut command = host::cargo("doc")?;
     command.args(["--no-deps", "--lib", "--bins", "--examples"]).env("RUSTDOCFLAGS", "-D warnings");
@@ -86,13 +88,13 @@ fn build_other_chips() -> Result<()> {
     images::OTHER_CHIPS.iter().try_for_each(|chip| images::compile_for(&toolchain, chip).map(|_| ()))
 }
 
-/// That the images for another chip compile. `--thorough` links them and runs them.
+/// Checks that the images for another chip compile. `--thorough` links the images and runs them.
 fn check_other_chip() -> Result<()> {
     let [chip, _] = images::OTHER_CHIPS;
     images::check_for(&Toolchain::ensure()?, chip)
 }
 
-/// The library in an async main for the target. It is never run.
+/// Builds the library in an async main for the target. The program is never run.
 fn embassy() -> Result<()> {
     let example = ["--release", "-p", "canopen-device", "--example", "embassy"];
     let scripts = root().join("crates/canopen/examples/embassy");
@@ -101,7 +103,8 @@ fn embassy() -> Result<()> {
     progress::build("embassy", &mut command)
 }
 
-/// Links everything that comes from the bus with a panic handler that cannot link; and shows that it would not link.
+/// Links all code that handles data from the bus with a panic handler that cannot be linked. Also checks that code with
+/// a panic fails to link.
 fn no_panic() -> Result<()> {
     let toolchain = Toolchain::ensure()?;
     let package = ["--release", "-p", "panic-free"];

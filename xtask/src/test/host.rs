@@ -1,5 +1,5 @@
-//! Everything that runs on this machine, compiled by one cargo call: programs, libraries, tests and examples. One call, so
-//! that each crate is compiled with one set of features.
+//! Programs, libraries, tests and examples for this machine, compiled by one cargo call. With one call each crate is
+//! compiled with one set of features.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
@@ -11,11 +11,11 @@ use serde::Deserialize;
 
 use crate::setup::emulator;
 
-/// The packages that only build for the embedded target.
+/// The packages that build for the embedded target only.
 pub(super) const IMAGES: [&str; 5] =
     ["firmware", "bootloader", "mechanics-images", "panic-free", "bench-images"];
 
-/// A cargo call over all packages of this machine, the emulated board included.
+/// A cargo call for all packages of this machine, including the emulated board.
 pub(super) fn cargo(verb: &str) -> Result<Command> {
     let mut command = emulator::cargo_with_emulator()?;
     command.args([verb, "--workspace", "--profile", "sim", "--features", "host-tests/board"]);
@@ -25,7 +25,7 @@ pub(super) fn cargo(verb: &str) -> Result<Command> {
     Ok(command)
 }
 
-/// The call that compiles everything.
+/// The call that compiles all packages.
 pub(super) fn build() -> Result<Command> {
     let mut command = cargo("build")?;
     command.arg("--all-targets");
@@ -34,14 +34,14 @@ pub(super) fn build() -> Result<Command> {
 
 /// A program with tests.
 pub(super) struct TestProgram {
-    /// The package, and the file of tests where it is one.
+    /// The package, with the name of the test file if there is one.
     pub(super) label: String,
     pub(super) path: PathBuf,
-    /// Where cargo runs the tests.
+    /// The directory in which cargo runs the tests.
     pub(super) directory: PathBuf,
 }
 
-/// What cargo says of each thing that it has compiled.
+/// Cargo's message about a compiled artifact.
 #[derive(Deserialize)]
 struct Message {
     reason: String,
@@ -62,7 +62,7 @@ struct Profile {
     test: bool,
 }
 
-/// Compiles what is not compiled yet and lists the programs with tests.
+/// Compiles the packages and lists the programs with tests.
 pub(super) fn test_programs() -> Result<Vec<TestProgram>> {
     let mut command = build()?;
     command.args(["--quiet", "--message-format", "json-render-diagnostics"]);

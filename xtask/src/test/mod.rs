@@ -1,8 +1,9 @@
 //! `cargo xtask test`: every check of the project.
 //!
-//! Two lanes at a time compile, one for this machine and one for the Cortex-M4. Then the tests run, each in a process of its own: as
-//! many at a time as there are cores, and as many again of those that mostly wait. The two lanes go on beside them with lints and
-//! documentation. A step or a test that fails has its output printed; the output of all is in target/test-logs.
+//! Two lanes compile at the same time, one for this machine and one for the Cortex-M4. Then the tests run, each in a
+//! process of its own: one test per core, and as many again of the tests that mostly wait. The two lanes go on beside
+//! the tests with lints and documentation. The output of a failed step or test is printed; all output is in
+//! target/test-logs.
 
 mod checks;
 mod host;
@@ -27,7 +28,7 @@ pub(crate) struct Flags {
     thorough: bool,
 }
 
-/// Runs everything, or what the flags leave of it.
+/// Runs all checks, or those that the flags select.
 pub(crate) fn run(flags: &Flags) -> Result<()> {
     let needs = if flags.thorough { setup::THOROUGH } else { setup::TEST };
     setup::check(needs)?;

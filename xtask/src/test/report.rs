@@ -1,4 +1,4 @@
-//! Runs named steps, several at a time, and tells how they went and how long they took.
+//! Runs named steps, several at a time, and reports their results and times.
 
 use std::collections::VecDeque;
 use std::fs::{self, File};
@@ -12,16 +12,16 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::command::{target_dir, with_log};
 
-/// How many of the slowest tests are named at the end.
+/// The number of slowest tests that the report names.
 const SLOWEST: usize = 12;
 
-/// How often the number of tests that have run is told.
+/// The period of printing the number of finished tests.
 const PERIOD: Duration = Duration::from_secs(20);
 
-/// Something to do, which succeeds or fails.
+/// An action with a name, which succeeds or fails.
 pub(super) struct Step {
     name: String,
-    /// Most of its time passes with waiting, as at the speed of a real board.
+    /// Whether the step mostly waits, as a test at the speed of a real board does.
     waits: bool,
     action: Box<dyn FnOnce() -> Result<()> + Send>,
 }
@@ -31,7 +31,7 @@ impl Step {
         Step { name: name.into(), waits: false, action: Box::new(action) }
     }
 
-    /// The same, which leaves the processor to others most of the time.
+    /// The same step, marked as one that mostly waits.
     pub(super) fn that_waits(self) -> Step {
         Step { waits: true, ..self }
     }
@@ -41,7 +41,7 @@ impl Step {
     }
 }
 
-/// Tests that wait for a worker. A test that fails keeps no other from running.
+/// The tests that wait for a worker. A failed test does not stop the others.
 struct Pool {
     all: usize,
     busy: Mutex<VecDeque<Step>>,
@@ -62,9 +62,9 @@ impl Pool {
         Pool { all, busy, waiting, finished: AtomicUsize::new(0), told: Mutex::new(Instant::now()) }
     }
 
-    /// Takes tests from a queue until there are none. Now and then the number of those that have run is told.
+    /// Runs tests from a queue until it is empty. Now and then prints the number of finished tests.
     fn work(&self, queue: &Mutex<VecDeque<Step>>, run: impl Fn(Step) -> bool) {
-        // The queue is free again before the test runs.
+        // The lock is released before the test runs.
         let next = || lock(queue).pop_front();
         while let Some(test) = next() {
             run(test);
@@ -78,25 +78,25 @@ impl Pool {
     }
 }
 
-/// What was done.
+/// A finished step.
 struct Done {
     name: String,
     time: Duration,
     is_test: bool,
 }
 
-/// The steps that ran and those that failed.
+/// The steps that have run, and those that have failed.
 pub(super) struct Report<'a> {
     only: Option<&'a str>,
     begin: Instant,
     done: Mutex<Vec<Done>>,
     failed: Mutex<Vec<String>>,
-    /// A step of a lane has failed.
+    /// Whether a step of a lane has failed.
     is_over: AtomicBool,
 }
 
 impl<'a> Report<'a> {
-    /// With `only`, what has a name without this text is skipped.
+    /// With `only`, steps whose name lacks this text are skipped.
     pub(super) fn new(only: Option<&'a str>) -> Result<Report<'a>> {
         fs::create_dir_all(logs())?;
         let (done, failed) = Default::default();
@@ -107,8 +107,8 @@ impl<'a> Report<'a> {
         self.only
     }
 
-    /// Runs lanes of steps, each in its order, and beside them the tests in any order: as many at a time as there are cores, and as many
-    /// again of those that wait.
+    /// Runs the lanes, each in its order, and the tests in any order beside them: one test per core, and as many again
+    /// of the tests that mostly wait.
     pub(super) fn run(&self, lanes: [Vec<Step>; 2], tests: Vec<Step>) -> Result<()> {
         let workers = thread::available_parallelism().map_or(2, usize::from);
         let pool = Pool::new(tests);
@@ -125,7 +125,7 @@ impl<'a> Report<'a> {
         self.ensure_none_failed()
     }
 
-    /// The steps build on each other: after one that failed, no other begins.
+    /// Runs the steps of a lane. Steps depend on each other, so that none begins after a failed one.
     fn lane(&self, steps: Vec<Step>) {
         for step in steps {
             let is_skipped = self.only.is_some_and(|only| !step.name.contains(only));
@@ -139,7 +139,7 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Runs one step. What it printed is told when it fails.
+    /// Runs one step. Its output is printed when it fails.
     fn step(&self, step: Step, is_test: bool) -> bool {
         let begin = Instant::now();
         let path = logs().join(step.name.replace(['/', ':', ' '], "_")).with_extension("log");
@@ -167,7 +167,7 @@ impl<'a> Report<'a> {
         bail!("failed: {}", failed.join(", "));
     }
 
-    /// Prints the times of the steps and of the slowest tests, and the count; an error when nothing ran.
+    /// Prints the times of the steps and of the slowest tests, and the count. Fails when nothing has run.
     pub(super) fn finish(self) -> Result<()> {
         let mut done = self.done.into_inner().unwrap_or_default();
         ensure!(!done.is_empty(), "nothing has a name that contains {:?}", self.only.unwrap_or_default());
@@ -192,7 +192,8 @@ impl<'a> Report<'a> {
     }
 }
 
-/// Writes how long each step took, for the next run to begin with the slowest tests. What did not run this time keeps its time.
+/// Saves the time of each step, so that the next run can begin with the slowest tests. Steps that have not run keep
+/// their time.
 fn remember(done: &[Done]) -> Result<()> {
     let mut times = last_times();
     times.extend(done.iter().map(|step| (step.name.clone(), step.time.as_secs_f64())));
@@ -201,7 +202,7 @@ fn remember(done: &[Done]) -> Result<()> {
     fs::write(times_file(), lines.concat()).context("cannot write the times")
 }
 
-/// How long a test took in the last run, in seconds.
+/// The time of each test in its last run, in seconds.
 pub(super) fn last_times() -> std::collections::HashMap<String, f64> {
     let text = fs::read_to_string(times_file()).unwrap_or_default();
     let line = |line: &str| {

@@ -1,4 +1,4 @@
-//! The tests: those of every crate and the Python clients.
+//! The tests of every crate, and the Python clients.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,10 +13,10 @@ use crate::images;
 use crate::own_tool::Tools;
 use crate::setup::python;
 
-/// The tests that run on the emulated board are the longest: they begin first when nothing is known of a last run.
+/// Tests on the emulated board take the longest. They begin first when there are no times of a last run.
 const LONG: &str = "/board";
 
-/// All tests whose name contains `only`, the longest first. With `thorough`, those that sample take all.
+/// All tests whose name contains `only`, the longest first. With `thorough`, sampling tests try everything.
 pub(super) fn collect(thorough: bool, only: Option<&str>) -> Result<Vec<Step>> {
     let programs = host::test_programs()?;
     images::build(Tools::Built)?;
@@ -34,8 +34,8 @@ pub(super) fn collect(thorough: bool, only: Option<&str>) -> Result<Vec<Step>> {
     Ok(steps)
 }
 
-/// The tests of a program, each run by itself: a test that changes something for another one, or ends the process, is seen. What
-/// is marked as ignored needs more than a new machine brings, and runs with `thorough`.
+/// The tests of a program. Each runs by itself, so that a test that depends on another one, or ends the process, is
+/// noticed. Ignored tests need more than a new machine has, and run with `thorough`.
 fn of_program(program: &TestProgram, thorough: bool) -> Result<Vec<Step>> {
     let mut names = list(&program.path, &[])?;
     if !thorough {
@@ -68,7 +68,7 @@ fn one(program: &Path, directory: &Path, test: &str, thorough: bool) -> Result<(
     run(with_images(&mut command, thorough))
 }
 
-/// The files of Python tests, each a step.
+/// The files of Python tests, each as a step.
 fn of_python(thorough: bool) -> Result<Vec<Step>> {
     let folder = root().join("host-tests/python");
     let mut files: Vec<_> = folder.read_dir()?.flatten().map(|entry| entry.path()).collect();
@@ -87,7 +87,7 @@ fn python(file: &Path, thorough: bool) -> Result<()> {
     run(with_images(with_programs(&mut command), thorough))
 }
 
-/// Tells Python where the programs of the project are.
+/// Sets the variables by which Python finds the programs of the project.
 pub(crate) fn with_programs(command: &mut Command) -> &mut Command {
     for (variable, tool) in [("SIM_COMMAND", "sim"), ("NODECTL_COMMAND", "nodectl"), ("SIGN_COMMAND", "sign")]
     {
@@ -96,7 +96,7 @@ pub(crate) fn with_programs(command: &mut Command) -> &mut Command {
     command
 }
 
-/// Tells tests where the ELF files are, and whether to take all where they otherwise sample.
+/// Sets the variables by which tests find the ELF files, and the variable that makes sampling tests try everything.
 pub(crate) fn with_images(command: &mut Command, thorough: bool) -> &mut Command {
     if thorough {
         command.env("THOROUGH", "1");

@@ -1,5 +1,5 @@
-//! What this machine has of what the commands of the project need, found without any other crate: a machine that lacks something is told so
-//! before anything else is compiled.
+//! Checks which needs of the project's commands this machine lacks. The crate has no dependencies, so that a user is
+//! told of missing things before anything else is compiled.
 
 pub mod needs;
 mod packages;
@@ -13,13 +13,13 @@ use std::process::{Command, ExitCode, Stdio};
 pub use needs::{Need, missing};
 pub use packages::{Missing, Package, apt_names, check, describe, is_installed, runs};
 
-/// What a program prints, without the last line end; `None` when it is missing or fails.
+/// The output of a program without the last line end; `None` when the program is missing or fails.
 pub fn output(program: impl AsRef<OsStr>, args: &[&str]) -> Option<String> {
     let output = Command::new(program).args(args).stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
-/// Goes on as another program, so that a signal to this process reaches that one.
+/// Replaces this process by another program, so that a signal to this process reaches the program.
 ///
 /// # Errors
 /// The program cannot be started.
@@ -29,7 +29,7 @@ pub fn become_program(command: &mut Command) -> io::Result<ExitCode> {
     Err(command.exec())
 }
 
-/// Without `exec` the program is a child; its exit status becomes ours.
+/// Without `exec` the program is a child process, and its exit status becomes ours.
 ///
 /// # Errors
 /// The program cannot be started.

@@ -1,5 +1,5 @@
-//! `cargo xtask` and `cargo sim` begin here: this program compiles in a second. Where something is missing that only the user can
-//! install, it names the one command; everything else it leaves to xtask.
+//! The start of `cargo xtask` and `cargo sim`. This program compiles in a second. If something is missing that only the
+//! user can install, it prints the one command; otherwise it starts xtask.
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
@@ -24,7 +24,7 @@ fn main() -> ExitCode {
     })
 }
 
-/// What is sure to be needed. What depends on flags, or on what xtask alone can find out, xtask asks.
+/// The certain needs of a command. Xtask checks the needs that depend on flags, or that only xtask can find out.
 fn needs_of(words: &[&str]) -> &'static [Need] {
     let is_help = words.iter().any(|word| matches!(*word, "--help" | "-h" | "help" | "--dry-run"));
     match words.first() {

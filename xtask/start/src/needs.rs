@@ -1,4 +1,4 @@
-//! What the commands need of the machine, and what is missing of it.
+//! The needs of the commands, and the packages that are missing.
 
 use crate::packages::{Package, runs};
 use crate::{python, target};
@@ -6,45 +6,45 @@ use crate::{python, target};
 /// A need of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// A C compiler, cmake and libclang: the emulator's CPU library is built with them.
+    /// A C compiler, cmake and libclang, which build the emulator's CPU library.
     Emulator,
     /// A compiler for the Cortex-M4.
     Target,
-    /// The lints of that compiler.
+    /// The lints of the compiler for the Cortex-M4.
     TargetLints,
-    /// A Python that makes environments: the outside judges python-can and canopen run in one.
+    /// A Python that can make environments, in which python-can and canopen run to test the node.
     Python,
     /// The tool that writes the flash of a board.
     Probe,
-    /// The protocol analyser that judges what was said on the bus.
+    /// The protocol analyser that checks the traffic on the bus.
     Tshark,
-    /// The browser that shows the page of the bus, and the program that drives it.
+    /// The browser that shows the page, and the program that drives the browser.
     Browser,
     /// Another emulator of the core.
     Qemu,
 }
 
-/// What `cargo sim` needs.
+/// The needs of `cargo sim`.
 pub const SIM: &[Need] = &[Need::Target, Need::Emulator];
 
-/// What the images need.
+/// The needs of the images.
 pub const IMAGES: &[Need] = &[Need::Target];
 
-/// What `cargo xtask flash` needs.
+/// The needs of `cargo xtask flash`.
 pub const FLASH: &[Need] = &[Need::Target, Need::Probe];
 
-/// What `cargo xtask test` needs.
+/// The needs of `cargo xtask test`.
 pub const TEST: &[Need] =
     &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark, Need::Browser];
 
-/// What `cargo xtask test --thorough` needs.
+/// The needs of `cargo xtask test --thorough`.
 pub const THOROUGH: &[Need] =
     &[Need::Target, Need::TargetLints, Need::Emulator, Need::Python, Need::Tshark, Need::Browser, Need::Qemu];
 
-/// What `cargo xtask pictures` needs.
+/// The needs of `cargo xtask pictures`.
 pub const PICTURES: &[Need] = &[Need::Target, Need::Emulator, Need::Python, Need::Browser];
 
-/// What only the system's package manager can bring.
+/// The missing packages that only the package manager can install.
 pub fn missing(needs: &[Need]) -> Vec<Package> {
     let mut packages: Vec<Package> = Vec::new();
     for need in needs {
@@ -67,8 +67,8 @@ pub fn missing(needs: &[Need]) -> Vec<Package> {
     packages
 }
 
-/// For the CPU library. Whether there is a libclang that works is asked later, with the library that the build asks: without one it
-/// comes from PyPI.
+/// The packages for the CPU library. Xtask checks libclang later, with the library that the build uses; a missing
+/// libclang comes from PyPI.
 fn emulator() -> Vec<Package> {
     let compiler = package_unless(runs("cc") && runs("make"), Package::Compiler);
     let python = package_unless(runs("cmake") || python::makes_environments(), Package::Python);

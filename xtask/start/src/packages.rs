@@ -1,4 +1,4 @@
-//! The system's package manager: which one it is, what it calls a package, and whether this user may install.
+//! The system's package manager: its kind, its names of packages, and whether this user may install them.
 
 use std::error::Error;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use crate::output;
 use crate::target::{self, TRIPLE};
 
-/// What can be had from the package manager.
+/// A package of the package manager, or a tool that is installed in another way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Package {
     /// A C compiler and make.
@@ -28,19 +28,19 @@ pub enum Package {
     Qemu,
     /// Debian's compiler for the Cortex-M4.
     DebianRust,
-    /// Its source of the core library.
+    /// Debian's source of the core library.
     DebianRustSource,
-    /// Its cargo.
+    /// Debian's cargo.
     DebianCargo,
-    /// Its clippy.
+    /// Debian's clippy.
     DebianClippy,
-    /// Its linker, where rustup's is not there.
+    /// Debian's linker, where rustup's linker is missing.
     DebianLinker,
     /// The tools that read coverage counters.
     DebianLlvm,
-    /// The target, where only the user can have rustup add it.
+    /// The Rust target, where only the user may let rustup add it.
     RustTarget,
-    /// probe-rs, which no Debian has.
+    /// probe-rs, which Debian does not have.
     ProbeRs,
 }
 
@@ -61,7 +61,7 @@ impl Manager {
         MANAGERS.into_iter().find(|(_, program)| runs(program)).map(|(manager, _)| manager)
     }
 
-    /// The one command that installs these.
+    /// The command that installs these packages.
     fn command(self, packages: &[Package]) -> String {
         let start = match self {
             Manager::Apt => "sudo apt-get install -y",
@@ -77,7 +77,7 @@ impl Manager {
     fn names(self, packages: &[Package]) -> Vec<&'static str> {
         let from_here = packages.iter().filter(|package| package.own_command().is_none());
         let mut names: Vec<&str> = from_here.map(|package| self.name(*package)).collect();
-        // Some have the browser and its driver in one package.
+        // Some package managers have the browser and its driver in one package.
         names.dedup();
         names
     }
@@ -94,7 +94,7 @@ impl Manager {
 }
 
 impl Package {
-    /// Its names for apt-get, dnf, pacman and brew.
+    /// The names of a package for apt-get, dnf, pacman and brew.
     fn names(self) -> [&'static str; 4] {
         match self {
             Package::Compiler => ["build-essential", "gcc make", "base-devel", "gcc make"],
@@ -105,7 +105,7 @@ impl Package {
             Package::Chromium => ["chromium"; 4],
             Package::Qemu => ["qemu-system-arm", "qemu-system-arm", "qemu-system-arm", "qemu"],
             Package::Chromedriver => ["chromium-driver", "chromedriver", "chromium", "chromedriver"],
-            // These are asked for where Debian's packages are the way to the target, and nowhere else.
+            // These packages are only needed where Debian builds for the target.
             Package::DebianRust => ["rustc-web"; 4],
             Package::DebianRustSource => ["rust-web-src"; 4],
             Package::DebianCargo => ["cargo-web"; 4],
@@ -117,7 +117,7 @@ impl Package {
         }
     }
 
-    /// What brings it, where that is not the package manager.
+    /// The command that installs the package, where it is not the package manager.
     fn own_command(self) -> Option<String> {
         match self {
             Package::RustTarget => Some(add_target()),
@@ -151,7 +151,7 @@ impl Package {
     }
 }
 
-/// Something is missing that this user cannot install: the text has the one command that does.
+/// A missing package that this user cannot install. The text contains the command that installs it.
 #[derive(Debug)]
 pub struct Missing(String);
 
@@ -163,7 +163,7 @@ impl fmt::Display for Missing {
 
 impl Error for Missing {}
 
-/// Whether these packages can be installed without asking anybody.
+/// Checks that these packages can be installed without asking the user.
 ///
 /// # Errors
 /// This user cannot install them.
@@ -172,7 +172,7 @@ pub fn check(packages: &[Package]) -> Result<(), Missing> {
     if packages.is_empty() || is_installable { Ok(()) } else { Err(Missing(describe(packages))) }
 }
 
-/// What is missing, why, and the command that installs it.
+/// A text with the missing packages, the reason for each, and the command that installs them.
 pub fn describe(packages: &[Package]) -> String {
     if packages.is_empty() {
         return "nothing is missing".to_owned();
@@ -196,14 +196,14 @@ fn own_commands(packages: &[Package]) -> impl Iterator<Item = String> {
     packages.iter().filter_map(|package| package.own_command())
 }
 
-/// The command of a user whose rustup may not download by itself.
+/// The command that adds the target, for a user whose rustup may not download by itself.
 fn add_target() -> String {
     let closed = if target::is_closed() { "env -u RUSTUP_AUTO_INSTALL " } else { "" };
     format!("{closed}rustup target add {TRIPLE}")
 }
 
-/// Whether a program can be started and says its version. The names of some programs lead to a stub that only
-/// offers to install them.
+/// Whether a program can be started and prints its version. Starting alone is no proof, because the names of some
+/// programs lead to a stub that only offers to install them.
 pub fn runs(program: &str) -> bool {
     let status = Command::new(program)
         .arg("--version")
@@ -214,13 +214,13 @@ pub fn runs(program: &str) -> bool {
     status.is_ok_and(|status| status.success())
 }
 
-/// Whether Debian's package manager has installed this.
+/// Whether Debian's package manager has installed a package.
 pub fn is_installed(package: Package) -> bool {
     output("dpkg-query", &["-W", "-f", "${Status}", Manager::Apt.name(package)])
         .is_some_and(|status| status.ends_with("ok installed"))
 }
 
-/// What apt-get calls these packages.
+/// The names of packages for apt-get.
 pub fn apt_names(packages: &[Package]) -> Vec<&'static str> {
     Manager::Apt.names(packages)
 }

@@ -1,15 +1,15 @@
-//! What this machine has of Python.
+//! The Python of this machine.
 
 use std::process::{Command, Stdio};
 
 use crate::packages::Package;
 
-/// What only the package manager can bring.
+/// The missing packages that only the package manager can install.
 pub fn missing() -> Vec<Package> {
     if makes_environments() { Vec::new() } else { vec![Package::Python] }
 }
 
-/// Whether there is a Python that can make environments: Debian has the part that does in a package of its own.
+/// Whether there is a Python that can make environments. On Debian this needs a package of its own.
 pub fn makes_environments() -> bool {
     let mut command = Command::new("python3");
     command.args(["-c", "import venv, ensurepip"]).stdin(Stdio::null()).stderr(Stdio::null());

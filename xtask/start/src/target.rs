@@ -1,4 +1,4 @@
-//! What this machine has for building the images.
+//! The tools of this machine for building the images.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub fn has_target() -> bool {
     entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore"))
 }
 
-/// What only the package manager can bring for the target.
+/// The missing packages for the target that only the package manager can install.
 pub fn missing() -> Vec<Package> {
     if has_target() {
         return Vec::new();
@@ -31,18 +31,18 @@ pub fn missing() -> Vec<Package> {
     if is_closed() || !runs("rustup") { vec![Package::RustTarget] } else { Vec::new() }
 }
 
-/// The same for clippy, which comes with the compiler unless Debian builds for the target.
+/// The missing packages for clippy. Clippy comes with the compiler unless Debian builds for the target.
 pub fn missing_lints() -> Vec<Package> {
     let is_debian = !has_target() && is_closed() && runs("apt-get");
     if is_debian && !is_installed(Package::DebianClippy) { vec![Package::DebianClippy] } else { Vec::new() }
 }
 
-/// Whether rustup must not download.
+/// Whether rustup may not download.
 pub fn is_closed() -> bool {
     std::env::var("RUSTUP_AUTO_INSTALL").is_ok_and(|value| value == "0")
 }
 
-/// rustup's own lld, else the one that Debian's package links to.
+/// rustup's own lld, else the lld of Debian's package.
 pub fn linker() -> Option<PathBuf> {
     let sysroot = output("rustc", &["--print", "sysroot"]).unwrap_or_default();
     let hosts = Path::new(&sysroot).join("lib/rustlib").read_dir().into_iter().flatten().flatten();

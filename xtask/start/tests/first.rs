@@ -1,4 +1,4 @@
-//! What the first step does on machines whose programs are scripts on a search path of their own.
+//! Tests of the first step on faked machines. The programs of a machine are scripts on a search path of its own.
 #![cfg(unix)]
 
 use std::fs;
@@ -6,10 +6,10 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A machine on which these programs are found. Each writes down what it is called with.
+/// A machine with these programs. Each program notes the arguments of its calls.
 fn machine(name: &str, programs: &[(&str, &str)]) -> PathBuf {
     let root = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
-    // What an earlier run left.
+    // Remove the files of an earlier run.
     let _ = fs::remove_dir_all(&root);
     fs::create_dir_all(root.join("bin")).unwrap();
     for (program, does) in programs {
