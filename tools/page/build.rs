@@ -1,4 +1,4 @@
-//! Lists the files of the page, for the server to have them inside itself.
+//! Writes the list of the page's files, which the server includes.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

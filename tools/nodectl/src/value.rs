@@ -1,4 +1,4 @@
-//! Values: from bytes to text and back, by data type.
+//! Values of objects: from bytes to text and back, by data type.
 
 use std::fmt;
 
@@ -14,18 +14,18 @@ const VISIBLE_STRING: DataType = DataType(0x09);
 /// A value of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Of an integer type or BOOLEAN.
+    /// A value of an integer type or BOOLEAN.
     Integer(i128),
-    /// Of REAL32.
+    /// A value of REAL32.
     Real32(f32),
-    /// Of REAL64.
+    /// A value of REAL64.
     Real64(f64),
-    /// A number with its point so many digits from the right: what the integer of an object means. No object has it on
-    /// the wire.
+    /// An integer with the decimal point this number of digits from the right: the scaled value of an object. On the
+    /// wire there is only the integer.
     Decimal(i128, u8),
-    /// Of a string type.
+    /// A value of a string type.
     Text(String),
-    /// Of any other type, or of none that fits.
+    /// A value of any other type, or bytes that do not fit their type.
     Bytes(Vec<u8>),
 }
 
@@ -38,7 +38,7 @@ pub struct ValueError {
 }
 
 impl Value {
-    /// The value in these bytes. More bytes than the type has are cut; fewer are shown as they are.
+    /// The value in these bytes. Surplus bytes are cut off; too few bytes for the type stay bytes.
     #[must_use]
     pub fn decode(bytes: &[u8], data_type: DataType) -> Value {
         let number = |class| decode_number(bytes, class).unwrap_or_else(|| Value::Bytes(bytes.to_vec()));
@@ -50,12 +50,12 @@ impl Value {
         }
     }
 
-    /// Reads a value of a type.
+    /// Reads a value of a data type.
     ///
-    /// Integers are decimal, or hexadecimal after `0x`. Bytes are pairs of hexadecimal digits, apart or not.
+    /// Integers are decimal, or hexadecimal after `0x`. Bytes are pairs of hexadecimal digits, with or without spaces.
     ///
     /// # Errors
-    /// When it is none, or out of the range of the type.
+    /// The text is no value of the type, or the value is out of the range of the type.
     pub fn parse(text: &str, data_type: DataType) -> Result<Value, ValueError> {
         let value = match data_type.class() {
             Class::Signed(bits) => integer(text, -(1 << (bits - 1)), (1 << (bits - 1)) - 1),
@@ -69,7 +69,7 @@ impl Value {
         value.ok_or_else(|| ValueError { text: text.to_owned(), expected: expected(data_type) })
     }
 
-    /// The bytes of the value of a type. It must be one: [`parse`](Value::parse) makes none that is not.
+    /// The bytes of the value for a data type. The value must be of this type; [`parse`](Value::parse) makes no others.
     #[must_use]
     pub fn encode(&self, data_type: DataType) -> Vec<u8> {
         match self {
@@ -86,7 +86,7 @@ impl Value {
         }
     }
 
-    /// As a number, for plots. `None` for texts and bytes.
+    /// The value as a number, for plots. `None` for texts and bytes.
     #[must_use]
     pub fn as_f64(&self) -> Option<f64> {
         match self {
@@ -94,14 +94,14 @@ impl Value {
             Value::Integer(value) => Some(*value as f64),
             Value::Real32(value) => Some(f64::from(*value)),
             Value::Real64(value) => Some(*value),
-            // The text is exact, and read back it is rounded once.
+            // The text is exact, so that parsing it rounds only once.
             Value::Decimal(..) => self.to_string().parse().ok(),
             Value::Text(_) | Value::Bytes(_) => None,
         }
     }
 }
 
-/// Bytes that a number has.
+/// The size of a number in bytes.
 fn size(class: Class) -> usize {
     match class {
         Class::Signed(bits) | Class::Unsigned(bits) | Class::Real(bits) => usize::from(bits).div_ceil(8),
@@ -127,7 +127,7 @@ fn extend(bytes: &[u8], is_negative: bool) -> i128 {
     i128::from_le_bytes(word)
 }
 
-/// The text in the bytes of a `VISIBLE_STRING`. Some devices fill theirs with zeros.
+/// The text of a `VISIBLE_STRING`. Some devices pad texts with zeros.
 #[must_use]
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned()
@@ -151,13 +151,13 @@ fn integer(text: &str, low: i128, high: i128) -> Option<Value> {
     let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));
     let lower = digits.to_ascii_lowercase();
     let (digits, radix) = lower.strip_prefix("0x").map_or((lower.as_str(), 10), |digits| (digits, 16));
-    // `from_str_radix` takes a sign of its own.
+    // `from_str_radix` accepts a second sign.
     let is_plain = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
     let value = i128::from_str_radix(digits, radix).ok().filter(|_| is_plain)?.checked_mul(sign)?;
     (low..=high).contains(&value).then_some(Value::Integer(value))
 }
 
-/// Pairs of hexadecimal digits, apart or not.
+/// Pairs of hexadecimal digits, with or without spaces.
 pub(crate) fn hex_bytes(text: &str) -> Option<Vec<u8>> {
     let digits: String = text.split_ascii_whitespace().collect();
     let is_plain = digits.len().is_multiple_of(2) && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
@@ -200,8 +200,8 @@ pub fn data_type(name: &str) -> Option<DataType> {
     (0..=0x1F).map(DataType).find(|data_type| data_type.to_string() == long)
 }
 
-/// The type that a value of an unknown type looks like: text that is longer than any number, a number of a usual size,
-/// else bytes.
+/// The probable type of a value of unknown type: text if it is longer than any number, a number of a usual size, else
+/// bytes.
 #[must_use]
 pub fn guess(bytes: &[u8]) -> DataType {
     let is_text = bytes.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ');
@@ -215,7 +215,7 @@ pub fn guess(bytes: &[u8]) -> DataType {
     }
 }
 
-/// A number whose point is so many digits from the right.
+/// A number with the decimal point this number of digits from the right.
 fn decimal(mantissa: i128, digits: usize) -> String {
     if digits == 0 {
         return mantissa.to_string();
@@ -226,7 +226,8 @@ fn decimal(mantissa: i128, digits: usize) -> String {
     format!("{sign}{whole}.{fraction}")
 }
 
-/// Numbers in decimal, bytes in hexadecimal, a text as it is: for a terminal, [`visible`](crate::text::visible) makes it fit.
+/// Numbers are decimal, bytes are hexadecimal, and a text is unchanged. For a terminal,
+/// [`visible`](crate::text::visible) makes the text safe.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
@@ -240,12 +241,12 @@ impl fmt::Display for Value {
     }
 }
 
-/// A number, or a text: bytes in hexadecimal. What is no number (infinite) is null, as JSON has none.
+/// A JSON number or text; bytes become hexadecimal text. Infinity and NaN become null, because JSON does not have them.
 impl Serialize for Value {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Value::Integer(value) => serializer.serialize_i128(*value),
-            // As f32: its shortest text is what a person calls the number.
+            // As an f32, because its shortest text is the number that a person expects.
             Value::Real32(value) => serializer.serialize_f32(*value),
             Value::Real64(value) => serializer.serialize_f64(*value),
             Value::Decimal(..) => serializer.serialize_f64(self.as_f64().unwrap_or(f64::NAN)),

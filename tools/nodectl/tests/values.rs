@@ -1,4 +1,4 @@
-//! Values of every type: from text to bytes and back.
+//! Tests of values of every type: from text to bytes and back.
 
 use eds::{Class, DataType};
 use nodectl::value::{self, Value, data_type, guess};
@@ -16,18 +16,18 @@ fn types() -> impl Strategy<Value = DataType> {
 proptest! {
     #![proptest_config(repeatable())]
 
-    /// What is printed is read again, and means the same bytes.
+    /// A printed value, read again, means the same bytes.
     #[test]
     fn printed_and_read(data_type in types(), bytes in prop::collection::vec(any::<u8>(), 8..20)) {
         let value = Value::decode(&bytes, data_type);
         let read = Value::parse(&value.to_string(), data_type)?;
-        // Of what is not a number there are many.
+        // There are many NaNs, so that only being one is compared.
         let is_nan = value.as_f64().is_some_and(f64::is_nan);
         let again = Value::decode(&read.encode(data_type), data_type);
         prop_assert!(is_nan || again == value, "{data_type}: {value:?} {again:?}");
     }
 
-    /// Bytes that are too few for their type are shown as they are.
+    /// A value with too few bytes for its type is shown as bytes.
     #[test]
     fn too_few(data_type in types(), bytes in prop::collection::vec(any::<u8>(), 0..8)) {
         let value = Value::decode(&bytes, data_type);
@@ -38,7 +38,7 @@ proptest! {
         prop_assert_eq!(bytes.len() < size, size > 0 && value == Value::Bytes(bytes));
     }
 
-    /// Every integer in the range of its type is taken, in both notations, and no other.
+    /// Every integer in the range of its type is accepted, in both notations, and no integer outside of the range.
     #[test]
     fn integers_in_their_range(bits in 1..=8_u32, signed: bool, number in any::<i64>()) {
         let bits = bits * 8;
@@ -58,7 +58,7 @@ proptest! {
         }
     }
 
-    /// Any text is read or refused.
+    /// The parser accepts or refuses any text without a panic.
     #[test]
     fn any_text(text in ".{0,40}", data_type in types()) {
         if let Ok(value) = Value::parse(&text, data_type) {
@@ -67,7 +67,7 @@ proptest! {
         let _ = value::data_type(&text);
     }
 
-    /// What a value of an unknown type is taken for shows all of its bytes.
+    /// The guessed type of a value shows all of its bytes.
     #[test]
     fn a_guess_loses_nothing(bytes in prop::collection::vec(any::<u8>(), 0..20)) {
         let data_type = guess(&bytes);

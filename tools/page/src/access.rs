@@ -1,17 +1,17 @@
-//! Who may connect: by the `Host` that was asked for, the `Origin` of the page that asks, and a token.
+//! The access rules: they depend on the `Host` of the request, the `Origin` of the asking page, and a token.
 //!
-//! A browser lets any page of any site send requests to this machine. Such a page cannot choose its `Origin`, cannot read
-//! what this server answers, and so does not know the token. A name that its owner points at this machine (DNS rebinding) is
-//! found out by its `Host`: an IP address cannot be pointed anywhere.
+//! A browser lets any page of any site send requests to this machine. Such a page cannot choose its `Origin` and cannot
+//! read the answers of this server, so it does not know the token. An attacker may also point a name at this machine
+//! (DNS rebinding). Then the `Host` shows the name instead of an IP address, and the request is refused.
 
 use std::fmt::Write as _;
 use std::net::{IpAddr, SocketAddr};
 
-/// What lets a page write. Another one at each start.
+/// The token that lets a page write. Each start of the server has another token.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
-/// What a request may do.
+/// The rights of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rights {
     Read,
@@ -26,7 +26,7 @@ pub(crate) enum Refusal {
     Token,
 }
 
-/// What a request says of itself.
+/// The properties of a request that decide on its rights.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Claim<'a> {
     pub(crate) host: Option<&'a str>,
@@ -34,7 +34,7 @@ pub(crate) struct Claim<'a> {
     pub(crate) token: Option<&'a str>,
 }
 
-/// The rules of one server.
+/// The access rules of one server.
 #[derive(Clone)]
 pub(crate) struct Access {
     address: SocketAddr,
@@ -42,7 +42,7 @@ pub(crate) struct Access {
 }
 
 impl Token {
-    /// 128 bits that nobody can guess.
+    /// A token of 128 random bits.
     ///
     /// # Errors
     /// The system has no random numbers.
@@ -57,13 +57,13 @@ impl Token {
         Ok(Token(text))
     }
 
-    /// As it stands in a URL.
+    /// The text of the token in a URL.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// Compares all of it, so that the time tells nothing.
+    /// Compares whole tokens, so that the time does not tell where the first difference is.
     fn is(&self, given: &str) -> bool {
         let differing = self.0.bytes().zip(given.bytes()).fold(0, |differing, (a, b)| differing | (a ^ b));
         self.0.len() == given.len() && differing == 0
@@ -84,7 +84,7 @@ impl Access {
         self.address.ip().is_loopback()
     }
 
-    /// What a request may do. On this machine anybody may read; from elsewhere nobody may do anything without the token.
+    /// The rights of a request. Without the token, local requests may read, and others may do nothing.
     pub(crate) fn rights(&self, claim: Claim) -> Result<Rights, Refusal> {
         let host = claim.host.filter(|host| self.is_ours(host)).ok_or(Refusal::Host)?;
         if claim.origin.is_some_and(|origin| origin.strip_prefix("http://") != Some(host)) {
@@ -97,7 +97,7 @@ impl Access {
         }
     }
 
-    /// Whether a `Host` is an address of this server and no name, but for `localhost` on this machine.
+    /// Whether a `Host` is an IP address of this server, or `localhost` on this machine.
     fn is_ours(&self, host: &str) -> bool {
         let Some((name, port)) = host.rsplit_once(':') else { return false };
         if port.parse() != Ok(self.address.port()) {
@@ -113,7 +113,7 @@ impl Access {
 }
 
 impl Refusal {
-    /// For the answer.
+    /// The text of the answer.
     pub(crate) const fn text(self) -> &'static str {
         match self {
             Refusal::Host => "this server is asked for by its IP address and port",

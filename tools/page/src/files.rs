@@ -1,12 +1,12 @@
 //! The files of the page.
 
-/// Path below the root, and content.
+/// Path below the root, and content of each file.
 static FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/files.rs"));
 
-/// Where the page has its chart library, which comes out of a package and not out of the folder of the page.
+/// The path of the chart library, which comes from a package and not from the folder of the page.
 const CHARTS: &str = "/lib/chart.js";
 
-/// A file by its path; the root is `index.html`.
+/// A file by its path; the path `/` is `index.html`.
 pub(crate) fn find(path: &str) -> Option<(&'static str, &'static [u8])> {
     if path == CHARTS {
         return Some((media_type(CHARTS)?, rustlavel_chart::plugin::CHART_JS.as_bytes()));
@@ -16,7 +16,7 @@ pub(crate) fn find(path: &str) -> Option<(&'static str, &'static [u8])> {
     Some((media_type(path)?, content))
 }
 
-/// What a browser is told that it is; `None` for a file that is not served.
+/// The media type of a file; `None` for a file that is not served.
 fn media_type(path: &str) -> Option<&'static str> {
     Some(match path.rsplit_once('.')?.1 {
         "html" => "text/html; charset=utf-8",

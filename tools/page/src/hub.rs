@@ -1,46 +1,47 @@
-//! The pages that are there, and what waits for each: bounded, so that a slow page costs memory no more than so much.
+//! The connected pages, and the messages that wait for each. The queues are bounded, so that a slow page needs limited
+//! memory.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
 
-/// Bytes that may wait for a page before events for it have to be left out.
+/// Bytes that may wait for a page before events for it are dropped.
 const ROOM: usize = 512 * 1024;
-/// Pages that are connected at the same time.
+/// The number of pages that may be connected at the same time.
 const PAGES: usize = 32;
-/// Bytes that may wait at all: a page that lets so many answers wait is let go.
+/// Bytes that may wait for a page at all. A page with more waiting answers is disconnected.
 const MOST: usize = 16 * 1024 * 1024;
 
-/// Names a page for as long as it is connected.
+/// The number of a page while it is connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PageId(u64);
 
-/// What a page does.
+/// An action of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FromPage {
-    /// It has connected.
+    /// The page has connected.
     Came {
-        /// Which one.
+        /// The page.
         page: PageId,
-        /// Whether it may change something.
+        /// Whether the page may change something.
         writes: bool,
     },
-    /// It has said something.
+    /// The page has sent a message.
     Said {
-        /// Which one.
+        /// The page.
         page: PageId,
-        /// What; of any form.
+        /// The text of the message, which need not be valid.
         text: String,
     },
-    /// It is gone.
+    /// The page has disconnected.
     Left {
-        /// Which one.
+        /// The page.
         page: PageId,
     },
 }
 
-/// All pages.
+/// All connected pages.
 #[derive(Default)]
 pub struct Hub {
     pages: Mutex<Pages>,
@@ -52,7 +53,7 @@ struct Pages {
     outboxes: BTreeMap<PageId, Arc<Outbox>>,
 }
 
-/// What waits for one page.
+/// The queue of one page.
 #[derive(Default)]
 pub(crate) struct Outbox {
     waiting: Mutex<Waiting>,
@@ -66,7 +67,7 @@ struct Waiting {
     is_closed: bool,
 }
 
-/// What a page is to be sent next.
+/// The next action for a page.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     Text(String),
@@ -74,20 +75,20 @@ pub(crate) enum Next {
 }
 
 impl Hub {
-    /// Sends a text. It waits until the page takes it; nothing happens when there is no such page.
+    /// Puts a text into the queue of a page. Nothing happens when there is no such page.
     pub fn send(&self, page: PageId, text: String) {
         if let Some(outbox) = self.outbox(page) {
             outbox.push(text);
         }
     }
 
-    /// Whether a page has room for an event.
+    /// Whether the queue of a page has room for an event.
     #[must_use]
     pub fn has_room(&self, page: PageId) -> bool {
         self.outbox(page).is_some_and(|outbox| outbox.waiting().bytes < ROOM)
     }
 
-    /// Lets go of a page; what waits for it is still sent.
+    /// Disconnects a page after its queue is sent.
     pub fn close(&self, page: PageId) {
         if let Some(outbox) = self.outbox(page) {
             outbox.waiting().is_closed = true;
@@ -95,7 +96,7 @@ impl Hub {
         }
     }
 
-    /// A place for another page; `None` when there are enough.
+    /// A place for a new page; `None` when there are too many.
     pub(crate) fn enter(&self) -> Option<(PageId, Arc<Outbox>)> {
         let mut pages = self.pages();
         if pages.outboxes.len() == PAGES {
@@ -115,7 +116,8 @@ impl Hub {
         self.pages().outboxes.get(&page).cloned()
     }
 
-    /// Nobody panics while holding it; if somebody did, the lists would still be whole.
+    /// Locks the pages. A poisoned lock is ignored: no code panics while it holds the lock, and the lists would still
+    /// be consistent.
     fn pages(&self) -> MutexGuard<'_, Pages> {
         self.pages.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -134,7 +136,7 @@ impl Outbox {
         self.news.notify_one();
     }
 
-    /// Waits for something to send.
+    /// Waits for the next action.
     pub(crate) async fn next(&self) -> Next {
         loop {
             if let Some(next) = self.take() {

@@ -1,8 +1,9 @@
-//! The web server of `nodectl serve`: it has the files of the page inside itself, takes WebSockets from browsers, and carries
-//! texts between them and a service that knows the bus. What the texts say is in `PROTOCOL.md`; nothing here reads them.
+//! The web server of `nodectl serve`. It contains the files of the page, accepts WebSockets from browsers, and carries
+//! texts between the pages and the service that knows the bus. The texts are defined in `PROTOCOL.md`; the server does
+//! not read them.
 //!
-//! Whoever may connect is decided by the module `access`; what waits for a page is bounded ([`Hub`]), so that a page that does not
-//! read, says nonsense or says nothing at all costs the others nothing.
+//! The module `access` decides which requests are allowed. The queue of each page is bounded ([`Hub`]), so that a page
+//! that does not read, sends nonsense or sends nothing does not disturb the others.
 #![forbid(unsafe_code)]
 
 mod access;

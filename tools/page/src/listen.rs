@@ -1,4 +1,4 @@
-//! The port, and the connections at it.
+//! The TCP port of the server, and its connections.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener as StdListener};
@@ -18,34 +18,34 @@ use crate::access::{Access, Token};
 use crate::hub::{FromPage, Hub};
 use crate::routes::{Site, router};
 
-/// Connections that are open at the same time. A browser opens up to six for a page.
+/// The number of connections that may be open at the same time. A browser opens up to six for a page.
 const CONNECTIONS: usize = 128;
-/// How long a request may take to arrive; a connection that says nothing is closed then.
+/// The time-out for a request. A connection that sends nothing is closed then.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Ports that are tried when the first is taken.
+/// The number of ports that are tried when the first one is in use.
 const PORTS: u16 = 20;
 
-/// Where the server is.
+/// The options of the server.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Address and port; port 0 takes a free one.
+    /// Address and port; port 0 takes any free port.
     pub address: SocketAddr,
 }
 
 /// A server that runs until the process ends.
 pub struct Server {
-    /// What it listens on.
+    /// The address that the server listens at.
     pub address: SocketAddr,
-    /// What a browser opens.
+    /// The URL for a browser.
     pub url: String,
     /// The pages.
     pub hub: Arc<Hub>,
 }
 
-/// Starts the server on a thread of its own. `listener` is told what pages do; it must not wait.
+/// Starts the server on a thread of its own. `listener` is called with the actions of pages and must not block.
 ///
 /// # Errors
-/// The address cannot be had, and none of the next ports.
+/// Neither this port nor one of the next ports can be used.
 pub fn start(options: &Options, listener: impl Fn(FromPage) + Send + Sync + 'static) -> io::Result<Server> {
     let socket = bind(options.address)?;
     socket.set_nonblocking(true)?;
@@ -86,18 +86,18 @@ async fn accept(socket: StdListener, router: Router) {
     while let Ok(place) = Arc::clone(&places).acquire_owned().await {
         match listener.accept().await {
             Ok((stream, _)) => drop(tokio::spawn(connection(stream, router.clone(), place))),
-            // The host has no room for another; it may have later.
+            // The host has no resources for another connection at the moment.
             Err(_) => sleep(Duration::from_millis(100)).await,
         }
     }
 }
 
 async fn connection(stream: TcpStream, router: Router, _place: OwnedSemaphorePermit) {
-    // An event is one small write that must not wait for the next.
+    // An event is one small write that must be sent at once.
     let _ = stream.set_nodelay(true);
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(64 * 1024);
     let service = TowerToHyperService::new(router);
-    // A connection that fails is its own business.
+    // A failed connection concerns only its own client.
     let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
 }

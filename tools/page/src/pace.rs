@@ -1,17 +1,18 @@
-//! How fast a page may speak.
+//! The limit on the messages of a page.
 
 use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// Messages a second that a page may send for long.
+/// Messages a second that a page may send continuously.
 const RATE: u32 = 100;
-/// Messages that it may send at once.
+/// Messages that a page may send at once.
 const BURST: u32 = 200;
 
-/// Lets through a burst, and then so many a second. Who sends more is not read from for a while, and waits in its own queue.
+/// Allows a burst, and then a constant rate. A page that sends more is not read for a while; its messages wait in its
+/// own queue.
 pub(crate) struct Pace {
-    /// When all that was sent is worked off.
+    /// The time at which all messages are paid off at the constant rate.
     owed_until: Instant,
 }
 
@@ -20,12 +21,12 @@ impl Pace {
         Pace { owed_until: now }
     }
 
-    /// A message has come.
+    /// Counts a message.
     pub(crate) fn count(&mut self, now: Instant) {
         self.owed_until = self.owed_until.max(now) + Duration::from_secs(1) / RATE;
     }
 
-    /// When the next may be read.
+    /// The time at which the next message may be read.
     pub(crate) fn next(&self) -> Instant {
         self.owed_until.checked_sub(Duration::from_secs(1) / RATE * BURST).unwrap_or(self.owed_until)
     }

@@ -1,4 +1,4 @@
-//! What is at which URL.
+//! The URLs of the server.
 
 use std::sync::Arc;
 
@@ -19,14 +19,14 @@ use crate::files;
 use crate::hub::Hub;
 use crate::socket::{self, LARGEST, Listener};
 
-/// Nothing from elsewhere, and no script in the text of the page.
+/// The content security policy: the page loads nothing from other servers, and has no inline scripts.
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; \
                       frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
-/// What `index.html` has in the place of the token.
+/// The place holder for the token in `index.html`.
 const PLACE: &str = "{{token}}";
 const COOKIE_NAME: &str = "token";
 
-/// What every request needs.
+/// The state for every request.
 #[derive(Clone)]
 pub(crate) struct Site {
     pub(crate) access: Access,
@@ -40,7 +40,7 @@ pub(crate) fn router(site: Site) -> Router {
     Router::new().route("/ws", get(connect)).fallback(file).layer(access).layer(headers).with_state(site)
 }
 
-/// Lets a request through that may be answered.
+/// Passes on allowed requests and refuses the others.
 async fn checked(State(site): State<Site>, mut request: Request, next: Next) -> Response {
     match rights(&site.access, request.headers(), request.uri()) {
         Ok(rights) => {
@@ -53,10 +53,11 @@ async fn checked(State(site): State<Site>, mut request: Request, next: Next) -> 
 
 fn rights(access: &Access, headers: &HeaderMap, uri: &Uri) -> Result<Rights, Refusal> {
     let text = |name: &HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or_default());
-    // Two of them may be two opinions of what is asked for.
+    // Two `Host` headers would leave open which one counts.
     let host = Some(headers.get_all(HOST)).filter(|all| all.iter().count() == 1).and_then(|_| text(&HOST));
     let token = uri.query().and_then(token_of_query).or_else(|| {
-        // A cookie is sent by other pages' requests too: it opens the files of a server that is reached from elsewhere only.
+        // The requests of other sites' pages have the cookie, too. So the cookie only opens files, and only on a server
+        // for other machines.
         let is_file = uri.path() != "/ws" && !access.is_local();
         text(&COOKIE).filter(|_| is_file).and_then(token_of_cookies)
     });
@@ -91,7 +92,7 @@ async fn file(State(site): State<Site>, method: Method, uri: Uri) -> Response {
     }
 }
 
-/// The page with its token, which no page of another origin can read.
+/// The page with its token. No page of another origin can read it.
 fn index(access: &Access, media: &'static str, content: &[u8]) -> Response {
     let token = access.token().as_str();
     let text = String::from_utf8_lossy(content).replace(PLACE, token);

@@ -1,4 +1,4 @@
-//! One page at its WebSocket.
+//! The WebSocket of one page.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,15 +12,15 @@ use crate::pace::Pace;
 
 /// The largest message of a page: a firmware image in base64, or the configuration of a large device.
 pub(crate) const LARGEST: usize = 2 * 1024 * 1024;
-/// How often a page that says nothing is asked whether it is there.
+/// The period of pings to a page that sends nothing.
 const PING: Duration = Duration::from_secs(10);
-/// For so long a page may say nothing, and take nothing.
+/// The time-out for a page that sends nothing, and for a page that accepts nothing.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Who is told what pages do.
+/// The receiver of the pages' actions.
 pub(crate) type Listener = dyn Fn(FromPage) + Send + Sync;
 
-/// Serves a page until it leaves, or is let go.
+/// Serves a page until it disconnects or is disconnected.
 pub(crate) async fn serve(mut socket: WebSocket, writes: bool, hub: Arc<Hub>, listener: Arc<Listener>) {
     let code = match hub.enter() {
         Some((page, outbox)) => {
@@ -34,12 +34,13 @@ pub(crate) async fn serve(mut socket: WebSocket, writes: bool, hub: Arc<Hub>, li
     };
     if let Some(code) = code {
         let farewell = Message::Close(Some(CloseFrame { code, reason: "".into() }));
-        // A page that is gone needs none.
+        // A lost page needs no close frame.
         let _ = timeout(PING, socket.send(farewell)).await;
     }
 }
 
-/// Both directions; returns with which code the connection is to be closed, where it is not already.
+/// Transfers messages in both directions. Returns the code to close the connection with; `None` when it is closed
+/// already.
 async fn converse(socket: &mut WebSocket, page: PageId, outbox: &Outbox, listener: &Listener) -> Option<u16> {
     let mut pace = Pace::new(Instant::now());
     let mut heard = Instant::now();
@@ -56,7 +57,7 @@ async fn converse(socket: &mut WebSocket, page: PageId, outbox: &Outbox, listene
                 pace.count(heard);
                 match message {
                     Some(Ok(Message::Text(text))) => listener(FromPage::Said { page, text: text.to_string() }),
-                    // The service answers that this is no message of the protocol.
+                    // An empty text is no message of the protocol, so that the service answers with an error.
                     Some(Ok(Message::Binary(_))) => listener(FromPage::Said { page, text: String::new() }),
                     Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
                     Some(Ok(Message::Close(_)) | Err(_)) | None => return None,
@@ -77,7 +78,7 @@ async fn converse(socket: &mut WebSocket, page: PageId, outbox: &Outbox, listene
     }
 }
 
-/// `None` for a page that does not take it.
+/// Sends a message; `None` when the page does not accept it in time.
 async fn send(socket: &mut WebSocket, message: Message) -> Option<()> {
     timeout(PATIENCE, socket.send(message)).await.ok()?.ok()
 }

@@ -1,4 +1,4 @@
-//! An absolute encoder of 12 + 13 bits on a shaft, its readings disturbed, and what the node makes of them.
+//! Plots of an absolute encoder of 12 + 13 bits on a shaft: disturbed readings, and the values that the node publishes.
 
 use profiles::board::{RawEncoder, SsiFrame};
 use profiles::encoder::{ChannelValues, Encoder, Format, Parameters, SensorType, Start};
@@ -7,35 +7,35 @@ use profiles::profile::Chain;
 use crate::figure::{Chart, Curve, INPUT, OUTPUT, READ, stairs, svg};
 use crate::stimulus::LENGTH;
 
-/// Steps of the shaft in a millisecond: 600 rpm of 8192 steps.
+/// Steps of the shaft in a millisecond: 600 rpm with 8192 steps a turn.
 const STEPS_A_MILLISECOND: f64 = 81.92;
 const HALF_A_TURN: i64 = 4096;
-/// Milliseconds in which the readings are disturbed.
+/// The milliseconds with disturbed readings.
 const DISTURBED: std::ops::Range<usize> = 30..50;
 
-/// What disturbs the readings for 20 ms.
+/// The disturbance of the readings for 20 ms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Disturbance {
     /// The code jumps by half a turn.
     Jump,
-    /// No clock is answered.
+    /// The encoder does not answer the clock.
     Silence,
 }
 
-/// What the node had of one millisecond.
+/// The data of one millisecond.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// When the shaft was read, in milliseconds.
+    /// The time of the reading, in milliseconds.
     pub ms: usize,
-    /// Where the shaft was, in steps.
+    /// The true position of the shaft, in steps.
     pub shaft: i64,
-    /// What the encoder said, in steps; `None` for no answer.
+    /// The reading of the encoder, in steps; `None` without an answer.
     pub read: Option<i64>,
-    /// What the node publishes.
+    /// The values that the node publishes.
     pub values: ChannelValues,
 }
 
-/// Turns the shaft at 600 rpm for the time of a plot, with the parameters as delivered.
+/// Turns the shaft at 600 rpm for the time of a plot, with default parameters.
 #[must_use]
 pub fn turn(disturbance: Disturbance) -> Vec<Sample> {
     let mut parameters = Parameters::default();
@@ -58,13 +58,13 @@ fn sample(encoder: &mut Encoder, format: Format, ms: usize, disturbance: Disturb
     Sample { ms, shaft, read, values }
 }
 
-/// The word of a position in Gray code behind the start bit, the line at rest behind the word.
+/// The SSI frame of a position: the start bit, the word in Gray code, and the line at rest.
 fn frame(format: Format, position: i64) -> SsiFrame {
     let (position, bits) = (position.unsigned_abs(), format.position_bits());
     SsiFrame { bits: ((1 << bits) | (position ^ (position >> 1))) << 2, clocks: bits + 3 }
 }
 
-/// The plot as text.
+/// The plot as SVG text.
 pub(crate) fn plot() -> String {
     svg(&[chart(Disturbance::Jump), chart(Disturbance::Silence)])
 }

@@ -11,12 +11,12 @@ use crate::stimulus::LENGTH;
 
 const WIDTH: u32 = 900;
 const HEIGHT_OF_A_CHART: u32 = 260;
-/// The true value, what was read of it, and what the node makes of that.
+/// The colours of the true value and of the reading; the third colour is that of the node's value.
 pub(crate) const INPUT: RGBColor = RGBColor(150, 150, 150);
 pub(crate) const READ: RGBColor = RGBColor(40, 90, 200);
 pub(crate) const OUTPUT: RGBColor = RGBColor(200, 40, 40);
 
-/// What a chart shows over the time of a plot.
+/// A chart over the time of a plot.
 pub(crate) struct Chart {
     pub(crate) title: String,
     pub(crate) unit: &'static str,
@@ -24,14 +24,14 @@ pub(crate) struct Chart {
     pub(crate) curves: Vec<Curve>,
 }
 
-/// One curve with its name in the legend.
+/// A curve with its name in the legend.
 pub(crate) struct Curve {
     pub(crate) name: String,
     pub(crate) color: RGBColor,
     pub(crate) points: Trace,
 }
 
-/// The plot as text.
+/// The plot as SVG text.
 pub(crate) fn svg(charts: &[Chart]) -> String {
     let mut text = String::new();
     draw(charts, &mut text).expect("a string takes everything");
@@ -71,7 +71,7 @@ fn key((x, y): (i32, i32), color: RGBColor) -> PathElement<(i32, i32)> {
     PathElement::new([(x, y), (x + 18, y)], color)
 }
 
-/// A value holds until the next one.
+/// A curve in steps: a value holds until the next one.
 pub(crate) fn stairs(points: &[(f64, f64)]) -> Trace {
     let ends = points.iter().skip(1).map(|(ms, _)| *ms).chain([LENGTH as f64]);
     points.iter().zip(ends).flat_map(|((ms, value), end)| [(*ms, *value), (end, *value)]).collect()

@@ -4,7 +4,7 @@ use crate::figure::{Chart, Curve, INPUT, OUTPUT, stairs, svg};
 use crate::stimulus::LENGTH;
 use crate::{Filter, Stimulus, trace};
 
-/// The plot as text.
+/// The plot as SVG text.
 pub(crate) fn plot(filter: Filter) -> String {
     svg(&Stimulus::ALL.map(|stimulus| chart(filter, stimulus)))
 }

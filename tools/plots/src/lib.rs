@@ -1,7 +1,8 @@
-//! What the documentation shows of the measurement chain, computed with the chain itself: plots of input against output
-//! for each filter, tables of settling times, delays and resolution, and what an encoder makes of disturbed readings.
+//! The plots and tables of the measurement chain for the documentation, computed with the chain itself: plots of input
+//! against output for each filter, tables of settling times, delays and resolution, and plots of an encoder with
+//! disturbed readings.
 //!
-//! The output is the same on every run, so a test compares it with what lies in docs/.
+//! The output is the same on every run, so that a test can compare it with the files in docs/.
 
 mod encoder;
 mod figure;
@@ -18,19 +19,19 @@ pub use stimulus::Stimulus;
 
 use std::path::{Path, PathBuf};
 
-/// A file that is generated, as a whole or in part.
+/// A generated file, or a file with generated parts.
 #[derive(Clone, Debug)]
 pub struct File {
-    /// Where it lies.
+    /// The path of the file.
     pub path: PathBuf,
-    /// All of it.
+    /// The whole text of the file.
     pub text: String,
 }
 
-/// Every file: a plot for each filter and one for the encoder, and the page with its tables brought up to date.
+/// All files: a plot for each filter, a plot for the encoder, and the page with its tables updated.
 ///
 /// # Panics
-/// When a plot cannot be drawn, or the page is not there.
+/// When a plot cannot be drawn, or the page does not exist.
 #[must_use]
 pub fn files() -> Vec<File> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the root of the workspace");

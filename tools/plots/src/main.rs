@@ -1,4 +1,4 @@
-//! Writes every file: `cargo xtask plots`.
+//! Writes all files: `cargo xtask plots`.
 
 use std::process::ExitCode;
 

@@ -1,16 +1,16 @@
-//! The tables of docs/measuring.md, each between two comments that Markdown does not show.
+//! The tables of docs/measuring.md. Each table is between two comments, which Markdown does not show.
 
 use crate::{Filter, delay, resolution, settling};
 
 const CONSTANTS: [u8; 5] = [1, 2, 10, 100, 255];
 
-/// The page with its tables as they are now.
+/// The page with updated tables.
 pub(crate) fn updated(page: &str) -> String {
     let page = replaced(page, "filters", &filters());
     replaced(&page, "resolution", &resolutions())
 }
 
-/// Replaces what lies between the comments of this name.
+/// Replaces the text between the comments of this name.
 fn replaced(page: &str, name: &str, table: &str) -> String {
     let (begin, end) = (format!("<!-- begin {name} -->\n"), format!("<!-- end {name} -->"));
     let (before, rest) = page.split_once(&begin).unwrap_or_else(|| panic!("the page has no {begin}"));

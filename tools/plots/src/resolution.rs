@@ -1,4 +1,4 @@
-//! The resolution that is left of 16 conversions of 12 bits, by trying.
+//! The resolution of the mean of 16 conversions of 12 bits, found by simulation.
 
 use std::f64::consts::TAU;
 
@@ -9,21 +9,21 @@ const CODES: f64 = 4096.0;
 const CONVERSIONS: u16 = 16;
 /// The supply of the transducer as the converter reads it, as on the board: 3.0 V of 3.3 V.
 const SUPPLY: u32 = 3724;
-/// Pressures tried.
+/// The number of pressures that are tried.
 const TRIALS: u32 = 20_000;
 
-/// What is left between the pressure that is measured and the one that was there.
+/// The difference between the measured and the true pressure.
 #[derive(Clone, Copy, Debug)]
 pub struct Resolution {
-    /// Root mean square in steps of one conversion.
+    /// Root mean square in steps of a conversion.
     pub steps: f64,
     /// Root mean square in Pa.
     pub pascal: f64,
 }
 
 impl Resolution {
-    /// Bits of an ideal converter with the same error: one of `b` bits over the same range is off by a step of
-    /// `2^-b`, divided by the square root of 12.
+    /// Bits of an ideal converter with the same error. An ideal converter of `b` bits over the same range has an error
+    /// of `2^-b`, divided by the square root of 12.
     #[must_use]
     pub fn bits(&self) -> f64 {
         (CODES / (self.steps * 12_f64.sqrt())).log2()
@@ -48,7 +48,7 @@ pub fn resolution(noise: f64) -> Resolution {
     Resolution { steps: root(steps), pascal: root(pascal) }
 }
 
-/// The converter: the first transition lies at half a step.
+/// The converter. The first transition is at half a step.
 fn convert(code: f64) -> f64 {
     code.round().clamp(0.0, CODES - 1.0)
 }

@@ -1,27 +1,27 @@
-//! What a pressure channel makes of a stimulus.
+//! The response of a pressure channel to a stimulus.
 
 use profiles::pressure::{Channel, ChannelParameters, Span, Unit};
 
 use crate::stimulus::{LENGTH, Stimulus};
 
-/// A filter by its objects 61A0h and 61A1h.
+/// A filter, by its objects 61A0h and 61A1h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Filter {
-    /// 61A0h.
+    /// The kind of filter, 61A0h.
     pub kind: u8,
-    /// 61A1h.
+    /// The constant of the filter, 61A1h.
     pub constant: u8,
 }
 
-/// One course of a value: milliseconds and bar.
+/// A value over time: pairs of milliseconds and bar.
 pub type Trace = Vec<(f64, f64)>;
 
 impl Filter {
-    /// Those that are drawn.
+    /// The filters in the plots.
     pub const SHOWN: [Filter; 3] =
         [Filter { kind: 0, constant: 1 }, Filter { kind: 1, constant: 10 }, Filter { kind: 2, constant: 10 }];
 
-    /// Its name.
+    /// The name of the filter.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self.kind {
@@ -46,8 +46,8 @@ impl Filter {
     }
 }
 
-/// The process value of each millisecond, at the instant at which it is published: the mean of the input over the millisecond
-/// that ends there, as 16 conversions give it, through the channel.
+/// The process value of each millisecond, at the time of its publication. The input of the channel is the mean of 16
+/// conversions in the millisecond before.
 #[must_use]
 pub fn trace(filter: Filter, stimulus: Stimulus) -> Trace {
     let mut channel = filter.channel();
@@ -64,10 +64,10 @@ fn mean(stimulus: Stimulus, end: f64) -> f64 {
     (0..16).map(|number| stimulus.at(end - 1.0 + f64::from(number) / 16.0)).sum::<f64>() / 16.0
 }
 
-/// Samples after a step from 0 until what is missing stays below this share of it.
+/// Samples after a step from 0 until the remaining difference stays below this share of the step.
 ///
 /// # Panics
-/// When that never happens.
+/// When the difference never stays below.
 #[must_use]
 pub fn settling(filter: Filter, missing: f64) -> usize {
     let mut channel = filter.channel();
@@ -76,7 +76,7 @@ pub fn settling(filter: Filter, missing: f64) -> usize {
     (1..100_000).find(|_| is_settled(output(&mut channel, 100_000.0))).expect("it settles")
 }
 
-/// How many samples the output is behind a ramp once the start is over: the least and the most.
+/// The number of samples that the output is behind a ramp, after the initial phase: the least and the greatest.
 #[must_use]
 pub fn delay(filter: Filter) -> (f64, f64) {
     let mut channel = filter.channel();

@@ -2,27 +2,27 @@
 
 use std::f64::consts::TAU;
 
-/// Milliseconds that a plot shows.
+/// The time of a plot in milliseconds.
 pub(crate) const LENGTH: usize = 100;
-/// Milliseconds before anything happens.
+/// The time before the stimulus begins, in milliseconds.
 const START: f64 = 10.0;
 
 /// A pressure as a function of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stimulus {
-    /// From 0 to 5 bar.
+    /// A step from 0 to 5 bar.
     Step,
-    /// Around 2.5 bar with an amplitude of 2.5 bar, 20 Hz.
+    /// A sine around 2.5 bar with an amplitude of 2.5 bar, 20 Hz.
     Sine,
-    /// From 0 bar on, 5 bar in 80 ms.
+    /// A ramp from 0 bar, 5 bar in 80 ms.
     Ramp,
 }
 
 impl Stimulus {
-    /// All of them.
+    /// All stimuli.
     pub const ALL: [Stimulus; 3] = [Stimulus::Step, Stimulus::Sine, Stimulus::Ramp];
 
-    /// The pressure in Pa after so many milliseconds.
+    /// The pressure in Pa after `ms` milliseconds.
     #[must_use]
     pub fn at(self, ms: f64) -> f64 {
         let since = (ms - START).max(0.0);
@@ -34,7 +34,7 @@ impl Stimulus {
         }
     }
 
-    /// What a plot of it is called.
+    /// The title of a plot of the stimulus.
     #[must_use]
     pub fn title(self) -> &'static str {
         match self {

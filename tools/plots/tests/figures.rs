@@ -1,4 +1,4 @@
-//! The plots and tables in docs/ are what the chain gives now, and what theory says.
+//! Tests that the plots and tables in docs/ agree with the chain as it is now, and with theory.
 
 use plots::{Disturbance, Filter, Stimulus, delay, files, resolution, settling, trace, turn};
 use profiles::encoder::SENSOR_POSITION_ERROR;
@@ -20,7 +20,7 @@ fn the_plots_and_tables_are_up_to_date() {
 #[test]
 fn without_a_filter_the_output_is_one_sample_old() {
     for (ms, bar) in trace(Filter::SHOWN[0], Stimulus::Step) {
-        // Conversions of the millisecond that ends with the step's are all before it.
+        // All conversions of the millisecond that ends at the step are before the step.
         assert_eq!(bar.to_bits(), if ms <= 10.0 { 0_f64 } else { 5.0 }.to_bits(), "{ms}");
     }
     for (ms, bar) in trace(Filter::SHOWN[0], Stimulus::Ramp).into_iter().skip(11).take(70) {
@@ -48,7 +48,7 @@ fn the_moving_average_settles_as_a_geometric_series() {
 fn the_repeating_average_settles_with_its_second_block() {
     for constant in CONSTANTS {
         let filter = Filter { kind: 2, constant };
-        // The step comes with the second sample of the first block, which misses 1 / N.
+        // The step comes with the second sample of the first block, so that 1 / N of the step is missing.
         let n = f64::from(constant);
         for missing in [0.1, 0.01, 0.001_f64] {
             let blocks = if 1.0 / n <= missing { 1.0 } else { 2.0 };
@@ -56,7 +56,7 @@ fn the_repeating_average_settles_with_its_second_block() {
             assert!((settling(filter, missing) as f64 - expected).abs() <= 0.0, "{constant} {missing}");
         }
         let (least, most) = delay(filter);
-        // The middle of the block when it ends, and as much more as it is held.
+        // The middle of the block at its end, and the additional time for which the value is held.
         assert!(
             (least - (n - 1.0) / 2.0).abs() < 0.01 && (most - 1.5 * (n - 1.0)).abs() < 0.01,
             "{constant}"
@@ -67,7 +67,7 @@ fn the_repeating_average_settles_with_its_second_block() {
 #[test]
 fn the_resolution_is_that_of_one_conversion_without_noise() {
     let still = resolution(0.0);
-    // A step over the square root of 12, and 12 bits.
+    // The error is a step divided by the square root of 12, which means 12 bits.
     assert!(
         (still.steps - 1.0 / 12_f64.sqrt()).abs() < 0.005 && (still.bits() - 12.0).abs() < 0.03,
         "{still:?}"
@@ -94,7 +94,7 @@ fn a_disturbed_reading_is_not_taken_over_and_the_next_good_one_is() {
             let expected = if sample.read == Some(sample.shaft) { sample.shaft } else { held.shaft };
             assert_eq!(i64::from(sample.values.position), expected, "{disturbance:?} at {} ms", sample.ms);
         }
-        // From the third millisecond on the state says that the position is not right.
+        // From the third millisecond on the state reports a position error.
         let is_wrong = |ms: usize| samples[ms].values.sensor_state & SENSOR_POSITION_ERROR != 0;
         assert_eq!([29, 31, 32, 49].map(is_wrong), [false, false, true, true], "{disturbance:?}");
     }

@@ -1,4 +1,4 @@
-//! A board at a debug probe: the flags that choose it, and the calls of probe-rs for it.
+//! A board at a debug probe: the command line flags that choose it, and the calls of probe-rs for it.
 #![forbid(unsafe_code)]
 
 use std::process::Command;
@@ -17,7 +17,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// A call of probe-rs for this board. What follows the verb is the caller's.
+    /// A call of probe-rs for this board. The caller adds the arguments behind the verb.
     #[must_use]
     pub fn call(&self, verb: &str) -> Command {
         let mut command = Command::new("probe-rs");
@@ -25,14 +25,14 @@ impl Board {
         command
     }
 
-    /// The flags that choose the board: probe-rs and the tools of the project have the same.
+    /// The flags that choose the board, which are the same for probe-rs and for the tools of the project.
     pub fn flags(&self) -> impl Iterator<Item = &str> {
         let probe = self.probe.iter().flat_map(|probe| ["--probe", probe]);
         ["--chip", &self.chip].into_iter().chain(probe)
     }
 }
 
-/// A call as one would type it.
+/// A call as a command line.
 #[must_use]
 pub fn line(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());

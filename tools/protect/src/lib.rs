@@ -1,9 +1,9 @@
-//! The protections of the chip that the project leaves off: the sectors of the bootloader against erasing and programming,
-//! and the whole flash against reading (docs/update.md, Protection).
+//! The protections of the chip that the project leaves off by default: the bootloader's sectors against erasing and
+//! programming, and the whole flash against reading (docs/update.md, Protection).
 //!
-//! They are set from outside, with a debug probe, and not by the bootloader at its first start: code that can write option
-//! bytes is code that can go wrong in the field, where nobody can put them right, and that an attacker can use; a probe is
-//! there anyway when a board gets its bootloader, and whoever holds it sees at once whether it has worked.
+//! A debug probe sets the protections, not the bootloader at its first start. Code that can write option bytes can go
+//! wrong in the field, where nobody can correct them, and an attacker can use such code. A probe is needed anyway when
+//! a board gets its bootloader, and its user sees at once whether the setting has worked.
 #![forbid(unsafe_code)]
 
 mod option_bytes;

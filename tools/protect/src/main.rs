@@ -1,4 +1,4 @@
-//! `cargo xtask protect`: sets the option bytes of a chip at a debug probe, and says before what that means.
+//! `cargo xtask protect`: sets the option bytes of a chip at a debug probe, and explains the consequences before.
 
 use std::io::{BufRead, Write, stdin, stdout};
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ impl Cli {
         if self.readout { wanted.with_read_out(!self.off) } else { wanted }
     }
 
-    /// What a dry run begins with: a new chip, or one that has what is to be taken away.
+    /// The option bytes that a dry run assumes: those of a new chip, with the protections that are to be removed.
     fn pretended(&self) -> OptionBytes {
         let opposite = |chosen| chosen && self.off;
         let new = OptionBytes::FACTORY.with_bootloader(opposite(self.bootloader));
@@ -77,7 +77,7 @@ fn run(cli: &Cli) -> Result<()> {
     Ok(())
 }
 
-/// What people should know before.
+/// The consequences that the user has to confirm.
 fn consequences(has: OptionBytes, wanted: OptionBytes) -> Vec<&'static str> {
     let closes = has.read_out() == ReadOut::Open && wanted.read_out() == ReadOut::Protected;
     let cases = [

@@ -1,40 +1,40 @@
-//! The option bytes as FLASH_OPTCR has them (RM0390, 3.8.6; RM0090, 3.9.7).
+//! The option bytes in the layout of FLASH_OPTCR (RM0390, 3.8.6; RM0090, 3.9.7).
 
 use std::fmt;
 
-/// OPTLOCK and OPTSTRT, which are commands and no options.
+/// The bits OPTLOCK and OPTSTRT, which are commands and not options.
 const COMMANDS: u32 = 0b11;
-/// RDP.
+/// The field RDP.
 const READ_OUT: u32 = 0xFF << 8;
 const LEVEL_0: u32 = 0xAA << 8;
-/// Any value but those of the other two levels.
+/// Level 1 is any value except the values of the other two levels.
 const LEVEL_1: u32 = 0x55 << 8;
 const LEVEL_2: u32 = 0xCC << 8;
-/// nWRP of sectors 0 and 1: a sector is protected while its bit is 0.
+/// The nWRP bits of sectors 0 and 1. A sector is protected while its bit is 0.
 const BOOTLOADER: u32 = 0b11 << 16;
-/// SPRMOD: with it the bits of the sectors mean something else.
+/// SPRMOD, which changes the meaning of the sector bits.
 const PROPRIETARY: u32 = 1 << 31;
 
-/// What they say.
+/// The option bytes of a chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OptionBytes(u32);
 
-/// How far a debugger, or a program that was not started from flash, can read the flash.
+/// How much of the flash a debugger, or a program that was not started from flash, can read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReadOut {
-    /// Level 0: all of it.
+    /// Level 0: the whole flash.
     Open,
-    /// Level 1: nothing. The way back erases everything.
+    /// Level 1: nothing. The way back to level 0 erases the flash.
     Protected,
-    /// Level 2: no debugger connects, and nothing changes the option bytes any more.
+    /// Level 2: no debugger can connect, and the option bytes cannot be changed any more.
     Final,
 }
 
 impl OptionBytes {
-    /// As a new STM32F446 has them.
+    /// The option bytes of a new STM32F446.
     pub const FACTORY: OptionBytes = OptionBytes(0x0FFF_AAEC);
 
-    /// Those in a value of FLASH_OPTCR.
+    /// The option bytes in a value of FLASH_OPTCR.
     #[must_use]
     pub fn from_register(value: u32) -> OptionBytes {
         OptionBytes(value & !COMMANDS)
@@ -62,26 +62,26 @@ impl OptionBytes {
         }
     }
 
-    /// Whether sectors are protected against reading by their owner (PCROP), which this project knows nothing of.
+    /// Whether sectors are protected by PCROP, which this project does not support.
     #[must_use]
     pub fn is_proprietary(self) -> bool {
         self.0 & PROPRIETARY != 0
     }
 
-    /// The same with the bootloader write protected, or not.
+    /// The same option bytes with or without write protection of the bootloader.
     #[must_use]
     pub fn with_bootloader(self, kept: bool) -> OptionBytes {
         OptionBytes(if kept { self.0 & !BOOTLOADER } else { self.0 | BOOTLOADER })
     }
 
-    /// The same at level 1, or at level 0. There is no way to level 2 here.
+    /// The same option bytes with read-out protection at level 1 or level 0. Level 2 is not offered.
     #[must_use]
     pub fn with_read_out(self, protected: bool) -> OptionBytes {
         let level = if protected { LEVEL_1 } else { LEVEL_0 };
         OptionBytes(self.0 & !READ_OUT | level)
     }
 
-    /// Whether a chip that has these and gets the others erases all of its flash.
+    /// Whether the change to the other option bytes makes the chip erase its whole flash.
     #[must_use]
     pub fn is_erased_by(self, others: OptionBytes) -> bool {
         self.read_out() == ReadOut::Protected && others.read_out() == ReadOut::Open

@@ -1,4 +1,5 @@
-//! The registers through `probe-rs`, a call for each access: it does not reset the chip, so the lock stays open between two.
+//! Access to registers through `probe-rs`, with a call for each access. A call does not reset the chip, so that the
+//! lock stays open between two calls.
 
 use std::io;
 use std::process::{Command, ExitStatus, Stdio};
@@ -11,13 +12,13 @@ use crate::sequence::{OPTCR, Registers};
 /// Why a register could not be reached.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeError {
-    /// There is no probe-rs.
+    /// probe-rs cannot be started.
     #[error("cannot start probe-rs (https://probe.rs): {0}")]
     Start(io::Error),
-    /// It has said why on its standard error output.
+    /// probe-rs has failed, and has printed the reason on its standard error output.
     #[error("`{0}` failed ({1})")]
     Failed(String, ExitStatus),
-    /// This is not a word.
+    /// The output of probe-rs is not a word.
     #[error("probe-rs has read {0:?}")]
     Answer(String),
 }
@@ -26,7 +27,7 @@ pub enum ProbeError {
 pub struct Probe(Board);
 
 impl Probe {
-    /// The registers of this board.
+    /// Access to the registers of this board.
     #[must_use]
     pub fn new(board: Board) -> Probe {
         Probe(board)
@@ -60,20 +61,20 @@ fn answer(mut command: Command) -> Result<String, ProbeError> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// The word that probe-rs prints: eight digits, behind the address in some of its formats.
+/// The word in the output of probe-rs: eight digits, behind the address in some of its formats.
 fn word(text: &str) -> Option<u32> {
     let digits = text.split_whitespace().next_back()?;
     u32::from_str_radix(digits.trim_start_matches("0x"), 16).ok()
 }
 
-/// Prints the calls instead of making them, and answers as a chip that is never busy.
+/// Prints the calls instead of making them, and behaves like a chip that is never busy.
 pub struct DryRun {
     probe: Probe,
     option_bytes: u32,
 }
 
 impl DryRun {
-    /// With these option bytes.
+    /// A dry run that starts with these option bytes.
     #[must_use]
     pub fn new(probe: Probe, has: OptionBytes) -> DryRun {
         DryRun { probe, option_bytes: has.register() }

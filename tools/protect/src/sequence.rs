@@ -12,13 +12,13 @@ const OPTLOCK: u32 = 1 << 0;
 const OPTSTRT: u32 = 1 << 1;
 const BSY: u32 = 1 << 16;
 
-/// How often to look whether the flash is still busy. The longest operation, a mass erase, takes 8 s typically and 16 s at
-/// most (STM32F446 datasheet, 6.3.12); a look through a probe takes a good part of a second.
+/// The number of tries to wait for the flash. The longest operation, a mass erase, takes 8 s typically and 16 s at most
+/// (STM32F446 datasheet, 6.3.12). A try through a probe takes a large part of a second.
 const LOOKS: usize = 1000;
 
-/// Whatever reaches the registers of the chip: a probe, or an emulator.
+/// Access to the registers of the chip, through a probe or in an emulator.
 pub trait Registers {
-    /// Why an access failed.
+    /// The error of an access.
     type Error;
 
     /// Reads a register.
@@ -34,16 +34,16 @@ pub trait Registers {
     fn write(&mut self, address: u32, value: u32) -> Result<(), Self::Error>;
 }
 
-/// Why the option bytes are not as they should be.
+/// Why the option bytes were not programmed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error<E> {
     /// A register could not be reached.
     #[error(transparent)]
     Access(E),
-    /// Read-out protection of level 2, on the chip or wanted.
+    /// Level 2 of the read-out protection, on the chip or in the wanted option bytes.
     #[error("level 2 of the read-out protection cannot be undone; this tool leaves it alone")]
     Final,
-    /// SPRMOD is set.
+    /// SPRMOD is set on the chip or in the wanted option bytes.
     #[error("the chip has its sectors in PCROP mode, which this tool leaves alone")]
     Proprietary,
     /// The keys did not unlock the register.
@@ -52,7 +52,7 @@ pub enum Error<E> {
     /// The flash stays busy.
     #[error("the flash does not come to an end of what it does")]
     Busy,
-    /// They read back otherwise.
+    /// The option bytes differ from the wanted ones after programming.
     #[error("afterwards the option bytes are {0}")]
     Differs(OptionBytes),
 }
@@ -63,7 +63,7 @@ impl<E> From<E> for Error<E> {
     }
 }
 
-/// What the chip has.
+/// The option bytes of the chip.
 ///
 /// # Errors
 /// [`Error::Access`].
@@ -71,10 +71,11 @@ pub fn current<R: Registers>(registers: &mut R) -> Result<OptionBytes, Error<R::
     Ok(OptionBytes::from_register(registers.read(OPTCR)?))
 }
 
-/// Programs them, and locks them again. From level 1 to level 0 the chip erases all of its flash first.
+/// Programs the option bytes, and locks them again. For the change from level 1 to level 0 the chip first erases its
+/// whole flash.
 ///
 /// # Errors
-/// Nothing was changed, but for [`Error::Busy`], [`Error::Differs`], and perhaps [`Error::Access`].
+/// Nothing was changed, except after [`Error::Busy`], [`Error::Differs`], and perhaps [`Error::Access`].
 pub fn program<R: Registers>(registers: &mut R, wanted: OptionBytes) -> Result<(), Error<R::Error>> {
     admit(current(registers)?)?;
     admit(wanted)?;
@@ -116,7 +117,7 @@ mod tests {
 
     use super::*;
 
-    /// Answers as a chip does that is at once ready, and notes what was written.
+    /// A chip that is never busy, and notes the written values.
     struct Chip {
         optcr: u32,
         opens: bool,

@@ -8,7 +8,7 @@ use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Object, elf};
 use update::HEADER_LEN;
 
-/// What erased flash reads as.
+/// The value of erased flash.
 const ERASED: u8 = 0xFF;
 
 /// The address of the vector table of an application: after the header.
@@ -17,16 +17,17 @@ pub fn start() -> u32 {
     FLASH + LAYOUT.application().start() + HEADER_LEN as u32
 }
 
-/// The most code that there is room for, in bytes.
+/// The greatest size of the code, in bytes.
 #[must_use]
 pub fn most() -> usize {
     LAYOUT.longest_image() as usize - HEADER_LEN
 }
 
-/// The code in a file, as whole words: of an ELF file what is loaded into flash, anything else as it is.
+/// The code in a file, as whole words. Of an ELF file, the parts that are loaded into flash; of any other file, all
+/// bytes.
 ///
 /// # Errors
-/// Why it is no application.
+/// The reason why the file is no application.
 pub fn read(file: &[u8]) -> Result<Vec<u8>> {
     let mut code = if file.starts_with(&elf::ELFMAG) { flatten(file)? } else { file.to_vec() };
     ensure!(!code.is_empty(), "there is no code");
@@ -49,7 +50,7 @@ fn flatten(file: &[u8]) -> Result<Vec<u8>> {
     Ok(code)
 }
 
-/// Puts a segment where it is loaded. What lies between segments stays erased.
+/// Copies a segment to its load address. The gaps between segments stay erased.
 fn place(code: &mut Vec<u8>, address: u32, content: &[u8]) -> Result<()> {
     let room = address.checked_sub(start()).map(|at| at as usize..at as usize + content.len());
     let Some(room) = room.filter(|room| room.end <= most()) else {

@@ -4,12 +4,12 @@ use anyhow::{Context, Result, ensure};
 use ed25519_dalek::{Digest, Sha512, Signature, SigningKey, VerifyingKey};
 use update::{CONTEXT, Description, HEADER_LEN, Header};
 
-/// An image: header and code, as it is downloaded.
+/// An image as it is downloaded: header and code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// The header.
     pub header: Header,
-    /// The code, as long as the header says.
+    /// The code, in the length that the header tells.
     pub code: Vec<u8>,
 }
 
@@ -30,10 +30,10 @@ impl Image {
         [&self.header.encode()[..], &self.code].concat()
     }
 
-    /// The image in a file, checked but for its signature.
+    /// Reads the image in a file and checks everything except its signature.
     ///
     /// # Errors
-    /// What is wrong with it, in the words of 1F57h where a node would say the same.
+    /// The error in the image, in the words of 1F57h where a node would give the same error.
     pub fn read(bytes: &[u8]) -> Result<Image> {
         let (header, code) = bytes.split_first_chunk::<HEADER_LEN>().context("too short for a header")?;
         let header = Header::parse(header)?;
@@ -47,7 +47,7 @@ impl Image {
         Ok(Image { header, code: code.to_vec() })
     }
 
-    /// Whether the owner of this key has signed it.
+    /// Whether the image is signed with the secret half of this key.
     #[must_use]
     pub fn is_signed_by(&self, key: &VerifyingKey) -> bool {
         let signature = Signature::from_bytes(self.header.signature());

@@ -10,10 +10,10 @@ use ed25519_dalek::pkcs8::{DecodePrivateKey, EncodePrivateKey, KeypairBytes};
 use ed25519_dalek::{Digest, Sha512, SigningKey};
 use update::key::DEVELOPMENT_KEY_KNOWN_TO_EVERYBODY;
 
-/// What the development key is made from, so that it can be made again by anybody.
+/// The source of the development key, so that anybody can make it again.
 pub const DEVELOPMENT_SENTENCE: &str = "This development key is known to everybody and protects nothing.";
 
-/// Where the development key is.
+/// The path of the development key.
 #[must_use]
 pub fn development_path() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("keys/DEVELOPMENT-KEY-KNOWN-TO-EVERYBODY.pem")
@@ -37,7 +37,7 @@ pub fn is_development(key: &SigningKey) -> bool {
 /// A new key from the random numbers of the operating system.
 ///
 /// # Errors
-/// The operating system gives none.
+/// The operating system has no random numbers.
 pub fn random() -> Result<SigningKey> {
     let mut seed = [0; 32];
     getrandom::fill(&mut seed).map_err(|error| anyhow::anyhow!("no random numbers: {error}"))?;
@@ -54,19 +54,19 @@ pub fn read(path: &Path) -> Result<SigningKey> {
         .with_context(|| format!("{} is no Ed25519 key in PKCS#8", path.display()))
 }
 
-/// The text of a key file. Without the public half: OpenSSL does not read it with one.
+/// The text of a key file, without the public half: OpenSSL does not read a file with both halves.
 ///
 /// # Errors
-/// The encoder's.
+/// The errors of the encoder.
 pub fn pem(key: &SigningKey) -> Result<String> {
     let pair = KeypairBytes { secret_key: key.to_bytes(), public_key: None };
     Ok(pair.to_pkcs8_pem(LineEnding::LF).context("the key cannot be encoded")?.as_str().to_owned())
 }
 
-/// Writes a key to a new file, which nobody but its owner may read.
+/// Writes a key to a new file that only its owner may read.
 ///
 /// # Errors
-/// The file is there already, or cannot be written.
+/// The file exists already, or cannot be written.
 pub fn write(key: &SigningKey, path: &Path) -> Result<()> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);

@@ -1,6 +1,7 @@
-//! Signing keys and signed images for the field update: what `cargo xtask sign` does, for tests and other tools as well.
+//! Signing keys and signed images for the field update: the functions of `cargo xtask sign`, for tests and other tools
+//! as well.
 //!
-//! The format of an image is that of crate `update`; this crate adds the secret half.
+//! The crate `update` defines the format of an image; this crate adds the secret half.
 
 pub mod code;
 pub mod image;

@@ -1,4 +1,4 @@
-//! `cargo xtask sign`: makes keys, signs images, shows what is in one. docs/update.md tells the story.
+//! `cargo xtask sign`: makes keys, signs images, and shows their content (docs/update.md).
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

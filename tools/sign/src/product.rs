@@ -1,4 +1,4 @@
-//! What the application of this project says of itself where nobody says otherwise.
+//! The defaults in the header of this project's application.
 
 use anyhow::{Context, Result};
 use ed25519_dalek::SigningKey;
@@ -8,15 +8,15 @@ use crate::code;
 use crate::image::Image;
 use crate::key;
 
-/// The product that the bootloader answers to (1018h:2). An image has all personalities.
+/// The product code that the bootloader accepts (1018h:2). An image contains all personalities.
 pub const PRODUCT: u32 = product::BOARD;
-/// The hardware revisions that there are: 0.
+/// The set of hardware revisions, a bit for each: only revision 0 exists.
 pub const HARDWARE: u32 = 1;
 
 /// Reads a version as `1.2.3`.
 ///
 /// # Errors
-/// It is something else.
+/// The text is not a version.
 pub fn version(text: &str) -> Result<Version> {
     let numbers: Vec<u16> = text.split('.').map(str::parse).collect::<Result<_, _>>()?;
     let numbers: [u16; 3] = numbers.try_into().ok().context("three numbers with points between them")?;
@@ -24,7 +24,7 @@ pub fn version(text: &str) -> Result<Version> {
     Ok(Version { major, minor, patch })
 }
 
-/// The image of an application, signed with this key, of the version of this project.
+/// The image of an application in the version of this project, signed with this key.
 ///
 /// # Errors
 /// The file is no application.
@@ -34,7 +34,7 @@ pub fn image(file: &[u8], key: &SigningKey) -> Result<Image> {
     Image::sign(about, code::read(file)?, key)
 }
 
-/// The same, signed with the development key.
+/// The image of an application in the version of this project, signed with the development key.
 ///
 /// # Errors
 /// The file is no application.

@@ -1,4 +1,4 @@
-//! What the tool signs is what a node accepts.
+//! Tests that a node accepts the images that the tool signs.
 
 use bsp::update_layout::LAYOUT;
 use sign::image::Image;
@@ -18,7 +18,7 @@ fn target() -> Target {
     Target { layout: LAYOUT, product: 0x8271, hardware: 0, keys: &PUBLIC_KEYS }
 }
 
-/// An update of a node with the flash of the chip; what 1F57h reads at the end.
+/// Updates a node with the flash of the chip. Returns the value of 1F57h at the end.
 fn update(flash: &mut MockFlash, image: &[u8]) -> Status {
     let mut updater = Updater::new(flash, target(), Status::GOOD);
     let poll = |updater: &mut Updater<&mut MockFlash>| while updater.poll() != Next::Nothing {};
@@ -104,7 +104,7 @@ fn segment(offset: u32, address: u32, len: u32) -> Vec<u8> {
     [1, offset, address, address, len, len, 5, 4].iter().flat_map(|word: &u32| word.to_le_bytes()).collect()
 }
 
-/// An ELF file for Arm with these segments; all of them have the content of the file from byte 0 on.
+/// An ELF file for Arm with these segments. The content of each segment is the file itself, from byte 0 on.
 fn elf(segments: &[Vec<u8>]) -> Vec<u8> {
     let count = u16::try_from(segments.len()).unwrap();
     let head: [&[u8]; 4] =

@@ -14,7 +14,7 @@ fn value(len: usize) -> Vec<u8> {
     (0..len).map(|byte| (byte * 7 % 251) as u8).collect()
 }
 
-/// A loader with no program, so that it takes one at once.
+/// A loader without a program, which accepts a new program at once.
 fn empty() -> Wire<Loader> {
     Wire::new(Loader::new(3, &[]))
 }
@@ -33,7 +33,7 @@ fn lengths_around_segments_and_blocks() {
         let mut network = wire.network();
         write_and_read(&mut client(&mut network, 3), len);
         assert_eq!(wire.station(|loader| loader.flash().program.clone()), value(len), "{len}");
-        // Checking takes a moment; the domain can be read all the same.
+        // The loader checks the program for a moment. The domain can be read meanwhile.
         let object = at(PROGRAM.0, PROGRAM.1);
         assert_eq!(client(&mut network, 3).block_upload(object).unwrap(), value(len), "{len}");
         assert_eq!(client(&mut network, 3).upload(object).unwrap(), value(len), "{len}");
@@ -57,7 +57,8 @@ fn lost_segments_are_sent_again() {
         let wire = empty();
         let mut network = wire.network();
         network.pause(Duration::from_millis(10)).unwrap();
-        // Requests and answers arrive; segments do not always. In the middle of a transfer they are nearly all there is.
+        // Only segments are lost; requests and answers arrive. In the middle of a transfer nearly all frames are
+        // segments.
         let mut count = 0;
         wire.disturb(move |frame| {
             let is_segment = frame.len() == 8 && matches!(frame.data()[0] & 0x7F, 1..=0x7F);
@@ -81,7 +82,7 @@ fn every_nth_frame_lost_ends_with_the_value_or_with_an_error() {
         network.pause(Duration::from_millis(10)).unwrap();
         wire.lose_every(n);
         let object = at(PROGRAM.0, PROGRAM.1);
-        // The worse the line, the more ways to fail; what counts is that none is taken for success.
+        // A bad line may make the transfer fail. But a failed transfer must never count as success.
         if client(&mut network, 3).block_download(object, &value(3000), |_| ()).is_ok() {
             assert_eq!(wire.station(|loader| loader.flash().program.clone()), value(3000), "1 of {n}");
             arrived += 1;
@@ -105,7 +106,7 @@ fn a_server_without_blocks_refuses_by_protocol() {
 
 #[test]
 fn an_upload_that_was_changed_on_the_way_is_a_crc_error() {
-    // No bus does this; a faulty gateway may.
+    // A CAN bus does not change frames, but a faulty gateway may.
     let wire = empty();
     let mut network = wire.network();
     let object = at(PROGRAM.0, PROGRAM.1);

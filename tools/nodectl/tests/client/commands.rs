@@ -1,4 +1,4 @@
-//! The commands, in process: what they print and what they end with.
+//! Tests of the commands in this process: their output and their exit codes.
 
 use std::fs::File;
 
@@ -13,7 +13,7 @@ use crate::loader::{Loader, identification};
 use crate::pressure::Pressure;
 use crate::wire::Wire;
 
-/// Does a command; what it printed and how it ended.
+/// Runs a command. Returns its output and its result.
 pub(crate) fn run<S: nodectl::bus::Station + 'static>(
     wire: &Wire<S>,
     line: &[&str],
@@ -51,7 +51,7 @@ fn read_by_index_and_by_name() {
         printed(&wire, &["read", "--type", "os", "1017"]),
         "1017h:0 Producer heartbeat time = E8 03\n"
     );
-    // The unit is the one that the node has been set to.
+    // The unit is the one that the node is set to.
     printed(&wire, &["write", "6131:1", "0xFD4E0000"]);
     let line = printed(&wire, &["read", "--block", "Pressure span end"]);
     assert_eq!(line, "6149h:1 AI span end/Pressure span end = 10 mbar\n");
@@ -182,8 +182,8 @@ fn monitor_takes_pdos_and_reads_the_rest() {
     );
 }
 
-/// A lift unit as delivered is none of the virtual devices, and sends nothing. This one becomes all of them; nobody measures for it, so
-/// that it knows of no button.
+/// A new lift unit has no virtual device and sends nothing. This command gives it all virtual devices. No measurement
+/// is made in the test, so the unit knows of no button.
 const ALL_DEVICES: &[&str] = &["write", "--node", "16", "2305", "15"];
 
 #[test]
@@ -200,7 +200,7 @@ fn monitor_knows_the_pdos_of_a_lift_without_asking_anybody() {
     ] {
         assert!(lines.contains(expected), "{expected}: {lines}");
     }
-    // What has not changed is sent at a start only: another node, another start.
+    // Some values are sent at a start only, until they change. So the second part needs another node.
     let wire = Wire::new(Pressure::of(Personality::Lift, 16));
     printed(&wire, ALL_DEVICES);
     printed(&wire, &["nmt", "start", "--node", "16", "--no-wait"]);
@@ -210,7 +210,7 @@ fn monitor_knows_the_pdos_of_a_lift_without_asking_anybody() {
     assert!(run(&wire, &["monitor", "--lift", "--count", "0"]).1.is_ok());
 }
 
-/// TPDO 258 and 263: the data sheet says where they are.
+/// The data sheet tells where TPDO 258 and 263 are.
 #[test]
 fn monitor_finds_the_tpdos_of_a_lift_node() {
     let wire = Wire::new(Pressure::of(Personality::Lift, 16));
@@ -244,7 +244,8 @@ fn a_recording_as_a_stream_of_arrow_has_the_rows_of_the_table_with_types() {
     let file = |name: &str| format!("{}/{name}", env!("CARGO_TARGET_TMPDIR"));
     let (csv, arrow) = (file("typed.csv"), file("typed.arrows"));
     printed(&wire, &["write", "6132:1", "2"]);
-    // A number of a TPDO; read now and then: an integer without a sign, one with decimal digits, and a text.
+    // A number of a TPDO, and three objects that are read by SDO: an unsigned integer, an integer with decimal digits,
+    // and a text.
     let objects = ["6130:1", "1001", "7130:1", "1008"];
     let mut command = vec!["record", "--start", "--for", "3.5", "--csv", &csv, "--arrow", &arrow];
     command.extend(objects);
@@ -282,7 +283,7 @@ fn update_tells_what_was_there_and_what_is() {
     let (old, new) = (identification(b"1.0.0\n"), identification(b"1.1.0\nnew"));
     let expected = |node| format!("node {node}: 1.0.0 ({old:08X}h) -> 1.1.0 ({new:08X}h)\n");
     assert_eq!(printed(&wire, &["update", "--raw", &path, "-n", "3,4"]), expected(3) + &expected(4));
-    // Without --raw it must be an image of this project.
+    // Without --raw the file must be an image of this project.
     let (code, text) = failed(&wire, &["update", &path, "-n", "3"]);
     assert_eq!((code, text.contains("it has 9 bytes")), (7, true), "{text}");
     wire.station(|loaders| loaders[1].flash().verdict = 0x000E);

@@ -17,8 +17,8 @@ fn text(path: &str) -> String {
     std::fs::read_to_string(path).expect("a file")
 }
 
-/// What somebody changes in the field: a heartbeat, supervision, an event timer, a PDO with another mapping, one that is
-/// switched off, and words of the user.
+/// Changes that a user makes in the field: a heartbeat, supervision, an event timer, a PDO with another mapping, a PDO
+/// that is off, and the user's texts.
 fn configure(wire: &Wire<Pressure>, personality: Personality) {
     let sheet = eds::DEVICES.iter().find(|device| device.personality == personality).expect("a sheet").eds();
     let carried = sheet.entries().filter(|entry| entry.is_tpdo_mappable()).last().expect("a process value");
@@ -37,7 +37,7 @@ fn configure(wire: &Wire<Pressure>, personality: Personality) {
         printed(wire, &at_5(line));
     }
     if personality == Personality::Lift {
-        // Its pre-defined PDOs have a fixed mapping.
+        // The pre-defined PDOs of a lift have a fixed mapping.
         printed(wire, &at_5(&["write", "1881:5", "250"]));
         return;
     }
@@ -71,7 +71,7 @@ fn dump_apply_dump_is_the_same_for_every_personality() {
             text(&second).replace("-2.dcf", ""),
             "{personality:?}"
         );
-        // It survives a reset, and applying it again writes nothing.
+        // The configuration survives a reset. Applying it again writes nothing.
         printed(&fresh, &["nmt", "reset", "-n", "5"]);
         assert_eq!(printed(&fresh, &["apply", &first, "-n", "5"]), "node 5: has it already\n");
     }
@@ -110,7 +110,7 @@ fn a_mapping_is_made_in_one_command() {
         assert!(lines.contains(expected), "{expected}: {lines}");
     }
     assert_eq!(printed(&wire, &["unmap", "tpdo", "1"]), "node 1: TPDO 1 is off and empty\n");
-    // What cannot be mapped leaves the PDO on.
+    // A refused mapping leaves the PDO on.
     printed(&wire, &["map", "tpdo", "1", "6130:1"]);
     assert_eq!(failed(&wire, &["map", "tpdo", "1", "1017"]).0, 2);
     assert_eq!(failed(&wire, &["map", "tpdo", "1", "6130:1", "--transmission", "245"]).0, 1);

@@ -1,5 +1,5 @@
-//! A device that misbehaves in every way that its messages allow, and every command against it: each ends in time, with
-//! little memory, and nothing that the device says reaches the terminal as it is.
+//! A device that misbehaves in every way that its messages allow, with every command. Each command must end in time and
+//! with little memory, and no control character of the device may reach the terminal.
 
 use canopen::sdo::{
     BlockEnd, BlockSegment, BlockSize, Bytes, Initiate, Multiplexer, Request, Response, Segment,
@@ -10,7 +10,7 @@ use nodectl::bus::Station;
 use crate::commands::run;
 use crate::wire::Wire;
 
-/// What the device does instead of what it should do.
+/// The misbehaviour of the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Manner {
     Silent,
@@ -102,7 +102,7 @@ const MANNERS: [Manner; 41] = [
     LssRefusesAll,
 ];
 
-/// The device. What it answers to begins with what a good one would.
+/// The device. Its answers begin like the answers of a correct device.
 struct Hostile {
     manner: Manner,
     late: Vec<(Instant, Frame)>,
@@ -209,7 +209,8 @@ impl Hostile {
         }
     }
 
-    /// Segments of a block download look like requests; nobody but the device knows which they are.
+    /// Whether a request is a segment of a block download. Segments look like requests, and only the device can tell
+    /// them apart.
     fn is_segment_of_block(request: [u8; 8]) -> bool {
         matches!(request[0], 0x01..=0x0F | 0x81..=0x9F)
     }
@@ -313,7 +314,7 @@ impl Station for Hostile {
 /// The data sheet of a device with some hundred objects.
 const SHEET: &str = "../../eds/pressure.eds";
 
-/// Every command, and how long it may take in seconds. An update waits for flashes and restarts.
+/// Every command, and its time limit in seconds. An update waits for flashes and restarts.
 fn commands<'f>(file: &'f str, dcf: &'f str) -> Vec<(Vec<&'f str>, u64)> {
     vec![
         (vec!["scan"], 25),
@@ -367,7 +368,7 @@ fn every_command_survives_every_manner() {
     }
 }
 
-/// A transfer alone is over after its bound, to the second.
+/// A single transfer ends within its time limit, to the second.
 #[test]
 fn one_transfer_costs_ten_seconds_at_most() {
     for manner in MANNERS {

@@ -1,7 +1,7 @@
-//! A node with a program that can be replaced (CiA 302-3), on the server of crate `canopen`.
+//! A node with a program that can be replaced (CiA 302-3), on the server of the crate `canopen`.
 //!
-//! It behaves as devices in the field do: stopping and starting the program is not acknowledged, the node then answers
-//! in its new state; erasing takes time, in which SDO is served.
+//! The node behaves as devices in the field do. It does not acknowledge stopping and starting, and then answers in its
+//! new state. While it erases the flash, it serves SDO.
 
 use crate::wire::Answers;
 use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Object, Type};
@@ -47,43 +47,43 @@ const ROWS: &[Object] = &[
 
 const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
-/// From a command to the first answer in the new state.
+/// The time from a command to the first answer in the new state.
 const RESTART: Duration = Duration::from_millis(200);
-/// Erasing, and checking what was downloaded.
+/// The time of erasing, and below it the time of checking the downloaded program.
 const ERASE: Duration = Duration::from_millis(1500);
 const CHECK: Duration = Duration::from_millis(100);
 
-/// The program and what the loader knows about it.
+/// The program, and the state of the loader.
 #[derive(Clone, Debug)]
 pub(crate) struct Flash {
-    /// What was downloaded: an image is its version and a newline, then anything.
+    /// The downloaded program. An image is its version and a newline, then any bytes.
     pub(crate) program: Vec<u8>,
-    /// Whether block transfers are understood.
+    /// Whether the node supports block transfers.
     pub(crate) has_blocks: bool,
-    /// What 1F57h says after a download; 0 where the program is good.
+    /// The value of 1F57h after a download; 0 for a valid program.
     pub(crate) verdict: u32,
-    /// How often it was erased.
+    /// The number of times that the flash was erased.
     pub(crate) erased: usize,
-    /// Whether a new program is on trial, and whether this one is.
+    /// Whether new programs are on trial, and whether the present program is.
     pub(crate) has_trials: bool,
     pub(crate) is_on_trial: bool,
     /// The program that comes back when another one is started.
     pub(crate) takes_back: Option<Vec<u8>>,
-    /// The key of whoever may change the program, and what has become of the challenge of this start.
+    /// The key that authorises a change of the program, and the state of the challenge since this start.
     key: Option<[u8; 32]>,
     authorisation: Authorisation,
-    /// Commands of 1F51h as they came.
+    /// The received commands of 1F51h.
     pub(crate) commands: Vec<u8>,
     status: u32,
     busy_until: Instant,
     runs: bool,
-    /// The state after the restart that is under way.
+    /// The state after the restart in progress.
     next: Option<bool>,
     now: Instant,
 }
 
 impl Flash {
-    /// A start, at this time: another challenge.
+    /// Makes a new challenge at a start.
     fn challenge(&mut self, is_answered: bool) {
         let noise = [self.now.0 as u32, self.commands.len() as u32];
         let pair = self.key.map(|key| Pair::new(&key, &noise, SERIAL_NUMBER));
@@ -121,7 +121,7 @@ impl Flash {
     }
 }
 
-/// What stands in 1F56h: any function of the program will do.
+/// The value of 1F56h. Any function of the program will do.
 pub(crate) fn identification(program: &[u8]) -> u32 {
     program.iter().fold(1, |sum, &byte| sum.wrapping_mul(31).wrapping_add(byte.into()))
 }
@@ -161,11 +161,11 @@ impl Application for Flash {
     }
 }
 
-/// The node. It can be switched off.
+/// A node that can be switched off.
 pub(crate) struct Loader {
     id: NodeId,
     device: canopen::device!(Flash, ROWS),
-    /// When it is up again; `NEVER` while it is off.
+    /// The time at which the node is up again; `NEVER` while it is off.
     up: Instant,
     is_started: bool,
 }
@@ -202,14 +202,14 @@ impl Loader {
         self.device.application_mut()
     }
 
-    /// Switches it off until an instant. What was erased or half written stays so.
+    /// Switches the node off until an instant. An erased or half written flash stays as it is.
     pub(crate) fn switch_off(&mut self, until: Instant) {
         let runs = self.flash().runs;
         self.flash().challenge(false);
         self.restart(runs, until);
     }
 
-    /// Only whoever has this key may change the program from now on.
+    /// Demands an authorisation by this key from now on.
     pub(crate) fn set_key(&mut self, key: [u8; 32]) {
         self.flash().key = Some(key);
         self.flash().challenge(false);
@@ -221,7 +221,7 @@ impl Loader {
         (self.up, self.is_started) = (up, false);
     }
 
-    /// Brings the dictionary up to date.
+    /// Updates the objects from the state.
     fn publish(&mut self, now: Instant) {
         let flash = self.flash();
         let device_type = if flash.runs { 0x0002_0194_u32 } else { 0x424F_4F54 };
@@ -266,10 +266,10 @@ impl Station for Loader {
             let refusal = Response::Abort(at, Abort::Command.code()).encode();
             answers.0.extend(Frame::new(0x580 + u16::from(self.id.get()), &refusal));
         }
-        // A change of the program is not acknowledged.
+        // A command that changes the program is not acknowledged.
         match self.flash().next {
             Some(runs) => {
-                // The loader is open for whoever has stopped the program.
+                // The master that has stopped the program needs no second authorisation.
                 self.flash().challenge(!runs);
                 self.restart(runs, now + RESTART);
             }

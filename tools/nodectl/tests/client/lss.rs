@@ -1,4 +1,4 @@
-//! The LSS master with real nodes.
+//! Tests of the LSS master with real nodes.
 
 use canopen::client::lss as service;
 use canopen::lss::{BitRate, Identity};
@@ -35,7 +35,7 @@ fn fastscan_finds_one_after_the_other_and_gives_them_node_ids() {
         master.set_node_id(id).unwrap();
         master.release().unwrap();
     }
-    // The scan takes the branch with the bit clear where there is a choice.
+    // Where both values of a bit occur, the scan takes the clear bit first.
     assert_eq!(found, [0, 0x1234_5678, 0x1234_5679, 0xFFFF_FFFF]);
     for (serial, id) in found.iter().zip(11..) {
         assert_eq!(client(&mut network, id).upload(at(0x1018, 4)).unwrap(), serial.to_le_bytes());

@@ -1,4 +1,4 @@
-//! The library against nodes in this process, in virtual time.
+//! Tests of the library with nodes in this process, in virtual time.
 
 mod bad_input;
 mod blocks;

@@ -1,4 +1,4 @@
-//! Values as they are meant: units, decimal digits, words; and messages that help.
+//! Tests of scaled values: units, decimal digits, words. Also of hints in error messages.
 
 use node::Personality;
 
@@ -10,7 +10,7 @@ fn json(line: &str) -> serde_json::Value {
     serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"))
 }
 
-/// 6132h tells where the point is: 250 with two digits is 2.50 bar and not 250.
+/// 6132h tells the position of the decimal point: 250 with two digits is 2.50 bar and not 250.
 #[test]
 fn an_integer_with_a_unit_has_its_point() {
     for (personality, first) in [(Personality::Pressure, 0x6000_u16), (Personality::Combined, 0x6800)] {
@@ -19,13 +19,13 @@ fn an_integer_with_a_unit_has_its_point() {
         printed(&wire, &["write", &object(0x6132), "2"]);
         let line = printed(&wire, &["write", &object(0x7148), "250"]);
         assert!(line.ends_with("= 2.50 bar\n"), "{line}");
-        // With a point it is the value that is meant.
+        // A number with a decimal point is the scaled value.
         let line = printed(&wire, &["write", &object(0x7148), "-1.5"]);
         assert!(line.ends_with("= -1.50 bar\n"), "{line}");
         let value = json(&printed(&wire, &["--json", "read", &object(0x7148)]));
         assert_eq!((value["value"].as_f64(), value["raw"].as_i64()), (Some(-1.5), Some(-150)));
         assert_eq!(failed(&wire, &["write", &object(0x7148), "1.234"]).0, 2);
-        // The span of the INTEGER32, and REAL32, which has no digits.
+        // The object 9149h is an INTEGER32. A REAL32 below has no decimal digits.
         let line = printed(&wire, &["read", &object(0x9149)]);
         assert!(line.ends_with("= 21474836.47 bar\n"), "{line}");
         assert!(printed(&wire, &["read", &object(0x6149)]).ends_with("= 10 bar\n"));
@@ -36,7 +36,7 @@ fn an_integer_with_a_unit_has_its_point() {
     }
 }
 
-/// 6384h:1 is the measuring step of positions: the unit is a length, and not a code.
+/// 6384h:1 is the measuring step of positions. So the unit of a position is a length.
 #[test]
 fn a_position_of_a_lift_is_a_length() {
     let wire = Wire::new(Pressure::of(Personality::Lift, 1));
@@ -79,7 +79,7 @@ fn one_object_that_cannot_be_read_does_not_keep_the_others_from_it() {
     assert_eq!(error["abort"].as_u64(), Some(0x0602_0000));
 }
 
-/// The keys of a value are those of `read`, whoever tells it.
+/// All commands give values the same keys as `read`.
 #[test]
 fn values_have_one_schema() {
     let wire = Wire::new(Pressure::new(1));

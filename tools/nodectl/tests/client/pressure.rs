@@ -7,7 +7,7 @@ use storage::{Memory, Pages, Store, View};
 
 const PAGES: Pages = Pages::new(0, 4096);
 
-/// A pressure transmitter; it starts at the first poll and restarts when it is told to.
+/// A pressure transmitter. It starts at the first poll and restarts on command.
 pub(crate) struct Pressure {
     setup: Setup,
     protocol: Protocol,
@@ -16,12 +16,12 @@ pub(crate) struct Pressure {
 }
 
 impl Pressure {
-    /// A node as it comes from the factory; `None` for one that waits for LSS.
+    /// A node as delivered; with `None` it has no node-ID and waits for LSS.
     pub(crate) fn new(id: impl Into<Option<u8>>) -> Pressure {
         Pressure::of(Personality::Pressure, id)
     }
 
-    /// The same node as something else.
+    /// The same node with another personality.
     pub(crate) fn of(personality: Personality, id: impl Into<Option<u8>>) -> Pressure {
         let setup = Setup {
             personality,
@@ -35,7 +35,7 @@ impl Pressure {
         Pressure::with_flash(setup, vec![0xFF; 8192])
     }
 
-    /// The same with another serial number.
+    /// The same node with another serial number.
     pub(crate) fn with_serial(self, serial_number: u32) -> Pressure {
         Pressure::with_flash(Setup { serial_number, ..self.setup }, self.store.into_flash().0)
     }
@@ -43,7 +43,7 @@ impl Pressure {
     fn with_flash(setup: Setup, flash: Vec<u8>) -> Pressure {
         let mut view = View::open(Memory(flash), PAGES).expect("pages");
         let record = view.device().expect("a record or none");
-        // What LSS has stored of the device comes before what the factory has set.
+        // Values that LSS has stored have priority over the factory values.
         let stored = record.map_or(setup, |record| Setup {
             node_id: NodeId::new(record.node_id()),
             bit_rate: BitRate::from_kbit(record.bit_rate_kbit()).expect("a bit rate"),
@@ -77,7 +77,7 @@ impl Pressure {
 
     fn save(&mut self, now: Instant, out: &mut impl Transmit) {
         let mut job = StoreJob::new(Personality::default());
-        // As in the firmware, a job may wait for the values of new parameters.
+        // As in the firmware, a job may have to wait for the values of new parameters.
         let is_taken = (0..4).any(|_| {
             let is_taken = self.protocol.take_job(&mut job);
             if !is_taken {

@@ -1,4 +1,4 @@
-//! The program as a process: exit codes, and the way onto a bus over TCP.
+//! Tests of the program as a process: exit codes, and the connection to a bus over TCP.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -43,7 +43,7 @@ fn the_help_lists_the_exit_codes() {
     assert!(help.contains("Exit codes:\n  0  done\n"));
 }
 
-/// Every command is completed in every shell, and has a manual page.
+/// Every command has shell completions and a manual page.
 #[test]
 fn shells_and_man_know_every_command() {
     const COMMANDS: [&str; 5] = ["scan", "trace", "lss", "update", "check"];
@@ -84,7 +84,7 @@ fn a_wrong_command_line_is_2_and_a_bus_that_is_not_there_4() {
     ] {
         assert_eq!(nodectl("socketcan:none", line).0, 2, "{line:?}");
     }
-    // Nobody listens on port 1.
+    // No program listens on port 1.
     let (code, out, error) = nodectl("socketcand://127.0.0.1:1/vcan0", &["scan"]);
     assert_eq!((code, out.as_str()), (4, ""));
     assert!(error.starts_with("nodectl: cannot open socketcand://127.0.0.1:1/vcan0: "), "{error}");
@@ -108,7 +108,7 @@ fn a_socketcand_daemon_is_a_bus() {
     assert_eq!((code, error.contains("no such bus")), (4, true), "{error}");
 }
 
-/// A wrong scheme in front of the right port is told with the right one.
+/// For a wrong scheme with the right port, the error names the right scheme.
 #[test]
 fn slcan_at_a_socketcand_daemon_is_told() {
     let address = daemon().replace("socketcand", "slcan").replace("/vcan0", "");
@@ -120,7 +120,7 @@ fn slcan_at_a_socketcand_daemon_is_told() {
     );
 }
 
-/// A daemon with a node behind it, for as long as the test runs. Its address.
+/// A daemon with a node, for the time of the test. Returns its address.
 fn daemon() -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = listener.local_addr().expect("an address").port();
@@ -132,7 +132,7 @@ fn daemon() -> String {
     format!("socketcand://127.0.0.1:{port}/vcan0")
 }
 
-/// Answers until the client is gone. The node has time of its own, which goes on with each frame.
+/// Answers until the client is gone. The node has a time of its own, which advances with each frame.
 fn serve(mut stream: TcpStream) {
     let mut bus = Simulated::new(Pressure::new(1));
     let mut say = |text: &str| stream.write_all(text.as_bytes()).expect("a client");
@@ -151,7 +151,7 @@ fn serve(mut stream: TcpStream) {
     }
 }
 
-/// What is between two brackets; `None` when the client is gone.
+/// The text between two brackets; `None` when the client is gone.
 fn message(reader: &mut TcpStream) -> Option<String> {
     let (mut text, mut byte) = (String::new(), [0]);
     while reader.read_exact(&mut byte).is_ok() {
@@ -164,7 +164,7 @@ fn message(reader: &mut TcpStream) -> Option<String> {
     None
 }
 
-/// What the node sends when it gets a frame.
+/// The frames of the node in answer to a frame.
 fn frames(bus: &mut Simulated<Pressure>, id: &str, bytes: &[&str]) -> String {
     let hex = |text: &&str| u8::from_str_radix(text, 16).expect("a byte");
     let id = u16::from_str_radix(id, 16).expect("an identifier");

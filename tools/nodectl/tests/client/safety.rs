@@ -1,4 +1,4 @@
-//! Commands that could do harm: to a bus, to a terminal, to a file.
+//! Tests of commands that could do harm to a bus, a terminal or a file.
 
 use canopen::{Duration, Frame, Instant, Transmit};
 use nodectl::bus::Station;
@@ -39,7 +39,7 @@ fn a_node_id_is_not_given_to_more_than_one_node() {
                 assert!(text.contains(&name), "{text}");
             }
         }
-        // Nobody is left in the state configuration, and nobody has a new node-ID.
+        // No node stays in the state Configuration, and no node has a new node-ID.
         let select = |serial| format!("0:1:0x10000:{serial}");
         for (node, serial) in nodes.into_iter().zip([1, 2]) {
             let line = printed(&wire, &["lss", "inquire", "--select", &select(serial), "--json"]);
@@ -54,7 +54,7 @@ fn a_node_id_that_is_in_use_is_refused() {
     let wire = Wire::new(vec![with_serial(5, 1), with_serial(6, 2)]);
     let (code, text) = failed(&wire, &["lss", "set-id", "6", "--select", "0:1:0x10000:1"]);
     assert_eq!((code, text.as_str()), (2, "node-ID 6 is in use by another node"));
-    // Its own is no other's.
+    // The node-ID of the selected node itself is accepted.
     printed(&wire, &["lss", "set-id", "6", "--select", "0:1:0x10000:2"]);
 }
 
@@ -98,7 +98,8 @@ fn a_scan_numbers_all_nodes_past_those_in_use_and_lets_them_keep_it() {
     }
 }
 
-/// Answers of slaves that come too late for a step of 5 ms: slower steps find them, and nobody says that nobody is there.
+/// Answers come too late for a step of 5 ms. Slower steps then find the slaves, and the command does not say that there
+/// are none.
 #[test]
 fn slaves_behind_a_slow_gateway_are_found() {
     struct Slow {
@@ -129,10 +130,10 @@ fn slaves_behind_a_slow_gateway_are_found() {
 
 const EVIL: &[u8] = b"\x1b]0;x\x07\r\nnode 9\x9b";
 
-/// The device name is written by whoever has the device.
+/// A device with control characters in its name: the owner of a device can write the name.
 fn evil(serial: u32) -> Wire<Pressure> {
     let wire = Wire::new(with_serial(1, serial));
-    // The answer to a read of 1008h, 28 bytes in segments, becomes text that a terminal would obey.
+    // The answer to a read of 1008h (28 bytes in segments) becomes a text with control characters.
     let mut place = 0;
     wire.disturb(move |frame| match frame.data() {
         [0x41, 0x08, 0x10, ..] if frame.id() == 0x581 => {
@@ -156,7 +157,7 @@ fn what_a_device_says_does_not_reach_the_terminal_as_it_is() {
         assert!(text.contains("\\x1b]0;x\\x07\\r\\n"), "{text:?}");
         assert!(text.chars().all(|char| char == '\n' || !char.is_control()), "{line:?}: {text:?}");
     }
-    // JSON has the text as it is, in its own way of writing it.
+    // JSON has the text unchanged, with its own escapes.
     let text = printed(&evil(1), &["read", "1008", "--json"]);
     assert!(text.contains("\\u001b") && !text.contains('\u{1b}'), "{text:?}");
 }
@@ -189,7 +190,7 @@ fn a_data_sheet_is_read_before_anything_is_done() {
 fn a_file_stays_until_its_replacement_is_complete() {
     let file = path("kept.csv");
     std::fs::write(&file, "precious").unwrap();
-    // A node that is not there, and one that sends nothing.
+    // A node that does not exist, and a node that sends nothing.
     let wire = Wire::new(Pressure::new(1));
     assert_eq!(failed(&wire, &["record", "-n", "9", "--csv", &file]).0, 3);
     let (code, text) = failed(&wire, &["record", "--for", "2", "--csv", &file]);
@@ -237,7 +238,7 @@ fn times_of_a_recording_do_not_go_backwards() {
     assert!(times.len() > 300 && times.is_sorted(), "{} rows", times.len());
 }
 
-/// The node was lost while it erased: the next update waits until it is done.
+/// The node was lost while it erased its flash: the next update waits until the node has finished.
 #[test]
 fn an_update_waits_for_a_node_that_is_busy() {
     let wire = Wire::new(vec![Loader::new(3, b"1.0.0\n")]);

@@ -1,4 +1,4 @@
-//! What `nodectl trace` makes of the frames on a bus.
+//! Tests of the lines of `nodectl trace`.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::commands::{failed, printed};
 use crate::pressure::Pressure;
 use crate::wire::Wire;
 
-/// Decodes frames a millisecond apart, of a node 5 that is a pressure transmitter as delivered.
+/// Decodes frames a millisecond apart. Node 5 is a pressure transmitter as delivered.
 fn decoded(frames: &[(u16, &[u8])]) -> Vec<Line> {
     let mut decoder = Decoder::default();
     let sheet = Catalogue::of_file("pressure.eds").expect("a data sheet");
@@ -90,7 +90,7 @@ fn values_of_a_pdo_have_names_and_units_and_follow_the_mapping() {
         "TPDO 1: Pressure process value = 2.5 bar, Temperature process value = 25 \u{b0}C"
     );
     assert_eq!(lines[0].values.len(), 2);
-    // Somebody maps the status of the first channel instead, as CiA 301 wants it done.
+    // A master maps the status of the first channel instead, in the steps of CiA 301.
     let write = |command: u8, index: u16, sub: u8, data: u32| {
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), data.to_le_bytes());
         [command, low, high, sub, a, b, c, d]
@@ -113,7 +113,7 @@ fn values_of_a_pdo_have_names_and_units_and_follow_the_mapping() {
     }
     frames.push((0x185, &[1]));
     let texts = texts(&frames);
-    // Switched off, it is nobody's PDO any more.
+    // While the PDO is off, the frame belongs to no PDO of a known node.
     assert_eq!(texts[1], "TPDO 1: 01");
     assert_eq!(texts.last().map(String::as_str), Some("TPDO 1: Pressure status = 1 [not valid]"));
 }
@@ -140,7 +140,7 @@ fn a_transfer_is_one_line() {
     assert_eq!(texts(&twice), ["read 1000h:0 Device type: no answer"]);
 }
 
-/// A block download of which a segment is lost and comes again: 20 bytes in three segments.
+/// A block download with a lost segment that is repeated: 20 bytes in three segments.
 #[test]
 fn blocks_are_folded_and_what_came_twice_counts_once() {
     let segment = |number: u8| {
@@ -167,7 +167,7 @@ fn blocks_are_folded_and_what_came_twice_counts_once() {
         lines[0].text.contains("(blocks, 9.000 ms)") && lines[0].text.starts_with("write 1F50h:1 "),
         "{lines:?}"
     );
-    // A segment whose first byte is that of an abort would be number 0, which there is not.
+    // A segment with the first byte of an abort would have number 0, which does not exist.
     let given_up: Vec<(u16, &[u8])> = vec![
         (0x605, &[0xC6, 0x50, 0x1F, 1, 20, 0, 0, 0]),
         (0x585, &[0xA4, 0x50, 0x1F, 1, 127, 0, 0, 0]),
@@ -178,7 +178,7 @@ fn blocks_are_folded_and_what_came_twice_counts_once() {
     assert!(lines[0].text.contains("given up, 0800 0000h"), "{lines:?}");
 }
 
-/// Whatever is on the bus, the decoder says something and goes on; the same frames give the same lines.
+/// The decoder accepts any frames. The same frames give the same lines.
 #[test]
 fn any_frames_are_taken() {
     let mut random = 0x2545_F491_4F6C_DD1D_u64;

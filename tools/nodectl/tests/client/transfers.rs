@@ -1,4 +1,4 @@
-//! Expedited and segmented transfers with the real node, on good and bad lines.
+//! Tests of expedited and segmented transfers with the real node, on good and bad lines.
 
 use canopen::Duration;
 use canopen::client::sdo;

@@ -1,4 +1,4 @@
-//! Updates of nodes that are well, ill, or gone halfway.
+//! Tests of updates of nodes that work, that fail, and that are lost halfway.
 
 use canopen::{Duration, Instant, NodeId};
 use nodectl::sdo;
@@ -7,7 +7,7 @@ use nodectl::update::{Error, Image, ImageInfo, Options, Outcome, Step, Version, 
 use crate::loader::{Loader, identification};
 use crate::wire::{Fate, Wire};
 
-/// What was told.
+/// The reports of an update.
 #[derive(Default)]
 struct Diary {
     steps: Vec<(u8, Step)>,
@@ -68,7 +68,7 @@ fn run(wire: &Wire<Vec<Loader>>, ids: &[u8], image: &Image, options: &Options, d
     update(&mut wire.network(), &nodes(ids), image, options, diary)
 }
 
-/// The update of node 3 alone.
+/// Updates node 3 alone.
 fn one(
     wire: &Wire<Vec<Loader>>,
     image: &Image,
@@ -103,7 +103,7 @@ fn the_sequence_of_cia_302() {
     );
 }
 
-/// The key of a node that wants to know who changes its program.
+/// The key of a node that demands an authorisation.
 const KEY: [u8; 32] = [0x5A; 32];
 
 fn with_key() -> Options {
@@ -146,7 +146,7 @@ fn a_program_on_trial_is_confirmed_unless_that_is_not_wanted() {
     let left = Options { confirm: false, force: true, ..options() };
     let outcome = one(&wire, &image(OLD), &left, &mut Diary::default()).unwrap();
     assert!(outcome.is_on_trial && wire.station(|loaders| loaders[0].flash().is_on_trial));
-    // Who comes later and finds the program there ends its trial.
+    // A later update that finds the program on the node ends its trial.
     let outcome = one(&wire, &image(OLD), &options(), &mut Diary::default()).unwrap();
     assert!(!outcome.is_on_trial && !outcome.is_changed);
     assert!(!wire.station(|loaders| loaders[0].flash().is_on_trial));
@@ -244,7 +244,7 @@ fn another_identification_than_that_of_the_image_is_not_started() {
 
 #[test]
 fn a_bus_that_breaks_at_any_frame_is_opened_again_and_the_update_gone_on_with() {
-    // The frames of an undisturbed update; every 97th of them is enough.
+    // The bus breaks at one frame of the update, and that for every 97th frame: trying all frames would take too long.
     let count = std::rc::Rc::new(std::cell::Cell::new(0));
     let (wire, seen) = (fleet(&[3]), count.clone());
     wire.disturb(move |_| {
@@ -267,7 +267,7 @@ fn a_bus_that_breaks_at_any_frame_is_opened_again_and_the_update_gone_on_with() 
     }
 }
 
-/// Switches a node off for a while as soon as some of the program has arrived.
+/// Switches a node off for a while when a part of the program has arrived.
 struct Switch<'a> {
     wire: &'a Wire<Vec<Loader>>,
     diary: Diary,
@@ -303,7 +303,7 @@ fn switched_off(until: Instant) -> (Diary, Results) {
 
 #[test]
 fn four_nodes_of_which_one_is_switched_off_halfway_and_gone_on_with() {
-    // Longer than a node may stay away while others wait.
+    // The node is off for longer than an update waits while others have their turn.
     let (diary, results) = switched_off(Instant(40_000_000));
     let order: Vec<u8> = results.iter().map(|(node, _)| node.get()).collect();
     assert_eq!(order, [3, 5, 6, 4]);
@@ -317,7 +317,7 @@ fn four_nodes_of_which_one_is_switched_off_halfway_and_gone_on_with() {
     assert!(steps.ends_with(&[Step::Clear, Step::Download, Step::Verify, Step::Start]), "{steps:?}");
 }
 
-/// Its challenge is another one after that.
+/// The node has another challenge after it was off.
 #[test]
 fn a_guarded_node_that_is_switched_off_halfway_is_gone_on_with() {
     let wire = fleet(&[3]);

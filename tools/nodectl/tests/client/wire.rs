@@ -1,4 +1,4 @@
-//! A bus that the test can look into, disturb and break while a client uses it.
+//! A bus that a test can inspect, disturb and break while a client uses it.
 
 use std::cell::RefCell;
 use std::io;
@@ -9,20 +9,20 @@ use nodectl::Network;
 use nodectl::bus::{Bus, BusError, Received, Simulated, Station};
 use nodectl::sdo::{Client, Options};
 
-/// What the bus does to a frame, by the frame.
+/// The fate of each frame.
 type Fault = Box<dyn FnMut(&Frame) -> Fate>;
 
-/// What happens to a frame.
+/// The fate of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
     Arrives,
     IsLost,
     BecomesAnother(Frame),
-    /// The client's way to the bus breaks at this frame.
+    /// The client's connection to the bus breaks at this frame.
     BreaksTheBus,
 }
 
-/// What a device sends, in a queue that is never full.
+/// The frames of a device, in a queue that is never full.
 #[derive(Default)]
 pub(crate) struct Answers(pub(crate) Vec<Frame>);
 
@@ -43,7 +43,7 @@ struct State<S> {
     broken: bool,
 }
 
-/// The bus. Clones are the same bus.
+/// A simulated bus. Clones share the bus.
 pub(crate) struct Wire<S>(Rc<RefCell<State<S>>>);
 
 impl<S: Station + 'static> Wire<S> {
@@ -52,7 +52,7 @@ impl<S: Station + 'static> Wire<S> {
         Wire(Rc::new(RefCell::new(State { bus: Simulated::new(station), fault, broken: false })))
     }
 
-    /// From now on this happens to frames in both directions.
+    /// Sets the fate of the frames in both directions.
     pub(crate) fn disturb(&self, fault: impl FnMut(&Frame) -> Fate + 'static) {
         self.0.borrow_mut().fault = Box::new(fault);
     }
@@ -66,12 +66,12 @@ impl<S: Station + 'static> Wire<S> {
         });
     }
 
-    /// Looks at the station.
+    /// Gives access to the station.
     pub(crate) fn station<T>(&self, look: impl FnOnce(&mut S) -> T) -> T {
         look(&mut self.0.borrow_mut().bus.station)
     }
 
-    /// A client's side of the bus. Opening it again repairs it.
+    /// A client's connection to the bus. Opening it again repairs the connection.
     pub(crate) fn network(&self) -> Network {
         let this = Wire(Rc::clone(&self.0));
         Network::open(move || {
@@ -122,7 +122,7 @@ impl<S: Station> Bus for Wire<S> {
     }
 }
 
-/// A client with the usual patience for an answer, and with time for many of them.
+/// A client with the usual time-out for an answer, and with a long time limit for a transfer.
 pub(crate) fn client(network: &mut Network, node: u8) -> Client<'_> {
     let (timeout, limit) = (Duration::from_millis(500), Duration::from_millis(60_000));
     let options = Options { timeout, limit, ..Options::default() };

@@ -1,5 +1,5 @@
-//! Clients that are no pages of this server, or pages that behave badly, over real sockets: what they get, and that they cost the
-//! others nothing.
+//! Tests with hostile clients over real sockets: clients that are no page of this server, and pages that behave badly.
+//! The tests check the answers to them, and that they do not disturb other pages.
 
 mod socket;
 
@@ -11,7 +11,7 @@ use page::{FromPage, Hub, Options, PageId, Server};
 
 use socket::{PATIENCE, Socket, connect, request};
 
-/// A server, and what its pages do.
+/// A server, and the actions of its pages.
 struct Bench {
     server: Server,
     news: Receiver<FromPage>,
@@ -37,14 +37,14 @@ impl Bench {
         self.news.recv_timeout(PATIENCE).unwrap()
     }
 
-    /// The token as the page has it.
+    /// The token in the page.
     fn token(&self) -> String {
         let page = request(self.address(), "GET /", &[&format!("Host: {}", self.address())]).body;
         let start = page.find("name=\"token\" content=\"").expect("a token in the page") + 22;
         page[start..start + 32].to_owned()
     }
 
-    /// A page that is connected.
+    /// A connected page.
     fn page(&self, query: &str) -> (Socket, PageId, bool) {
         let socket = Socket::open(self.address(), query).unwrap();
         loop {
@@ -110,8 +110,8 @@ fn a_name_that_somebody_points_at_this_machine_gets_nothing() {
     assert_eq!(request(bench.address(), "POST /", &[&own]).status, 405);
 }
 
-/// Connections that say nothing, half a request, half a frame or nonsense, a page that floods, and pages that never read: all of
-/// them are there while a page gets what it is to get.
+/// Many hostile clients are connected at the same time: silent connections, half a request, half a frame, nonsense, a
+/// page that floods, and pages that never read. Another page still gets all of its messages.
 #[test]
 fn whatever_others_do_a_page_loses_nothing() {
     let bench = Bench::new();
@@ -123,7 +123,7 @@ fn whatever_others_do_a_page_loses_nothing() {
     nonsense.write_all(&[0xFF; 4096]).unwrap();
     let mut sockets: Vec<(Socket, PageId)> =
         (0..6).map(|_| bench.page("")).map(|(s, page, _)| (s, page)).collect();
-    // An unmasked frame, a reserved operation, half a frame, more than there may be, and two that will not read.
+    // An unmasked frame, a reserved operation, half a frame, a frame that is too large, and two pages that do not read.
     sockets[0].0.send_raw(&[0x81, 0x01, b'x']);
     sockets[1].0.send_raw(&[0xBF, 0x80, 0, 0, 0, 0]);
     sockets[2].0.send_raw(&[0x81, 0xFE, 0x10]);
@@ -131,7 +131,8 @@ fn whatever_others_do_a_page_loses_nothing() {
     let flood = bench.page("").0;
     let flooding = std::thread::spawn(move || {
         let mut flood = flood;
-        // The server reads no more than its rate; the rest waits in the queue of who has sent it, and goes with the connection.
+        // The server reads at its limited rate. The other messages wait in the sender's queue, and are dropped with the
+        // connection.
         (0..2000).take_while(|_| flood.send(1, b"{\"id\":1,\"do\":\"nothing\"}")).count()
     });
     let big = "x".repeat(64 * 1024);

@@ -1,10 +1,10 @@
-//! A client in bytes: what a browser sends, and what no browser would.
+//! A client that works on bytes, so that it can also send what a browser never sends.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
-/// Of the host. A test that waits so long has failed, however busy the machine is.
+/// The time-out for an answer of the server. It is long enough for a busy machine.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// An answer to a request.
@@ -20,7 +20,7 @@ pub(crate) fn connect(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// A request with these header lines, on a connection of its own.
+/// Sends a request with these header lines on a connection of its own.
 pub(crate) fn request(address: SocketAddr, line: &str, headers: &[&str]) -> Answer {
     let mut stream = connect(address);
     let headers: String = headers.iter().map(|header| format!("{header}\r\n")).collect();
@@ -33,11 +33,11 @@ pub(crate) fn request(address: SocketAddr, line: &str, headers: &[&str]) -> Answ
     Answer { status, head: head.to_lowercase(), body: body.to_owned() }
 }
 
-/// A WebSocket. Client frames are masked with zeros, which changes nothing.
+/// A WebSocket. Client frames are masked with zeros, which leaves the data unchanged.
 pub(crate) struct Socket(TcpStream);
 
 impl Socket {
-    /// Connects as a page of this server does; `Err` with the status when that is refused.
+    /// Connects like a page of this server; `Err` with the status when the connection is refused.
     pub(crate) fn open(address: SocketAddr, query: &str) -> Result<Socket, u16> {
         Socket::open_from(address, query, &format!("http://{address}"))
     }
@@ -60,7 +60,7 @@ impl Socket {
         if status == 101 { Ok(Socket(stream)) } else { Err(status) }
     }
 
-    /// A frame: 1 is text, 2 binary, 8 close. Whether the other side still takes it.
+    /// Sends a frame: 1 is text, 2 binary, 8 close. Returns whether the other side still accepts frames.
     pub(crate) fn send(&mut self, kind: u8, data: &[u8]) -> bool {
         let mut frame = vec![0x80 | kind];
         match data.len() {
@@ -75,7 +75,7 @@ impl Socket {
         self.0.write_all(&frame).is_ok()
     }
 
-    /// Bytes as they are.
+    /// Sends bytes without a frame around them.
     pub(crate) fn send_raw(&mut self, bytes: &[u8]) -> bool {
         self.0.write_all(bytes).is_ok()
     }

@@ -1,4 +1,4 @@
-//! The command: what it prints, writes and ends with.
+//! The command `check`: its output, its files and its exit code.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use super::layers::{reads, swallows};
 use crate::commands::{failed, printed, run};
 use crate::wire::Wire;
 
-/// A file of this test alone.
+/// A file for one test.
 fn file(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("nodectl-check-{}-{name}", std::process::id()))
 }
@@ -130,7 +130,7 @@ fn what_is_no_check_and_who_does_not_answer_is_told() {
     assert_eq!(code, 3, "{text}");
 }
 
-/// Everything is as before: values, mappings, what is saved, and the state.
+/// Values, mappings, saved values and the state are as before the run.
 #[test]
 fn a_whole_run_leaves_the_device_as_it_was() {
     let (eds, wire) = (sheet("as-before.eds"), good());
@@ -157,7 +157,7 @@ fn a_whole_run_leaves_the_device_as_it_was() {
     printed(&wire, &["--node", "5", "--eds", &eds, "check", "--yes"]);
     assert_eq!(dump("after.dcf"), before);
     assert_eq!(wire.station(|station| station.state()), canopen::nmt::State::Operational);
-    // What was saved is what was saved before; what was not saved is gone with a restart.
+    // The saved values are the same as before the run. Values that were not saved are lost with a restart.
     printed(&wire, &["--node", "5", "nmt", "reset"]);
     let values = printed(&wire, &["--node", "5", "--eds", &eds, "read", "1017", "2003", "1007"]);
     assert!(values.contains("= 700") && values.contains("= 77 ") && values.contains("= 0"), "{values}");

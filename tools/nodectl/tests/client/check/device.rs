@@ -1,5 +1,5 @@
-//! A device on the library's own device, with everything that a check asks for: also node guarding, a SYNC producer and sub-index
-//! FFh, which the library leaves out.
+//! A device based on the library's own device, with everything that a check needs. It adds node guarding, a SYNC
+//! producer and sub-index FFh, which the library leaves out.
 
 use crate::wire::Answers;
 use canopen::dictionary::{Access, DefaultValue, Dictionary, Entry, Group, Mapping, Object, Sizes, Type};
@@ -8,9 +8,9 @@ use canopen::{
 };
 use nodectl::check::Profile;
 
-/// Its node-ID.
+/// The node-ID of the device.
 pub(super) const ID: u8 = 5;
-/// What its data sheet is told by.
+/// The identity by which the data sheet is found.
 const VENDOR: u32 = 0x1A2;
 const PRODUCT: u32 = 0x77;
 const REVISION: u32 = 0x0001_0003;
@@ -67,7 +67,7 @@ const OTHERS: [Object; 12] = [
     input(0x2010, 2, Type::Integer32).value(0x0765_4321),
 ];
 
-/// The rows that every device has, with those of a profile.
+/// The rows of every device and the rows of a profile.
 macro_rules! device {
     ($type:expr, $rows:expr) => {{
         const ROWS: &[Object] = canopen::rows!(
@@ -153,7 +153,7 @@ pub(super) fn table(profile: Option<Profile>) -> Table {
     }
 }
 
-/// The data sheet of the device of a profile, as the library writes it and the reader reads it.
+/// The data sheet of a device of a profile, as the library writes it and the reader of this crate reads it.
 pub(super) fn sheet(profile: Option<Profile>) -> eds::Eds {
     let mut text = String::new();
     let info = canopen::eds::DeviceInfo { vendor: "Test", product: "a device" };
@@ -161,7 +161,7 @@ pub(super) fn sheet(profile: Option<Profile>) -> eds::Eds {
     eds::Eds::from_bytes(text.as_bytes()).expect("a data sheet")
 }
 
-/// What is stored, by group.
+/// The stored parameters, by group.
 #[derive(Default)]
 pub(super) struct App {
     stored: [Vec<u8>; 3],
@@ -177,19 +177,19 @@ impl Application for App {
     }
 }
 
-/// Bytes of the image of any of the dictionaries.
+/// The size of the largest dictionary image, in bytes.
 const SIZE: usize = 2048;
-/// Enough for any of them.
+/// Sizes that suffice for every dictionary.
 const ROOM: Sizes = Sizes { image: SIZE, tpdos: 8, rpdos: 8, watches: 4, scanned: 48 };
 
-/// The device, with what the library leaves out.
+/// The library's device with the additions.
 pub(super) struct Whole {
     dictionary: &'static Dictionary,
     device: canopen::device!(App, room: ROOM),
     out: Answers,
     is_started: bool,
     toggle: bool,
-    /// When the master is lost.
+    /// The time at which the master counts as lost.
     life: Instant,
     produces_sync: bool,
     next_sync: Instant,
@@ -216,7 +216,7 @@ impl Whole {
         self.device.state()
     }
 
-    /// Forgets what is stored.
+    /// Clears the stored parameters.
     pub(super) fn forget(&mut self) {
         self.device.application_mut().stored = Default::default();
     }
@@ -313,7 +313,7 @@ impl Whole {
         }
     }
 
-    /// Sub-index FFh of 1018h: a record.
+    /// The answer for sub-index FFh of 1018h: a record.
     fn structure(&self, frame: &Frame) -> Option<Frame> {
         let is_asked =
             frame.id() == 0x600 + u16::from(ID) && frame.data().starts_with(&[0x40, 0x18, 0x10, 0xFF]);
@@ -322,7 +322,7 @@ impl Whole {
             .then(|| Frame::new(0x580 + u16::from(ID), &answer).expect("a frame"))
     }
 
-    /// Bit 30 of 1005h is kept here: the library's device is no producer.
+    /// Bit 30 of 1005h is kept here, because the library's device is no SYNC producer.
     fn sync_cob_id(&mut self, frame: &Frame, now: Instant) -> Frame {
         let is_written =
             frame.id() == 0x600 + u16::from(ID) && frame.data().starts_with(&[0x23, 0x05, 0x10, 0]);
@@ -337,7 +337,7 @@ impl Whole {
         Frame::new(frame.id(), &data).expect("a frame")
     }
 
-    /// An upload of 1005h shows the bit.
+    /// Adds bit 30 to the answer of an upload of 1005h.
     fn show_producer(&mut self) {
         for frame in &mut self.out.0 {
             if frame.id() == 0x580 + u16::from(ID) && frame.data().starts_with(&[0x43, 0x05, 0x10, 0]) {

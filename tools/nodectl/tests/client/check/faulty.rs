@@ -1,4 +1,4 @@
-//! The device behind a layer that makes it wrong in one way.
+//! A device behind a layer that adds one fault.
 
 use canopen::nmt::State;
 use canopen::{Duration, Frame, Instant, Transmit};
@@ -7,7 +7,7 @@ use nodectl::check::Profile;
 
 use super::device::{ID, Whole};
 
-/// Where the layer looks at something.
+/// The event that the layer sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
     /// A frame is on its way to the device.
@@ -18,31 +18,32 @@ pub(super) enum Way {
     Tick,
 }
 
-/// What the layer looks at, and what it does.
+/// The input and the output of the layer.
 pub(super) struct Look {
     pub(super) way: Way,
     pub(super) frame: Frame,
     pub(super) state: State,
     pub(super) now: Instant,
-    /// The frame that goes on; `None` for none.
+    /// The frame that the layer passes on; `None` if the frame is lost.
     pub(super) pass: Option<Frame>,
-    /// Frames that go to the bus: after a frame of the device, before what follows from a frame to the device.
+    /// Additional frames to the bus. They come after a frame of the device, and before the answer to a frame to the
+    /// device.
     pub(super) to_bus: Vec<Frame>,
-    /// Frames that go to the device after it.
+    /// Additional frames to the device, after the frame that the layer passes on.
     pub(super) to_device: Vec<Frame>,
-    /// Frames that go to the bus after so many milliseconds.
+    /// Frames to the bus after this number of milliseconds.
     pub(super) later: Vec<(u64, Frame)>,
-    /// What is stored is forgotten.
+    /// Whether the stored parameters are cleared.
     pub(super) forgets: bool,
 }
 
 impl Look {
-    /// The request to the SDO server, where it is one.
+    /// The data of the frame, where the frame is a request to the SDO server.
     pub(super) fn request(&self) -> Option<[u8; 8]> {
         self.data(Way::In, 0x600 + u16::from(ID))
     }
 
-    /// The response of the SDO server, where it is one.
+    /// The data of the frame, where the frame is a response of the SDO server.
     pub(super) fn response(&self) -> Option<[u8; 8]> {
         self.data(Way::Out, 0x580 + u16::from(ID))
     }
@@ -52,18 +53,18 @@ impl Look {
         self.frame.data().try_into().ok().filter(|_| is_it)
     }
 
-    /// Whether it is a data frame with this CAN-ID, that way.
+    /// Whether the frame is a data frame with this CAN-ID in this direction.
     pub(super) fn is(&self, way: Way, id: u16) -> bool {
         self.way == way && self.frame.id() == id && !self.frame.is_remote()
     }
 
-    /// The layer answers instead of the device.
+    /// Answers the request instead of the device.
     pub(super) fn answer(&mut self, data: [u8; 8]) {
         self.pass = None;
         self.to_bus.push(frame(0x580 + u16::from(ID), &data));
     }
 
-    /// Another frame goes on, with the same CAN-ID.
+    /// Replaces the data of the frame.
     pub(super) fn replace(&mut self, data: &[u8]) {
         self.pass = Some(frame(self.frame.id(), data));
     }
@@ -74,10 +75,10 @@ pub(super) fn frame(id: u16, data: &[u8]) -> Frame {
     Frame::new(id, data).expect("a frame")
 }
 
-/// What the layer does.
+/// A layer that adds a fault.
 pub(super) type Layer = Box<dyn FnMut(&mut Look)>;
 
-/// The device and the layer.
+/// The device behind the layer.
 pub(super) struct Faulty {
     device: Whole,
     layer: Layer,
@@ -110,7 +111,7 @@ impl Faulty {
         look
     }
 
-    /// Hands frames to the device, and its frames to the bus.
+    /// Passes frames to the device, and its answers to the bus.
     fn inject(&mut self, frames: &[Frame], now: Instant, out: &mut impl Transmit) {
         for frame in frames {
             self.device.receive(frame, now);

@@ -1,4 +1,4 @@
-//! Ways to make a device wrong, for the switches to choose from.
+//! Layers with a fault each, from which the switches choose.
 
 use super::device::ID;
 use super::faulty::{Layer, Look, Way, frame};
@@ -30,24 +30,24 @@ fn abort(at: (u16, u8), code: u32) -> [u8; 8] {
     data
 }
 
-/// Whether a request begins an upload or a download, by segments or by blocks.
+/// Whether a request begins an upload or a download of any kind: expedited, segmented or in blocks.
 fn begins(data: [u8; 8]) -> bool {
     matches!(data[0] >> 5, 1 | 2)
         || data[0] >> 5 == 5 && data[0] & 3 == 0
         || data[0] >> 5 == 6 && data[0] & 1 == 0
 }
 
-/// A request that downloads to an object: the first frame.
+/// The request that begins a download to an object.
 pub(super) fn downloads(look: &Look, at: (u16, u8)) -> Option<[u8; 8]> {
     look.request().filter(|data| data[0] >> 5 == 1 && place(*data) == at)
 }
 
-/// An upload of an object: the first frame.
+/// Whether a request begins an upload of an object.
 pub(super) fn uploads(look: &Look, at: (u16, u8)) -> bool {
     look.request().is_some_and(|data| data[0] >> 5 == 2 && place(data) == at)
 }
 
-/// Any of these abort codes becomes another.
+/// Replaces any of these abort codes by another.
 pub(super) fn aborts_otherwise(codes: &'static [u32]) -> Layer {
     Box::new(move |look| {
         let Some(data) = look.response().filter(|data| data[0] == 0x80) else { return };
@@ -57,7 +57,7 @@ pub(super) fn aborts_otherwise(codes: &'static [u32]) -> Layer {
     })
 }
 
-/// An object reads as these bytes.
+/// Makes an object read as these bytes.
 pub(super) fn reads(index: u16, sub: u8, bytes: &'static [u8]) -> Layer {
     Box::new(move |look| {
         if uploads(look, (index, sub)) {
@@ -69,7 +69,7 @@ pub(super) fn reads(index: u16, sub: u8, bytes: &'static [u8]) -> Layer {
     })
 }
 
-/// A download to an object is refused.
+/// Refuses downloads to an object.
 pub(super) fn refuses(index: u16, sub: u8) -> Layer {
     Box::new(move |look| {
         if downloads(look, (index, sub)).is_some() {
@@ -78,7 +78,7 @@ pub(super) fn refuses(index: u16, sub: u8) -> Layer {
     })
 }
 
-/// A download to an object is answered, and done by nobody.
+/// Acknowledges downloads to an object without executing them.
 pub(super) fn swallows(index: u16, sub: u8) -> Layer {
     Box::new(move |look| {
         if downloads(look, (index, sub)).is_some_and(|data| data[0] & 2 != 0) {
@@ -87,7 +87,7 @@ pub(super) fn swallows(index: u16, sub: u8) -> Layer {
     })
 }
 
-/// What was written to an object is read for ever.
+/// Answers all reads of an object with the value that was written last, even after a restart.
 pub(super) fn keeps(index: u16, sub: u8) -> Layer {
     let mut kept: Option<[u8; 8]> = None;
     Box::new(move |look| {
@@ -101,7 +101,7 @@ pub(super) fn keeps(index: u16, sub: u8) -> Layer {
     })
 }
 
-/// The device has none of these objects.
+/// Makes these objects absent.
 pub(super) fn lacks(indices: &'static [u16]) -> Layer {
     Box::new(move |look| {
         let Some(data) = look.request().filter(|data| begins(*data)) else { return };
@@ -111,7 +111,7 @@ pub(super) fn lacks(indices: &'static [u16]) -> Layer {
     })
 }
 
-/// Responses of the SDO server that are meant become others.
+/// Changes responses of the SDO server.
 pub(super) fn responds(change: impl Fn(&mut [u8; 8]) + 'static) -> Layer {
     Box::new(move |look| {
         if let Some(mut data) = look.response() {
@@ -121,7 +121,7 @@ pub(super) fn responds(change: impl Fn(&mut [u8; 8]) + 'static) -> Layer {
     })
 }
 
-/// Frames to the device, or of it, that are meant are lost.
+/// Loses the frames that fulfil a condition, in both directions.
 pub(super) fn loses(is_lost: impl Fn(&Look) -> bool + 'static) -> Layer {
     Box::new(move |look| {
         if look.way != Way::Tick && is_lost(look) {
@@ -130,7 +130,7 @@ pub(super) fn loses(is_lost: impl Fn(&Look) -> bool + 'static) -> Layer {
     })
 }
 
-/// Every so many milliseconds a frame of its own, in some states.
+/// Sends a frame every `ms` milliseconds, in some states.
 pub(super) fn babbles(ms: u64, states: &'static [State], say: Frame) -> Layer {
     Box::new(move |look| {
         if look.way == Way::Tick && look.now.0 / 10_000 % (ms / 10) == 0 && states.contains(&look.state) {
@@ -139,7 +139,7 @@ pub(super) fn babbles(ms: u64, states: &'static [State], say: Frame) -> Layer {
     })
 }
 
-/// A data frame of the device with this CAN-ID has other data.
+/// Changes the data of the device's frames with this CAN-ID.
 pub(super) fn sends_otherwise(id: u16, change: impl Fn(&[u8], State) -> Vec<u8> + 'static) -> Layer {
     Box::new(move |look| {
         if look.is(Way::Out, id) {
@@ -149,7 +149,7 @@ pub(super) fn sends_otherwise(id: u16, change: impl Fn(&[u8], State) -> Vec<u8> 
     })
 }
 
-/// A data frame of the device with this CAN-ID comes so many milliseconds late.
+/// Delays the device's frames with this CAN-ID by `ms` milliseconds.
 pub(super) fn is_late(id: u16, ms: u64) -> Layer {
     Box::new(move |look| {
         if look.is(Way::Out, id) {
@@ -159,7 +159,7 @@ pub(super) fn is_late(id: u16, ms: u64) -> Layer {
     })
 }
 
-/// A frame to the device that is meant becomes another.
+/// Changes frames to the device.
 pub(super) fn hears(change: impl Fn(&Look) -> Option<Frame> + 'static) -> Layer {
     Box::new(move |look| {
         if let Some(frame) = change(look).filter(|_| look.way == Way::In) {
@@ -168,7 +168,7 @@ pub(super) fn hears(change: impl Fn(&Look) -> Option<Frame> + 'static) -> Layer 
     })
 }
 
-/// A frame to the device that is meant is answered by a frame of its own.
+/// Answers some frames to the device with an additional frame.
 pub(super) fn replies(reply: impl Fn(&Look) -> Option<Frame> + 'static) -> Layer {
     Box::new(move |look| {
         if let Some(frame) = reply(look).filter(|_| look.way == Way::In) {
@@ -177,7 +177,7 @@ pub(super) fn replies(reply: impl Fn(&Look) -> Option<Frame> + 'static) -> Layer
     })
 }
 
-/// After a frame that kills, the SDO server is dead for ten seconds.
+/// Stops the SDO server for ten seconds after a frame that fulfils a condition.
 pub(super) fn dies(mut kills: impl FnMut(&Look) -> bool + 'static) -> Layer {
     let mut until = canopen::Instant(0);
     Box::new(move |look| {

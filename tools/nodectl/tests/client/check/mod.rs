@@ -1,4 +1,4 @@
-//! `nodectl check` against nodes in this process: our own, and one that can be made wrong in many ways.
+//! Tests of `nodectl check` with nodes in this process: our own node, and a device to which many faults can be added.
 
 mod command;
 mod device;
@@ -37,7 +37,7 @@ fn judge<S: Station + 'static>(
     }
 }
 
-/// What did not pass, in words.
+/// The checks that did not pass, in words.
 fn complaints(run: &Run) -> Vec<String> {
     let complaint = |result: &check::Result| match &result.verdict {
         Verdict::Passed => None,

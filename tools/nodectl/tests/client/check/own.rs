@@ -1,4 +1,4 @@
-//! The personalities of this project conform, each with its profile.
+//! Tests that the personalities of this project conform, each with its profile.
 
 use node::Personality;
 use nodectl::check::Profile;
@@ -21,7 +21,7 @@ fn own_personalities_conform() {
     for device in eds::DEVICES {
         let wire = Wire::new(Pressure::of(device.personality, 5));
         if device.personality == Personality::Lift {
-            // As delivered it is no device of a lift yet, and its PDOs are off.
+            // A new lift node has no virtual device yet, and its PDOs are off.
             printed(&wire, &["write", "--node", "5", "2305", "15"]);
             printed(&wire, &["save", "--node", "5"]);
         }

@@ -1,4 +1,4 @@
-//! The device without a fault passes every check, and skips none.
+//! Tests that the device without a fault passes every check, and that no check is skipped.
 
 use nodectl::check::Profile;
 

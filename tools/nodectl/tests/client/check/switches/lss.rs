@@ -10,7 +10,7 @@ const TOLD: u16 = 0x7E4;
 /// The identity of the device.
 const IDENTITY: [u32; 4] = [0x1A2, 0x77, 0x0001_0003, 0];
 
-/// A response with this command has another byte.
+/// Changes one byte of the responses with this command.
 fn tells_otherwise(command: u8, byte: usize, value: u8) -> Layer {
     sends_otherwise(TOLD, move |data, _| {
         let mut data = data.to_vec();
@@ -21,7 +21,7 @@ fn tells_otherwise(command: u8, byte: usize, value: u8) -> Layer {
     })
 }
 
-/// A request with this command is always answered so.
+/// Always gives this answer to requests with this command.
 fn always_tells(command: u8, answer: u8) -> Layer {
     replies(move |look| {
         let is_it = look.frame.id() == ASKED && look.frame.data().first() == Some(&command);

@@ -1,5 +1,6 @@
-//! Each switch makes the device wrong in one way, and names the checks that are red then. Every check is red for at least one switch,
-//! and green without ([`reference`](super::reference)); the table of both is docs/check-switches.md.
+//! Each switch adds one fault to the device, and names the checks that fail then. Every check fails for at least one
+//! switch, and passes without a fault ([`reference`](super::reference)). The table of checks and switches is
+//! docs/check-switches.md.
 
 mod emcy;
 mod lss;
@@ -21,15 +22,15 @@ use super::faulty::{Faulty, Layer};
 use super::{complaints, device, judge};
 use crate::wire::Wire;
 
-/// A way to be wrong.
+/// A fault of the device or of the data sheet.
 struct Switch {
-    /// What the device does, in words.
+    /// The fault in words.
     name: &'static str,
-    /// The checks that tell.
+    /// The checks that fail.
     red: &'static [&'static str],
-    /// What is different in the data sheet.
+    /// The change of the data sheet.
     sheet: fn(&mut Eds),
-    /// What is different on the bus.
+    /// The fault on the bus.
     layer: Layer,
 }
 
@@ -78,7 +79,7 @@ impl Switch {
     }
 }
 
-/// The checks that told something.
+/// The checks with a deviation.
 fn red(run: &Run) -> Vec<&'static str> {
     let told = run.results.iter().filter(|result| result.verdict.deviation().is_some());
     told.map(|result| result.check.id).collect()
@@ -123,7 +124,8 @@ fn every_check() -> Vec<check::Check> {
     checks
 }
 
-/// A switch says one thing: it does not make most of the checks red. In a thorough run, all checks against all switches.
+/// A switch has one fault only: it does not make most of the checks fail. A thorough run tries all checks with all
+/// switches.
 #[test]
 fn a_switch_is_told_by_few_checks() {
     if std::env::var("THOROUGH").is_ok_and(|value| value == "1") {

@@ -16,7 +16,7 @@ pub(super) fn switches() -> Vec<Switch> {
     [boot(), states(), addressing(), heartbeat(), consumer(), guarding()].into_iter().flatten().collect()
 }
 
-/// Whether it is the boot-up message.
+/// Whether a frame is the boot-up message.
 fn is_boot_up(look: &super::super::faulty::Look) -> bool {
     look.is(Way::Out, HEARTBEAT) && look.frame.data() == [0]
 }
@@ -70,7 +70,7 @@ fn boot() -> Vec<Switch> {
     ]
 }
 
-/// An NMT command is not obeyed in a state.
+/// Ignores an NMT command in a state.
 fn ignores(specifier: u8, state: State) -> Layer {
     loses(move |look| is_command(look, specifier) && look.state == state)
 }
@@ -240,7 +240,7 @@ fn heartbeat() -> Vec<Switch> {
     ]
 }
 
-/// A write of 0 to 1017h becomes one of 100.
+/// Changes a write of 0 to 1017h into a write of 100.
 fn zero_is_one_second() -> Layer {
     hears(|look| {
         let data = super::super::layers::downloads(look, (0x1017, 0)).filter(|data| data[4..6] == [0, 0])?;

@@ -1,4 +1,4 @@
-//! Objects that are absent, wrong, or not what was written; saving, and profiles.
+//! Faults of objects: absent, wrong, or with another value than the one written. Also faults of saving and of profiles.
 
 use super::super::faulty::frame;
 use super::super::layers::{REQUEST, aborts_otherwise, downloads, keeps, lacks, reads, refuses, swallows};

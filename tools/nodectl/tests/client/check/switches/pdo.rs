@@ -89,7 +89,7 @@ fn transmission() -> Vec<Switch> {
     ]
 }
 
-/// Type 240 is refused, and what was written is kept through a reset.
+/// Refuses type 240, and keeps the written type through a reset.
 fn refuses_type_240() -> super::Layer {
     let mut kept = keeps(0x1800, 2);
     Box::new(move |look| {
@@ -200,7 +200,7 @@ fn receipt() -> Vec<Switch> {
             "fills up an RPDO that is too short",
             &["PDO-92", "PDO-93"],
             hears(|look| {
-                // The byte that is missing is the one that the object has.
+                // The missing byte is filled up with 0, as if the RPDO were complete.
                 let data = look.frame.data();
                 (is_rpdo(look) && data.len() < 2)
                     .then(|| frame(RPDO, &[data.first().copied().unwrap_or(0), 0]))

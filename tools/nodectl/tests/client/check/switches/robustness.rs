@@ -1,4 +1,4 @@
-//! Devices that foreign traffic, nonsense and floods bring down.
+//! Devices that fail under foreign traffic, nonsense and floods.
 
 use canopen::Instant;
 use canopen::nmt::State;
@@ -126,14 +126,14 @@ fn nonsense() -> Vec<Switch> {
     ]
 }
 
-/// Whether more than so many frames that are meant have come, each within a millisecond of the one before.
+/// Whether more than `most` frames of a kind have come without a gap.
 fn flood(most: u32, is_meant: impl Fn(&Look) -> bool) -> impl FnMut(&Look) -> bool {
     let (mut count, mut last) = (0, Instant(0));
     move |look| {
         if look.way != Way::In || !is_meant(look) {
             return false;
         }
-        // Frames follow each other without a gap: between requests whose answers are waited for there are those.
+        // Without a gap means less than one and a half frame times. A client that waits for answers leaves longer gaps.
         count = if look.now.0 - last.0 < 696 { count + 1 } else { 1 };
         last = look.now;
         count > most

@@ -166,7 +166,7 @@ fn expedited() -> Vec<Switch> {
     ]
 }
 
-/// A download of 1017h or 100Ch in segments: the first frame.
+/// Whether a request begins a segmented download to this object.
 fn in_segments(data: [u8; 8], index: u16) -> bool {
     data[0] >> 5 == 1 && data[0] & 2 == 0 && place(data).0 == index
 }
