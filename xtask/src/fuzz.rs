@@ -24,12 +24,12 @@ const HOST: &str = env!("XTASK_HOST");
 /// The flags of the command.
 #[derive(Args)]
 pub(crate) struct Flags {
-    /// What to fuzz
+    /// The code to fuzz
     target: Target,
-    /// How long to look, in seconds
+    /// How long to search, in seconds
     #[arg(long = "for", default_value_t = 60, value_name = "SECONDS")]
     seconds: u32,
-    /// Add what covers more to host-tests/fuzz/corpus, which the tests replay
+    /// Add inputs with new coverage to host-tests/fuzz/corpus, which the tests replay
     #[arg(long)]
     keep: bool,
 }

@@ -41,8 +41,8 @@ struct Cli {
 enum Command {
     /// Build the firmware and the bootloader for the Cortex-M4 (with the keys in UPDATE_PUBLIC_KEY and UPDATE_PUBLIC_KEY_2)
     Images {
-        /// For a board on a desk: the bootloader starts what nobody has signed and trusts the key that everybody knows, the firmware
-        /// is signed with that key. And what the tests run
+        /// For a board on a desk: the bootloader starts unsigned images and trusts the development key, which everybody
+        /// knows; the firmware is signed with this key. Also builds the images for the tests
         #[arg(long)]
         development: bool,
     },
@@ -88,9 +88,9 @@ enum Command {
     Bench(bench::Options),
     /// Print which lines of the pure crates the tests run
     Coverage,
-    /// Change the code of the pure crates and print what no test notices (docs/evidence.md)
+    /// Change the code of the pure crates and print the changes that no test notices (docs/evidence.md)
     Mutants(mutants::Flags),
-    /// Print what each task of the firmware takes at worst, and when it ends at the latest
+    /// Print the worst execution time of each task of the firmware, and the latest end of each
     Timing,
     /// Print which code of the images can panic, and why it does not
     Panics,
@@ -100,7 +100,7 @@ enum Command {
         #[arg(long)]
         paths: bool,
     },
-    /// Bring what the other commands need: compilers, cmake, libclang, Python packages, tshark, a browser
+    /// Install the needs of the other commands: compilers, cmake, libclang, Python packages, tshark, a browser
     Setup {
         /// Only say what is missing, and how to install it
         #[arg(long)]

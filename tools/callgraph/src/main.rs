@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
-    /// Where the ELF files of the images are
+    /// The directory with the ELF files of the images
     #[arg(long)]
     images: PathBuf,
     #[command(subcommand)]
@@ -20,13 +20,13 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Compare the calls that lead to a panic with those that are known
+    /// Compare the calls that lead to a panic with the known calls
     Panics {
-        /// Forget what is known of functions whose path contains this, to see the check fail
+        /// Ignore the known calls of functions whose path contains this, to see the check fail
         #[arg(long)]
         forget: Option<String>,
     },
-    /// Add up how deep the stack of each image can get
+    /// Print the bound of the stack of each image
     Stack {
         /// Show the functions of each way
         #[arg(long)]

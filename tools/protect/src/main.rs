@@ -9,8 +9,8 @@ use probe::Board;
 use protect::probe::{DryRun, Probe};
 use protect::{OptionBytes, ReadOut, current, program};
 
-/// Write protection of the bootloader, and read-out protection of the flash, with probe-rs. Without a choice it says what
-/// the chip has.
+/// Write protection of the bootloader, and read-out protection of the flash, with probe-rs. Without a choice it prints
+/// the protections of the chip.
 #[derive(Parser)]
 #[command(name = "cargo xtask protect", version)]
 struct Cli {

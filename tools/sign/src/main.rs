@@ -32,7 +32,7 @@ enum Command {
     },
     /// Sign an application, an ELF file or a flat binary
     Image(ImageArgs),
-    /// Show what is in an image, and check it
+    /// Show the content of an image, and check it
     Show {
         /// The image
         file: PathBuf,
@@ -49,25 +49,25 @@ struct ImageArgs {
     /// The secret key, PKCS#8 in PEM [default: the development key, which is known to everybody]
     #[arg(long)]
     key: Option<PathBuf>,
-    /// The product that it is for, as in 1018h:2
+    /// The product that the image is for, as in 1018h:2
     #[arg(long, value_parser = number, default_value_t = product::PRODUCT)]
     product: u32,
-    /// The hardware revisions that it runs on, 0 to 31, with commas
+    /// The hardware revisions that the image runs on, 0 to 31, with commas
     #[arg(long, value_delimiter = ',', default_value = "0", value_parser = clap::value_parser!(u32).range(0..32))]
     hardware: Vec<u32>,
-    /// Its version, as 1.2.3
+    /// The version of the image, as 1.2.3
     #[arg(long = "image-version", value_parser = version, default_value = env!("CARGO_PKG_VERSION"))]
     version: Version,
     /// The security counter: raise it when no older image may ever run again
     #[arg(long, default_value_t = 0)]
     counter: u32,
-    /// Which of the keys of the bootloader it is: 0 for UPDATE_PUBLIC_KEY, 1 for UPDATE_PUBLIC_KEY_2
+    /// The number of the key in the bootloader: 0 for UPDATE_PUBLIC_KEY, 1 for UPDATE_PUBLIC_KEY_2
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..2))]
     key_number: u8,
     /// A key that no node accepts any more where this image has run
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..2))]
     revokes: Option<u8>,
-    /// Where the image goes [default: the name of the file with .img]
+    /// The file for the image [default: the name of the file with .img]
     #[arg(long, short)]
     out: Option<PathBuf>,
 }

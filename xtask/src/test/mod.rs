@@ -23,7 +23,7 @@ pub(crate) struct Flags {
     /// Run only the steps and the tests whose name contains this text
     #[arg(long)]
     only: Option<String>,
-    /// Run whole what is otherwise sampled: exhaustive power cuts, long random runs
+    /// Run sampling tests in full: exhaustive power cuts, long random runs
     #[arg(long)]
     thorough: bool,
 }

@@ -48,7 +48,7 @@ pub(super) struct Check {
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
 
-    /// Write a report with the frames of what failed, as one page.
+    /// Write a report as one HTML page, with the frames of the failed checks.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
 }

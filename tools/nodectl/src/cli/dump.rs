@@ -18,14 +18,14 @@ use crate::object::{Place, at};
 use crate::text::visible;
 use crate::value::Value;
 
-/// Writes the configuration of a node to a file: a DCF with what differs from the defaults.
+/// Writes the configuration of a node to a file: a DCF with the values that differ from the defaults.
 #[derive(Debug, Args)]
 pub(super) struct Dump {
     /// The file; "-" for the standard output.
     #[arg(default_value = "-")]
     file: PathBuf,
 
-    /// All parameters, also those that have their defaults.
+    /// All parameters, also those with default values.
     #[arg(long)]
     all: bool,
 }
@@ -50,11 +50,11 @@ pub(super) struct Apply {
     #[arg(long)]
     dry_run: bool,
 
-    /// Make the node keep it.
+    /// Make the node save the configuration.
     #[arg(long)]
     save: bool,
 
-    /// Also where the file is for another product.
+    /// Write a file for another product, too.
     #[arg(long)]
     force: bool,
 }

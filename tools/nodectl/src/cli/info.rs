@@ -19,7 +19,7 @@ const MARGIN: Duration = Duration::from_millis(200);
 /// 1000h of a bootloader: "BOOT".
 const BOOT: u32 = 0x424F_4F54;
 
-/// Tells what nodes are: identity, versions, state, errors, program.
+/// Shows nodes: identity, versions, state, errors, program.
 #[derive(Debug, Args)]
 pub(super) struct Info {}
 

@@ -24,7 +24,7 @@ pub(super) struct Map {
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
 
-    /// The transmission type; as it is if this is left out.
+    /// The transmission type; unchanged if it is left out.
     #[arg(long = "transmission", value_name = "TYPE")]
     transmission: Option<u8>,
 }
@@ -42,9 +42,9 @@ pub(super) struct Unmap {
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Direction {
-    /// What the node sends.
+    /// The node sends the PDO.
     Tpdo,
-    /// What the node receives.
+    /// The node receives the PDO.
     Rpdo,
 }
 

@@ -19,7 +19,7 @@ pub struct Options {
     #[arg(long, global = true, env = "NODECTL_BUS", default_value = "socketcand://127.0.0.1:29536/vcan0")]
     pub bus: Address,
 
-    /// Bit rate in kbit/s, for slcan adapters; the others have theirs.
+    /// Bit rate in kbit/s, for slcan adapters only.
     #[arg(long, global = true, env = "NODECTL_BIT_RATE", value_name = "KBIT/S", default_value_t = 250)]
     pub bit_rate: u16,
 
@@ -43,11 +43,11 @@ pub struct Options {
     #[arg(long, global = true, value_name = "SECONDS", default_value_t = 10)]
     pub limit: u32,
 
-    /// How often a transfer without an answer is begun anew.
+    /// The number of retries of a transfer without an answer.
     #[arg(long, global = true, value_name = "N", default_value_t = 1)]
     pub retries: u8,
 
-    /// File with the key of nodes that change their program only for its holder: 64 hexadecimal digits.
+    /// File with the key that authorises updates, for nodes that demand one: 64 hexadecimal digits.
     #[arg(long, global = true, env = "NODECTL_AUTHORISATION_KEY", value_name = "FILE")]
     pub authorisation_key: Option<PathBuf>,
 }

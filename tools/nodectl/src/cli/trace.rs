@@ -27,16 +27,17 @@ const LISTEN: Duration = Duration::from_millis(300);
 /// The greatest length of a line of a file: ten times a line of candump.
 const LONGEST_LINE: u64 = 1024;
 
-/// Shows what is said on the bus: every frame decoded, with names, values and units; a transfer of several frames is a line.
+/// Shows the traffic on the bus: every frame decoded, with names, values and units; a transfer of several frames is one
+/// line.
 ///
-/// Nodes are asked first for the mapping of their PDOs and the units. What the trace itself shows of them counts from then on.
+/// Nodes are asked first for the mapping of their PDOs and the units. Later changes are taken from the trace itself.
 #[derive(Debug, Args)]
 pub(super) struct Trace {
     /// Decode a file of candump instead of the bus ("-" for the standard input). `--eds` is for the nodes of `--of`, or all.
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
 
-    /// Only what these nodes send or are sent (1,2,5-8).
+    /// Only frames from and to these nodes (1,2,5-8).
     #[arg(long, value_name = "NODES", default_value = "all")]
     of: NodeSet,
 

@@ -17,8 +17,8 @@ use crate::update::{Error, Image, Options, Outcome, Step, Watcher, update};
 
 /// Replaces the program of nodes (CiA 302-3), one after the other.
 ///
-/// Product and version are checked before anything is erased. A node or a bus that is lost on the way is waited for,
-/// and the update gone on with. Node-IDs by --node: 1,2,5-8.
+/// Product and version are checked before anything is erased. If a node or the bus is lost, the command waits for it
+/// and continues the update. Node-IDs by --node: 1,2,5-8.
 #[derive(Debug, Args)]
 pub(super) struct Update {
     /// The image.

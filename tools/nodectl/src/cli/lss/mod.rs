@@ -45,7 +45,7 @@ enum Command {
     SetId {
         /// 1 to 127, or 255 for none. In force after a reset of communication.
         id: u8,
-        /// Make the node keep it.
+        /// Make the node keep the node-ID.
         #[arg(long)]
         store: bool,
     },
@@ -53,7 +53,7 @@ enum Command {
     SetRate {
         /// In kbit/s; 0 to detect it. In force after `activate` or the next start.
         kbit: u16,
-        /// Make the node keep it.
+        /// Make the node keep the bit rate.
         #[arg(long)]
         store: bool,
     },
@@ -61,7 +61,7 @@ enum Command {
     Store,
     /// Change to the new bit rate now.
     Activate {
-        /// How long before and after the change nobody sends, in milliseconds.
+        /// How long all nodes are silent before and after the change, in milliseconds.
         #[arg(default_value_t = 500)]
         delay: u16,
     },

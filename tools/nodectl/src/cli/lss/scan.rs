@@ -20,10 +20,10 @@ pub(super) struct Scan {
     /// How long each of the 133 steps may take, in milliseconds; a tenth of --timeout if it is left out.
     #[arg(long, value_name = "MS")]
     step: Option<u32>,
-    /// Give them node-IDs from this one on, passing over those in use; else only the first is found.
+    /// Give the nodes node-IDs from this one on, without those in use; by default only the first node is found.
     #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     assign: Option<u8>,
-    /// Make them keep their node-IDs.
+    /// Make the nodes keep their node-IDs.
     #[arg(long, requires = "assign")]
     store: bool,
 }

@@ -35,7 +35,7 @@ pub(super) struct Monitor {
     #[arg(long, conflicts_with_all = ["objects", "start", "window"])]
     lift: bool,
 
-    /// A line for a value that is another than before, none for the others.
+    /// Print a line only for a value that has changed.
     #[arg(long, conflicts_with = "lift")]
     changes: bool,
 
@@ -43,19 +43,19 @@ pub(super) struct Monitor {
     #[arg(long, value_name = "N")]
     count: Option<usize>,
 
-    /// What the plot shows, in seconds.
+    /// The time span of the plot, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 30)]
     window: u32,
 }
 
-/// Which values, and how they are got.
+/// The values to acquire, and the way to acquire them.
 #[derive(Debug, Args)]
 pub(super) struct Source {
-    /// Objects by index or name; all that are in TPDOs if none is given. What is in a TPDO is taken from it.
+    /// Objects by index or name; without any, all objects in TPDOs. Objects in a TPDO are taken from the TPDO.
     #[arg(value_name = "OBJECT")]
     objects: Vec<String>,
 
-    /// How often what is in no TPDO is read, in milliseconds.
+    /// The period of reading the objects that no TPDO carries, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 100)]
     period: u32,
 

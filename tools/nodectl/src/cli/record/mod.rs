@@ -31,8 +31,8 @@ const WAKE: Duration = Duration::from_millis(50);
 
 /// Records values over time, as CSV, as a stream of Apache Arrow and as a plot.
 ///
-/// Times are those of the bus, where the adapter tells them. What has come is kept however the recording ends: by its
-/// duration, Ctrl-C, SIGTERM or the loss of the bus. A file that is there already is replaced when the new one is complete.
+/// Times are those of the bus, where the adapter tells them. The values are kept however the recording ends: by its
+/// duration, Ctrl-C, SIGTERM or the loss of the bus. An existing file is replaced when the new one is complete.
 #[derive(Debug, Args)]
 pub(super) struct Record {
     #[command(flatten)]

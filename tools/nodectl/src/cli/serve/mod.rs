@@ -31,15 +31,16 @@ use crate::bus::Address;
 
 /// Shows the bus in a browser: the nodes, live values, dictionary, trace, commissioning, update.
 ///
-/// The page is for this machine only, unless --page gives an address that others reach; they need the token of the printed
-/// address. Without --silent, all node-IDs are asked once who is there, and nodes that are heard for what they are.
+/// The page is for this machine only, unless --page gives an address that other machines reach. Other machines need the
+/// token in the printed address. Without --silent, the command looks for nodes at its start, and asks every node for
+/// its identity.
 #[derive(Debug, Args)]
 pub(super) struct Serve {
     /// The bus; that of --bus if it is left out.
     #[arg(value_name = "BUS")]
     address: Option<Address>,
 
-    /// Where the page is. Where the port is taken, the next free one is used; port 0 takes any.
+    /// The address of the page. If the port is in use, the next free one is taken; port 0 takes any.
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8301")]
     page: SocketAddr,
 
