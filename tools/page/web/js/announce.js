@@ -1,9 +1,9 @@
-// What happened, for those who do not look at it: a screen reader reads the live region.
+// Announcements for users of a screen reader, which reads the live region.
 
 /** Says one sentence politely. */
 export function announce(sentence) {
   const region = document.getElementById("announcer");
   region.textContent = "";
-  // A region reads what is put in after it was empty, the same sentence too.
+  // A region reads a text that replaces an empty one, also when the same text comes again.
   requestAnimationFrame(() => (region.textContent = sentence));
 }

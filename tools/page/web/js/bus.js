@@ -1,4 +1,4 @@
-// What the page knows of the bus: who is there, how it is, who is chosen. Views listen to it.
+// The page's knowledge of the bus: the nodes, their state, and the chosen node. Views listen to it.
 
 export class Bus extends EventTarget {
   constructor(connection) {
@@ -30,7 +30,7 @@ export class Bus extends EventTarget {
     return [...this.nodes.values()].sort((a, b) => a.node - b.node);
   }
 
-  /** The node that the views are about. */
+  /** The chosen node, which the views show. */
   node() {
     return this.nodes.get(this.chosen) ?? null;
   }
@@ -46,7 +46,7 @@ export class Bus extends EventTarget {
   }
 
   #greet(hello) {
-    // Another run of the bus has a time axis of its own.
+    // A new run of the bus has a time axis of its own.
     if (this.hello && hello.t < (this.status?.t ?? 0)) this.#forgetTimes();
     this.#update("hello", hello);
   }

@@ -3,7 +3,7 @@
 const RETRY_MS = 1000;
 const WENT_AWAY = "the server has gone away";
 
-/** What an answer with an error becomes. `abort` is the SDO abort code where a node has refused. */
+/** An answer with an error. `abort` is the SDO abort code where a node has refused. */
 export class Refusal extends Error {
   constructor(message, abort = null) {
     super(message);
@@ -23,7 +23,7 @@ export class Connection extends EventTarget {
     this.connected = false;
   }
 
-  /** Connects, and again whenever the connection is lost. */
+  /** Connects, and connects again whenever the connection is lost. */
   start() {
     const url = new URL("ws", location.href);
     url.protocol = url.protocol.replace("http", "ws");
@@ -34,7 +34,7 @@ export class Connection extends EventTarget {
     this.#socket = socket;
   }
 
-  /** Asks the server. `onProgress` is called with each step. The promise fails with a `Refusal`. */
+  /** Sends a request to the server. `onProgress` is called with each step. The promise fails with a `Refusal`. */
   request(what, keys = {}, onProgress = null) {
     if (!this.connected) return Promise.reject(new Refusal(WENT_AWAY));
     this.#lastId += 1;
@@ -62,7 +62,7 @@ export class Connection extends EventTarget {
   }
 
   #tell(message) {
-    // With the first message the server has taken the connection.
+    // The first message shows that the server has accepted the connection.
     const isFirst = message.event === "hello";
     if (isFirst) this.connected = true;
     this.dispatchEvent(new CustomEvent(message.event, { detail: message }));
@@ -76,7 +76,7 @@ export class Connection extends EventTarget {
     setTimeout(() => this.#again(), RETRY_MS);
   }
 
-  /** A server that was started anew has another token. The page stays as it is and takes the token out of a new copy. */
+  /** A restarted server has another token. The page stays, and takes the token out of a new copy of itself. */
   async #again() {
     this.#token = (await newToken()) ?? this.#token;
     this.start();

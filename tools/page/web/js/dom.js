@@ -7,7 +7,7 @@ export function el(tag, attributes = {}, ...children) {
   return fill(document.createElement(tag), attributes, children);
 }
 
-/** The same for a drawing. */
+/** An element of a drawing (SVG) with attributes and children. */
 export function svg(tag, attributes = {}, ...children) {
   return fill(document.createElementNS(SVG, tag), attributes, children);
 }
@@ -22,20 +22,20 @@ function fill(element, attributes, children) {
   return element;
 }
 
-/** Sets an attribute; `null`, `undefined` and `false` remove it. Nothing is touched where nothing changes. */
+/** Sets an attribute; `null`, `undefined` and `false` remove it. An unchanged attribute is not touched. */
 export function set(element, name, value) {
   if (value == null || value === false) element.removeAttribute(name);
   else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value === true ? "" : value);
 }
 
-/** Sets the text of an element, only where it is another. */
+/** Sets the text of an element, if the text has changed. */
 export function text(element, value) {
   if (element.textContent !== value) element.textContent = value;
 }
 
 let lastId = 0;
 
-/** An id that nothing else has. */
+/** A unique id. */
 export function newId(prefix = "e") {
   lastId += 1;
   return `${prefix}-${lastId}`;
@@ -49,7 +49,7 @@ export function field(label, control, hint = "") {
   return el("div", { class: "field" }, el("label", { for: control.id }, label), control, help || null);
 }
 
-/** A button that does one thing. It is out of use while its promise is open. */
+/** A button for an action. It is disabled while the promise of the action is open. */
 export function button(label, action, attributes = {}) {
   const press = async () => {
     if (element.getAttribute("aria-busy") === "true") return;
@@ -71,7 +71,7 @@ export function select(choices, value, onChange, attributes = {}) {
   return element;
 }
 
-/** Puts other choices into a list and keeps what is chosen where it is still there. */
+/** Replaces the choices of a list, and keeps the chosen one if it is still there. */
 export function setChoices(element, choices, value = element.value) {
   const key = JSON.stringify(choices);
   if (element.dataset.choices !== key) {

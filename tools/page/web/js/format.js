@@ -1,4 +1,4 @@
-// Numbers and names as the field writes them.
+// Numbers and names in the notation of the field.
 
 /** 6130h, or 6130h:1 with a sub-index. */
 export function address(index, sub = null) {
@@ -11,19 +11,19 @@ export function hex(number, digits = 8) {
   return number == null ? "-" : `${number.toString(16).toUpperCase().padStart(digits, "0")}h`;
 }
 
-/** The key of a signal, as the protocol has it. */
+/** The key of a signal in the protocol. */
 export function signalKey(node, index, sub) {
   return `${node}:${index.toString(16).toUpperCase().padStart(4, "0")}:${sub}`;
 }
 
-/** A value with its unit; REAL32 has seven digits that mean something. */
+/** A value with its unit; REAL32 has seven significant digits. */
 export function quantity(value, unit = "") {
   if (value == null) return "no valid value";
   const shown = typeof value === "number" ? number(value) : value;
   return unit ? `${shown} ${unit}` : shown;
 }
 
-/** A number without the digits that REAL32 does not have. */
+/** A number without the digits beyond the precision of REAL32. */
 export function number(value) {
   return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(7)));
 }

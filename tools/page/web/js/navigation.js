@@ -1,4 +1,4 @@
-// The views, one of which is shown. The address has its name, so that a reload and a bookmark lead back.
+// The views, one of which is shown. The address of the page has the view's name, so that a reload and a bookmark lead back.
 
 import { el, set } from "./dom.js";
 
@@ -20,7 +20,7 @@ export class Navigation {
     this.#follow(false);
   }
 
-  /** Takes a view in or out: the stimuli are for a simulator only. */
+  /** Adds or removes a view: the stimuli are for a simulator only. */
   offer(name, isThere) {
     const view = this.views.find((view) => view.name === name);
     set(view.link, "hidden", !isThere);
@@ -32,7 +32,7 @@ export class Navigation {
     if (view) location.hash = view.name;
   }
 
-  /** Puts the cursor where the view searches. */
+  /** Puts the cursor into the search field of the view. */
   search() {
     this.current.search?.focus();
   }

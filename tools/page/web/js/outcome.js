@@ -1,4 +1,4 @@
-// The line below a control that says what became of a request.
+// The line below a control that shows the result of a request.
 
 import { announce } from "./announce.js";
 import { el, set, text } from "./dom.js";
@@ -16,7 +16,7 @@ export function outcome() {
     busy: (sentence) => say("busy", sentence),
     good: (sentence) => say("good", sentence),
     bad: (error) => say("bad", error.message ?? String(error)),
-    /** Runs a request and says how it ended; `undefined` where it failed. */
+    /** Runs a request and shows its result; `undefined` where it has failed. */
     async of(doing, promise, done) {
       say("busy", doing);
       try {

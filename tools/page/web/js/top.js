@@ -1,4 +1,4 @@
-// The first line: the bus, how busy it is, and whether the page is connected.
+// The first line: the bus, its load, and the state of the connection.
 
 import { announce } from "./announce.js";
 import { el, set, text } from "./dom.js";

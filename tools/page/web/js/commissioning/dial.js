@@ -2,7 +2,7 @@
 
 const CENTRE = 110;
 
-/** Where an angle is at a distance from the centre. */
+/** The place of an angle at a distance from the centre. */
 export function point(angle, radius) {
   const radians = ((angle - 90) * Math.PI) / 180;
   return [CENTRE + radius * Math.cos(radians), CENTRE + radius * Math.sin(radians)].map((place) => Number(place.toFixed(2)));

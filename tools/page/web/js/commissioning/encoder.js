@@ -72,7 +72,7 @@ export class Encoder {
     this.draw();
   }
 
-  /** The controls of one cam. They stay the same whatever is read: what has the focus keeps it. */
+  /** The controls of one cam. They are kept after a read, so that a control in use keeps the focus. */
   #row(at) {
     const control = (name, type, edited) => el("input", { type, disabled: true, "aria-label": `Cam ${at + 1} ${name}`, on: { input: ({ target }) => this.#edit(at, name, edited(target)) } });
     const boxes = ["on", "inverted"].map((name) => [name, control(name, "checkbox", ({ checked }) => Number(checked))]);

@@ -50,7 +50,7 @@ export class Lift {
     this.#drawCar(this.recorder.of(this.keys[0]).newest);
   }
 
-  /** The shaft is as high as the car has been seen to go. */
+  /** The shaft spans the positions that the car has had so far. */
   #drawCar(position) {
     if (typeof position !== "number") return;
     this.least = Math.min(this.least, position);
@@ -71,7 +71,7 @@ export class Lift {
     this.chosen = devices;
   }
 
-  /** Fails as the request fails, so that a switch goes back. */
+  /** The promise fails when the request fails, so that a switch goes back. */
   async #send(index, sub, value, done) {
     const request = write(this.bus, index, sub, value);
     await this.result.of("writing", request, done);

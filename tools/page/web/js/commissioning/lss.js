@@ -1,4 +1,4 @@
-// LSS: who has no node-ID, node-IDs, the bit rate.
+// LSS: nodes without a node-ID, node-IDs, the bit rate.
 
 import { button, el, field, select, set } from "../dom.js";
 import { hex } from "../format.js";

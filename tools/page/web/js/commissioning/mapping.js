@@ -1,4 +1,4 @@
-// PDO mapping: the PDOs of a node, and one of them to change in the five steps of CiA 301.
+// PDO mapping: the PDOs of a node, and the change of one PDO in the five steps of CiA 301.
 
 import { button, el, field, select, setChoices, text } from "../dom.js";
 import { address, hex } from "../format.js";
@@ -26,7 +26,7 @@ export class Mapping {
     this.#edit();
   }
 
-  /** What others have changed comes into the list. What the user is about to change stays as it is. */
+  /** Updates the list with changes by others. The PDO that the user edits stays unchanged. */
   async refresh() {
     const { pdos } = await this.bus.request("pdos", { node: this.bus.chosen });
     this.pdos = pdos;

@@ -5,7 +5,7 @@ import { quantity, signalKey } from "../format.js";
 import { outcome } from "../outcome.js";
 import { objectField, write } from "../parts/objects.js";
 
-/** "zero" as the four bytes of an UNSIGNED32, as 6125h wants them (CiA 404). */
+/** "zero" as the four bytes of an UNSIGNED32, the value for 6125h (CiA 404). */
 const ZERO = 0x6f72657a;
 /** In a module of two devices the transmitter is the second one, 800h higher. */
 const SECOND_DEVICE = 0x800;
@@ -31,7 +31,7 @@ export class Pressure {
     for (const { show } of this.all) await show();
   }
 
-  /** The fields of the node that is chosen: what was typed for another node is gone. */
+  /** The fields of the chosen node. Values that were typed for another node are dropped. */
   #layFields() {
     this.shown = this.bus.chosen;
     this.all = [["Span start", 0x6148], ["Span end", 0x6149], ["Offset", 0x6124]].map(([label, index]) => objectField(this.bus, label, index + this.shift, 1));

@@ -1,10 +1,10 @@
-// What can be said of a typed value before it is sent. The server checks again.
+// Checks of a typed value before it is sent. The server checks again.
 
 import { parseNumber } from "../format.js";
 
 const INTEGER = /^(UNSIGNED|INTEGER)(\d+)$/;
 
-/** Why a node would refuse what was typed, in words; `null` where nothing is known against it. */
+/** Why a node would refuse the typed value, in words; `null` where no reason is known. */
 export function check(entry, typed) {
   if (!isWritable(entry)) return "This object cannot be written.";
   if (/STRING|DOMAIN/.test(entry.type)) return null;
@@ -24,14 +24,14 @@ export function isReadable({ access }) {
 
 function checkRange(entry, value) {
   const { low, high } = limits(entry);
-  // A number with a point is in the unit of the object: the server knows where the point is.
+  // A number with a decimal point is in the unit of the object. Only the server knows the position of the point.
   if (INTEGER.test(entry.type) && !Number.isInteger(value)) return entry.unit ? null : "A whole number is wanted.";
   if (low != null && value < low) return `Too low: ${rangeText(entry)} is wanted.`;
   if (high != null && value > high) return `Too high: ${rangeText(entry)} is wanted.`;
   return null;
 }
 
-/** What the data sheet allows, else what the type holds. */
+/** The range in the data sheet, else the range of the type. */
 function limits({ low, high, type }) {
   const [, sign, bits] = INTEGER.exec(type) ?? [];
   if (!bits) return { low, high };
@@ -40,7 +40,7 @@ function limits({ low, high, type }) {
   return { low: low ?? least, high: high ?? greatest };
 }
 
-/** The limits of an object: `0 to 38`; empty where there are none but those of the type. */
+/** The limits of an object: `0 to 38`; empty where only the type limits the value. */
 export function rangeText(entry) {
   const { low, high } = entry.low == null && entry.high == null ? limits(entry) : entry;
   if (low != null && high != null) return `${low} to ${high}`;

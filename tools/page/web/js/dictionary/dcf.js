@@ -1,4 +1,4 @@
-// Configuration files: the node's as a DCF, and a DCF into the node.
+// Configuration files: saving the node's configuration as a DCF, and writing a DCF to the node.
 
 import { button, el, field } from "../dom.js";
 import { offer } from "../file.js";
@@ -22,7 +22,7 @@ async function save(bus, all, result, steps) {
   if (file) offer(file.name, file.text);
 }
 
-/** Shows first what would be written: nothing is, before the user has seen it. */
+/** Shows the changes first; nothing is written before the user has seen them. */
 async function compare(bus, file, { result, plan, steps, onApplied }) {
   const keys = { node: bus.chosen, text: await file.text() };
   plan.replaceChildren();

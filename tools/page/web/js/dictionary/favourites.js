@@ -14,7 +14,7 @@ export class Favourites {
     try {
       localStorage.setItem(PLACE, JSON.stringify([...this.#keys]));
     } catch {
-      // A browser that keeps nothing: the favourites last as long as the page.
+      // The browser stores nothing: the favourites last as long as the page.
     }
   }
 }

@@ -1,4 +1,4 @@
-// Which objects of a dictionary are shown.
+// The selection of the objects that are shown.
 
 import { address } from "../format.js";
 import { isWritable } from "./check.js";

@@ -1,4 +1,4 @@
-// What objects are for, in a sentence each. A data sheet has no place for it.
+// The purpose of objects, in a sentence each. A data sheet has no place for such texts.
 
 import { COMMUNICATION } from "./texts/communication.js";
 import { ENCODER } from "./texts/encoder.js";

@@ -108,12 +108,12 @@ export class Row {
   }
 }
 
-/** The unit that the data sheet has. Where it has the object that tells the unit (6131h), a read brings the unit. */
+/** The unit in the data sheet. Where the data sheet names the object with the unit (6131h), a read brings the unit. */
 function knownUnit({ unit }) {
   return /^[0-9A-F]{4}h/.test(unit) ? "" : unit;
 }
 
-/** A value with what it stands for; the unit has a column of its own where the data sheet has a unit. */
+/** A value with its meaning. The unit has a column of its own where the data sheet has a unit. */
 function shown({ text: value, meaning }) {
   const known = value ?? "";
   return meaning ? `${known} (${meaning})` : known;

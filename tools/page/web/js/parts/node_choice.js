@@ -1,4 +1,4 @@
-// The list of nodes to choose from. All views share one choice.
+// The list to choose a node from. All views share one choice.
 
 import { el, field, select, setChoices } from "../dom.js";
 

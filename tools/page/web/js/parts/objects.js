@@ -13,7 +13,7 @@ export function write(bus, index, sub, value) {
   return bus.request("write", { node: bus.chosen, index, sub, value });
 }
 
-/** What the user has typed for a node and not yet written. No value that is read later takes its place; another node's do. */
+/** The values that the user has typed for a node and not yet written. A later read of this node does not replace them. */
 export class Edits {
   constructor(bus) {
     Object.assign(this, { bus, node: null, asked: null });
@@ -27,7 +27,7 @@ export class Edits {
     this.node = null;
   }
 
-  /** Reads from the chosen node; `undefined` where something is being edited, or another node is chosen, when the answer comes. */
+  /** Reads from the chosen node; `undefined` if the user edits values, or has chosen another node, when the answer comes. */
   async around(read) {
     const node = this.bus.chosen;
     if (this.asked !== node) this.end();
@@ -37,7 +37,7 @@ export class Edits {
   }
 }
 
-/** A field for one object. `show` reads the object, "Write" writes it. */
+/** A field for one object. "Show" reads the object, "Write" writes it. */
 export function objectField(bus, label, index, sub, hint = "") {
   const edits = new Edits(bus);
   const input = el("input", { autocomplete: "off", inputmode: "decimal", on: { input: () => edits.begin() } });

@@ -2,7 +2,7 @@
 
 import { el } from "../dom.js";
 
-/** `onChange` may refuse by a rejected promise: then the switch goes back. */
+/** `onChange` may refuse by a rejected promise; then the switch goes back. */
 export function toggle(label, isOn, onChange, attributes = {}) {
   const box = el("input", { type: "checkbox", role: "switch", prop: { checked: isOn }, ...attributes });
   box.addEventListener("change", async () => {

@@ -6,7 +6,7 @@ import { drawMarks } from "./marks.js";
 import { colour, line } from "./theme.js";
 
 export class UnitChart {
-  /** `signals`: `{key, name, position}`, the position says the colour. */
+  /** `signals`: `{key, name, position}`; the colour depends on the position. */
   constructor(unit, signals, { recorder, time, faults }) {
     Object.assign(this, { unit, signals, recorder, time, faults });
     this.canvas = el("canvas", { tabindex: 0, role: "img" });
@@ -14,7 +14,7 @@ export class UnitChart {
     this.chart = new window.Chart(this.canvas, this.#configuration());
   }
 
-  /** Draws what the time window shows now. */
+  /** Draws the present time window. */
   draw() {
     const { from, to } = this.time;
     const columns = Math.max(100, this.chart.width);
@@ -31,7 +31,7 @@ export class UnitChart {
     this.element.remove();
   }
 
-  /** The share of the width at which a pointer is: 0 at the left end of the time, 1 at the right one. */
+  /** The position of a pointer as a share of the width: 0 at the left end of the time, 1 at the right end. */
   share(event) {
     const { left, right } = this.chart.chartArea;
     return Math.min(1, Math.max(0, (event.offsetX - left) / (right - left)));

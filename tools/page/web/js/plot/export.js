@@ -1,11 +1,11 @@
-// What the plots show, as a table and as a drawing.
+// The content of the plots as a table and as a drawing.
 
 import { el, svg } from "../dom.js";
 import { number } from "../format.js";
 import { colourOf } from "./marks.js";
 import { colour, line } from "./theme.js";
 
-/** A row for each time, a column for each signal, as `nodectl record --csv` writes them. */
+/** A row for each time and a column for each signal, in the format of `nodectl record --csv`. */
 export function csv(recorder, signals, { from, to }) {
   const head = ["time s", ...signals.map((signal) => `${signal.title}${signal.unit ? ` [${signal.unit}]` : ""}`)];
   const rows = new Map();
@@ -85,7 +85,7 @@ function drawLine(group, { name, position, points }, i, x, y) {
   group.append(svg("text", { x: LEFT + 8 + i * 220, y: 4, fill: style.colour }, name));
 }
 
-/** The key of the colours, as an element. */
+/** The legend of the colours, as an element. */
 export function legend(position) {
   const { colour: stroke, dash } = line(position);
   return el("span", { class: "swatch", "aria-hidden": "true", style: `border-top: 3px ${dash.length ? "dashed" : "solid"} ${stroke}` });

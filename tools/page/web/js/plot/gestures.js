@@ -22,14 +22,14 @@ export function addGestures(chart, time) {
   addDrag(chart, time);
 }
 
-/** The wheel zooms where Ctrl is held or the plot has the focus, so that a page can still be scrolled past a plot. */
+/** The wheel zooms only while Ctrl is held or the plot has the focus, so that a page can still be scrolled past a plot. */
 function zoomByWheel(event, chart, time) {
   if (!event.ctrlKey && document.activeElement !== chart.canvas) return;
   event.preventDefault();
   time.zoom(event.deltaY > 0 ? 1.25 : 0.8, chart.share(event));
 }
 
-/** What is drawn over with a mouse is what the plots show then. */
+/** Dragging with a mouse chooses the time that the plots show. */
 function addDrag(chart, time) {
   let start = null;
   chart.canvas.addEventListener("pointerdown", (event) => {

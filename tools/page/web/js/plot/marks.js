@@ -1,4 +1,4 @@
-// Faults on the time axis of a chart: a line where one came, a thinner one where it went.
+// Faults on the time axis of a chart: a line where a fault came, a thinner line where the fault went.
 
 import { colour } from "./theme.js";
 

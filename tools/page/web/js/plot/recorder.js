@@ -21,7 +21,7 @@ export class Recorder extends EventTarget {
     this.addEventListener(name, ({ detail }) => listener(detail));
   }
 
-  /** What one view wants to follow. Replaces what it wanted before. */
+  /** Sets the signals that one view follows, instead of its former ones. */
   async want(view, keys) {
     this.wishes.set(view, keys);
     await this.#follow();

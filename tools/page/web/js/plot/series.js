@@ -1,6 +1,6 @@
 // The samples of one signal, in the order of their times.
 
-/** So many samples of a signal are kept: at a thousand a second more than four minutes. */
+/** The number of samples of a signal that are kept: at a thousand a second, more than four minutes. */
 export const KEPT = 262_144;
 
 export class Series {

@@ -1,4 +1,4 @@
-// The colours of the style sheet, for what is drawn by program.
+// The colours of the style sheet, for drawings by program.
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
@@ -7,7 +7,7 @@ export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
-/** Colours of lines, told apart also by those who see fewer colours; after the last one dashes begin. */
+/** Colours of lines, which people with colour blindness can tell apart, too. After the last colour dashes begin. */
 export function line(position) {
   return { colour: colour(`line-${(position % 6) + 1}`), dash: position < 6 ? [] : [6, 4] };
 }

@@ -64,7 +64,7 @@ export class TimeWindow extends EventTarget {
 
   #set(length, end) {
     this.length = length;
-    // Who moves on past the newest sample follows the bus again.
+    // A move beyond the newest sample makes the plots follow the bus again.
     this.end = end != null && end > this.now ? null : end;
     this.dispatchEvent(new CustomEvent("change"));
   }

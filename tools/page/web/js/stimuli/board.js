@@ -1,4 +1,4 @@
-// The knobs of one board: what its sensors see, its buttons, its faults.
+// The controls of one board: the inputs of its sensors, its buttons, its faults.
 
 import { button, el } from "../dom.js";
 import { outcome } from "../outcome.js";
@@ -37,7 +37,7 @@ export class Board {
     return toggle(name.replaceAll("-", " "), false, (on) => this.#request("fault", `${name}:${on ? "on" : "off"}`), { title: text });
   }
 
-  /** A button is down as long as it is held, by mouse, finger or the space bar. */
+  /** A button is down while it is held, by mouse, finger or the space bar. */
   #button(number) {
     const send = (state) => this.#send("button", `${number}:${state}`);
     const element = button(`Button ${number}`, () => {});

@@ -1,10 +1,10 @@
-// The boards of the simulator, kept as the server tells them.
+// The boards of the simulator, as the server reports them.
 
 import { el } from "../dom.js";
 import { Board } from "./board.js";
 
 export class Boards {
-  /** Shows those boards that `isWanted` takes. */
+  /** Shows the boards that `isWanted` accepts. */
   constructor(bus, isWanted = () => true) {
     Object.assign(this, { bus, isWanted, shown: new Map(), boards: [], faults: [] });
     this.element = el("div", { class: "boards" });
@@ -17,7 +17,7 @@ export class Boards {
     this.#take(await this.bus.request("stimuli"));
   }
 
-  /** Shows and hides boards after what is wanted has changed. */
+  /** Shows and hides boards after the selection has changed. */
   show() {
     for (const board of this.boards) this.#showBoard(board);
   }

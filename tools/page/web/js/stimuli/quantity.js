@@ -3,10 +3,10 @@
 import { button, el, field, newId, select, set, text } from "../dom.js";
 import { number } from "../format.js";
 
-/** A slider that moves sends at most so often. */
+/** The shortest time between two messages of a moving slider. */
 const SEND_MS = 60;
 
-/** The waveforms as the simulator calls them, with the names of their numbers and what those are at first. */
+/** The waveforms by their names in the simulator, with the names of their numbers and the initial values. */
 const FORMS = {
   sine: [["Offset", (q) => (q.low + q.high) / 4], ["Amplitude", (q) => (q.high - q.low) / 10], ["Frequency, Hz", () => 0.5]],
   ramp: [["From", (q) => q.low], ["To", (q) => q.high / 2], ["Seconds", () => 10]],
@@ -14,7 +14,7 @@ const FORMS = {
   noise: [["Mean", (q) => q.start], ["Deviation", (q) => (q.high - q.low) / 1000]],
 };
 
-/** `low`, `high`, `step` and all numbers are in the unit that is shown; `factor` leads to the unit of the simulator. */
+/** `low`, `high`, `step` and all numbers are in the displayed unit; `factor` converts to the unit of the simulator. */
 export class Quantity {
   constructor({ kind, name, unit, low, high, step, start, factor, offset = 0, rpm = false }, send) {
     Object.assign(this, { kind, name, unit, low, high, step, start, factor, offset, rpm, send });
@@ -27,7 +27,7 @@ export class Quantity {
     set(this.form, "aria-label", `Waveform of ${name}`);
   }
 
-  /** Shows what the board's sensors see now. */
+  /** Shows the present value at the board's sensors. */
   show({ spec, value }) {
     const shown = (value - this.offset) / this.factor;
     text(this.output, `${number(Number(shown.toFixed(3)))} ${this.unit}`);
@@ -36,7 +36,7 @@ export class Quantity {
     if (document.activeElement !== this.slider && !this.timer) this.slider.value = shown;
   }
 
-  /** The waveform that the board has, unless the user is about to choose another one. */
+  /** Shows the waveform of the board, unless the user is choosing another one. */
   #showForm(form) {
     if (document.activeElement === this.form || this.numbers.childElementCount > 0) return;
     if ([...this.form.options].some(({ value }) => value === form)) this.form.value = form;
@@ -65,7 +65,7 @@ export class Quantity {
   #apply(form) {
     const values = this.inputs.map((input) => Number(input.value));
     if (form === "rpm") return this.send(this.kind, `rpm:${values[0]}`);
-    // Amplitudes and deviations have no offset; times and frequencies no unit of the quantity at all.
+    // Amplitudes and deviations have no offset. Times and frequencies do not have the unit of the quantity at all.
     const isDifference = { sine: [false, true], noise: [false, true] }[form] ?? [false, false];
     const sent = values.map((value, at) => (at > 1 ? value : isDifference[at] ? value * this.factor : this.#inSimulator(value)));
     return this.send(this.kind, `${form}:${sent.map((value) => Number(value.toFixed(6))).join(",")}`);

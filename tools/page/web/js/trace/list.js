@@ -3,7 +3,7 @@
 import { el, set } from "../dom.js";
 import { hex } from "../format.js";
 
-/** So many rows are in the list; the browser draws no more in time on a full bus. */
+/** The number of rows in the list. The browser cannot draw more in time on a full bus. */
 const SHOWN = 400;
 
 export class List {

@@ -1,6 +1,6 @@
-// The rows of the trace: those that are kept, and which of them are wanted.
+// The rows of the trace that are kept, and the selection of the rows that are shown.
 
-/** So many rows are kept; older ones go, and that is said. */
+/** The number of rows that are kept. Older rows are dropped, and a text says so. */
 export const KEPT = 20_000;
 
 export const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
@@ -13,7 +13,7 @@ export class Rows {
     this.number = 0;
   }
 
-  /** Takes an event of the trace. What the server dropped before it becomes a row of its own. */
+  /** Takes an event of the trace. Rows that the server has dropped before it become a row of their own. */
   take({ lost, rows }) {
     const fresh = lost > 0 ? [{ gap: lost }, ...rows] : rows;
     for (const row of fresh) row.number = this.number += 1;
@@ -32,7 +32,7 @@ export class Rows {
   }
 }
 
-/** What of the trace is shown. */
+/** Sets the filter of the rows. */
 export class Filter {
   constructor() {
     this.kinds = new Set(KINDS);
@@ -44,7 +44,7 @@ export class Filter {
     this.words = text.toLowerCase().split(/\s+/).filter(Boolean);
   }
 
-  /** A gap is shown whatever the filter: the rows that are missing may have been wanted. */
+  /** A gap is shown whatever the filter, because the missing rows may have passed the filter. */
   wants(row) {
     if (row.gap) return true;
     if (!this.kinds.has(row.kind)) return false;

@@ -1,4 +1,4 @@
-// Commissioning: LSS, PDO mapping, and what each personality needs before it is used.
+// Commissioning: LSS, PDO mapping, and the settings of each personality before its use.
 
 import { el, set, text } from "../dom.js";
 import { Encoder } from "../commissioning/encoder.js";

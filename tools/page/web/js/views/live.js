@@ -79,7 +79,7 @@ class Live {
     onTheme(() => this.#makeCharts());
   }
 
-  /** Asks what the chosen node's TPDOs carry, and follows it; also while another view is shown, so that nothing is missing here. */
+  /** Follows the content of the chosen node's TPDOs, also while another view is shown, so that no samples are missing. */
   async #ask() {
     const node = this.bus.chosen;
     if (node == null || !this.bus.connection.connected) return;
@@ -94,7 +94,7 @@ class Live {
     }
   }
 
-  /** What no PDO carries is read by SDO: only while somebody looks, as a node has one SDO channel for all of its masters. */
+  /** Objects in no PDO are read by SDO, only while this view is shown: a node has one SDO channel for all of its masters. */
   async #follow() {
     const signals = this.offered.filter(({ tpdo }) => tpdo != null || this.isShown);
     const statuses = this.isShown ? signals.map(statusKey).filter(Boolean) : [];
@@ -196,7 +196,7 @@ class Live {
     this.isStale = true;
   }
 
-  /** A fault leads to its place on the time axis. */
+  /** A click on a fault shows its place on the time axis. */
   #fault({ t, node, text: words, active, kind }) {
     const look = () => this.time.show(t - this.time.length / 2, t + this.time.length / 2);
     return el("li", { data: { kind: kind === "state" ? "none" : active ? "bad" : "good" } }, button(seconds(t), look, { class: "plain", "aria-label": `Show ${seconds(t)} in the plots` }), ` node ${node}: ${words}`);

@@ -1,4 +1,4 @@
-// Overview: who is on the bus, and how they are.
+// Overview: the nodes on the bus, and their state.
 
 import { button, el, set, text } from "../dom.js";
 import { hex, percent, seconds } from "../format.js";

@@ -1,4 +1,4 @@
-// Stimuli: what the sensors of the simulated boards see.
+// Stimuli: the inputs of the sensors of the simulated boards.
 
 import { el } from "../dom.js";
 import { Boards } from "../stimuli/boards.js";

@@ -1,4 +1,4 @@
-// Trace: what every frame on the bus means.
+// Trace: the meaning of every frame on the bus.
 
 import { button, el, field, select, set, setChoices, text } from "../dom.js";
 import { offer } from "../file.js";
@@ -27,7 +27,7 @@ class Trace {
     bus.on("nodes", () => this.#nodes());
   }
 
-  /** From the first look on the trace runs, also while another view is shown: nothing is missing when the user comes back. */
+  /** Once this view was shown, the trace runs also while another view is shown, so that nothing is missing later. */
   show() {
     this.isShown = true;
     if (!this.isWanted) this.#ask();
@@ -92,7 +92,7 @@ class Trace {
     this.#count();
   }
 
-  /** All rows that are wanted, from those that are kept. */
+  /** All kept rows that pass the filter. */
   #show() {
     this.waiting = [];
     this.list.replace(this.rows.rows.filter((row) => this.filter.wants(row)));

@@ -1,4 +1,4 @@
-// Update: another program for a node. What is checked is shown before anything is erased.
+// Update: a new program for a node. The results of all checks are shown before anything is erased.
 
 import { button, el, field, set, text } from "../dom.js";
 import { base64 } from "../file.js";
@@ -40,7 +40,7 @@ class Update {
     await this.#inspect({ name: file.name, data: await base64(file) });
   }
 
-  /** Has the server check a file. Nothing is changed by that. */
+  /** Lets the server check a file. Nothing is changed. */
   async #inspect(file) {
     this.#clear();
     const keys = { node: this.bus.chosen, name: file.name, data: file.data };
@@ -78,7 +78,7 @@ class Update {
     text(this.step, all ? `${words}: ${done} of ${all}` : words);
   }
 
-  /** The program that ran before can be put back when its file was chosen on this page. */
+  /** The former program can be put back when its file was chosen on this page. */
   #offerBack({ result, old_identification: old, old_version: version }) {
     this.back.replaceChildren();
     if (result !== "updated") return;

@@ -1,4 +1,4 @@
-// What every node of this project has.
+// The objects that every node of this project has.
 
 export const NODE = {
   0x2000: "What the node is: 0 pressure, 1 encoder, 2 both, 3 lift. In force after the next reset.",
