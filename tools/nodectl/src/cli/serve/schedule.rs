@@ -53,8 +53,8 @@ impl<J> Schedule<J> {
         self.waiting.push((lane, haste, job));
     }
 
-    /// A job that may begin now, with its number. Older jobs of the same lane come first. A job that needs everything
-    /// is never overtaken by later jobs.
+    /// A job that may begin now, with its number. Older jobs of the same lane come first. Later jobs do not overtake an
+    /// urgent older one, so that a job that needs everything gets its turn.
     pub(super) fn next(&mut self) -> Option<(u64, J)> {
         let place = (0..self.waiting.len()).find(|&place| self.may_begin(place))?;
         let (lane, haste, job) = self.waiting.remove(place);
