@@ -22,7 +22,7 @@ pub(crate) const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
 pub(crate) const FASTEST: (u16, u8) = (0x2104, 1);
 pub(crate) const SENSOR_STATE: (u16, u8) = (0x210B, 1);
 
-/// Sensor types for object 2100h:1.
+/// Code of a sensor type, as in the device type (object 1000h).
 pub(crate) const MULTI_TURN: u32 = 2;
 /// Bit of the operating parameters: scaling is enabled.
 const SCALING: u32 = 1 << 2;

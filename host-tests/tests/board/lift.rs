@@ -92,7 +92,7 @@ fn buttons_are_virtual_inputs_and_lamps_follow_virtual_outputs() {
     }
 }
 
-/// PDOs of a node whose PDOs this node has no RPDO for: the frames must still pass the acceptance filters.
+/// Also from a producer without an RPDO in this node: the acceptance filters must pass its frames.
 #[test]
 fn multiplexed_pdos_of_any_node_light_a_lamp() {
     let mut world = world("--bitrate 1000 --node 1:lift");
