@@ -54,11 +54,11 @@ def unit_rows():
         power = Decimal(10) ** prefix
         for unit, field in itertools.product(PASCAL, ("-1234.5", "101325", "1000000")):
             value = single(field) / PASCAL[unit] / power
-            # Rounded twice: the divisor, the quotient.
+            # Rounded twice: the divisor and the quotient.
             yield unit_row("pressure", unit, prefix, field, value, 2 * abs(value))
         for unit, field in itertools.product(KELVIN, ("0", "233.15", "255.3722", "273.15", "310.15", "398.15")):
             value, zero = (KELVIN[unit](single(kelvin)) / power for kelvin in (field, 0))
-            # Rounded four times: the divisor, the quotient, the zero, the difference.
+            # Rounded four times: the divisor, the quotient, the zero and the difference.
             yield unit_row("temperature", unit, prefix, field, value, 2 * abs(value - zero) + abs(zero) + abs(value))
 
 
@@ -103,7 +103,7 @@ def real_rows():
     for span in ((0, 10), (-40, 125), (10, 0), (5, 5), ("-0.1", "0.1")):
         start, end = (single(limit) for limit in span)
         for limit, beside in itertools.product((start, end), (-1, 0, 1)):
-            # Beside 0 lie the smallest numbers of either sign.
+            # The neighbours of 0 are the smallest numbers of either sign.
             tiny = beside * Decimal(2) ** -149 if beside else Decimal(0)
             value = tiny if limit == 0 else neighbour(limit, beside)
             yield status_row("REAL32", start, end, value, overload(value, start, end))

@@ -30,7 +30,7 @@ def master(simulator):
 @pytest.fixture(scope="module")
 def driver():
     """One browser for all tests of a file."""
-    # The tests without a browser need no selenium.
+    # Tests without a browser do not need selenium.
     from page import browser
 
     driver = browser()

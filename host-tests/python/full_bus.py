@@ -20,9 +20,9 @@ import urllib.request
 import websocket
 
 NODES = range(1, 128)
-#: Frames a second. One with 8 bytes has 111 bits, interframe space included, and some stuff bits.
+#: Frames per second. A frame with 8 bytes has 111 bits, interframe space included, and some stuff bits.
 RATE = 8500
-#: Between two parcels of frames.
+#: Seconds between two parcels of frames.
 PARCEL = 0.005
 
 ABSENT = 0x0602_0000
@@ -53,7 +53,7 @@ class FullBus:
         self.running = threading.Event()
         self.lock = threading.Lock()
         self.sent = 0
-        #: The time of the first frame, by the clock of this program.
+        #: The time of the first frame, by this program's clock.
         self.first: float | None = None
         threading.Thread(target=self.serve, daemon=True).start()
 
@@ -151,7 +151,7 @@ def cpu(process: subprocess.Popen) -> float:
     return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
-#: What a page shows: eight signals of four nodes.
+#: The signals of a page: eight signals of four nodes.
 SIGNALS = [f"{node}:6130:{sub}" for node in (1, 40, 80, 127) for sub in (1, 2)]
 
 

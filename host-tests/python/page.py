@@ -14,10 +14,10 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
 from simulator import PATIENCE, Simulator
 
-#: The view that is shown.
+#: The selector of the view on display.
 SHOWN = "main > section:not([hidden])"
 
-#: Between two looks at the page.
+#: Seconds between two checks of the page.
 POLL = 0.1
 
 

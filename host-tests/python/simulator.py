@@ -13,11 +13,10 @@ from pathlib import Path
 import can
 import canopen
 
-#: Host seconds after which a frame that does not come is a failure. They pass in no test that succeeds, however busy the
-#: machine is.
+#: Host seconds after which a missing frame is a failure. No passing test waits this long, however busy the machine is.
 PATIENCE = 120.0
 
-#: Host seconds after which a question is asked again that nobody may have heard.
+#: Host seconds after which a request is repeated that the node may have missed.
 ONCE_MORE = 2.0
 
 BOOT_UP = b"\x00"
@@ -26,7 +25,7 @@ BOOT_UP = b"\x00"
 class Simulator:
     """The `sim` program with one pressure node, served on free ports."""
 
-    #: Those that have been started; the end of the session stops the ones that a failed test has left.
+    #: The simulators that were started; the end of the session stops those that a failed test has left running.
     started: list["Simulator"] = []
 
     def __init__(self, *flags: str, speed: str = "max", bootloader: str = "bootloader"):
@@ -37,7 +36,7 @@ class Simulator:
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         Simulator.started.append(self)
-        # The first line tells what is served.
+        # The first line lists the served addresses.
         line = self.process.stdout.readline()
         assert line, "the simulator has ended without serving clients"
         self.greeting = json.loads(line)
@@ -78,7 +77,7 @@ class Master:
         self.network.connect(interface="socketcand", host="127.0.0.1", port=simulator.socketcand, channel="vcan0")
         self.node = self.network.add_node(1, canopen.ObjectDictionary())
         self.node.sdo.RESPONSE_TIMEOUT = PATIENCE
-        # The client may be faster than the node, which answers nothing before it has booted.
+        # The client may be faster than the node, which does not answer before it has booted.
         if any(board["id"] == 1 for board in simulator.greeting["boards"]):
             self.ready()
 

@@ -19,9 +19,9 @@ from simulator import PATIENCE, Master, Simulator
 
 EDS = Path(__file__).parents[2] / "eds" / "pressure.eds"
 
-#: Objects whose value is a command or belongs to the moment.
+#: Objects whose value is a command or changes with time.
 COMMANDS = {0x1010, 0x1011, 0x1F51, 0x2203, 0x2204, 0x6125}
-#: What the EDS gives a default for and the node measures or counts.
+#: Objects that have a default in the EDS although the node measures or counts the value.
 MEASURED = {0x1F56, 0x6100, 0x6130, 0x6150, 0x7130, 0x9130}
 
 
@@ -50,7 +50,7 @@ def simulator(tmp_path_factory):
     log = tmp_path_factory.mktemp("log") / "bus.log"
     simulator = Simulator("--bitrate", "1000", "--pressure", "const:250000", "--candump", str(log), speed="real")
     simulator.log = log
-    # It has booted once before anybody resets it, or that boot-up would be taken for the one of the reset.
+    # The node must have booted once before a reset, so that this boot-up is not taken for the one of the reset.
     Master(simulator).ready().close()
     yield simulator
     simulator.process.kill()
@@ -111,7 +111,7 @@ def test_every_object_of_the_eds_is_written_or_refused(master: NodeWithEds):
     for number in (1, 2):
         master.write(0x1800 + number - 1, 1, 0x8000_0081 + 0x100 * number, 4)
         master.write(0x1A00 + number - 1, 0, 0, 1)
-    # The key to the calibration; "cali".
+    # The key to the calibration: "cali".
     master.write(0x2203, 0, 0x696C_6163, 4)
     for index, sub, variable, remote in master.variables():
         if index in COMMANDS or index == 0x2F00 or (index, sub) in ((0x2002, 2), (0x2003, 3)):
@@ -240,7 +240,7 @@ def test_tshark_finds_nothing_malformed_in_what_was_said(master: NodeWithEds, si
     master.node.nmt.send_command(0x01)
     master.network.send_message(0x80, b"")
     master.listen(0x701).next()
-    # What the simulator writes is complete up to here when it has ended.
+    # The log is complete when the simulator has ended.
     simulator.quit()
     fields = ["_ws.col.Protocol", "canopen.function_code", "_ws.malformed", "_ws.expert.message"]
     command = ["tshark", "-r", str(simulator.log), "-d", "can.subdissector,canopen", "-T", "fields"]

@@ -11,7 +11,7 @@ from selenium.webdriver.common.keys import Keys
 from simulator import PATIENCE, Simulator
 
 PRESSURE, ENCODER, LIFT, NEW = 1, 2, 33, 5
-#: A board that has a number on the simulator and no node-ID on the bus.
+#: A board with a number in the simulator and without a node-ID on the bus.
 WITHOUT_ID = 201
 PROCESS_VALUE = "Pressure process value"
 EDS = Path(__file__).parents[2] / "eds"
@@ -121,7 +121,7 @@ def test_what_is_being_edited_stays_when_the_nodes_are_heard_again(page: Page):
     for command, state in (("stop", "stopped"), ("start", "operational")):
         page.request("nmt", node=PRESSURE, command=command)
         page.until(lambda: page.script(STATE, PRESSURE) == state, f"hear that a node is {state}")
-    # As when the server was away.
+    # As after an interruption of the server.
     page.script("window.canopen.bus.dispatchEvent(new CustomEvent('connected'))")
     for _ in range(3):
         assert page.read(ENCODER, 0x6310, 2) != 77
@@ -138,7 +138,7 @@ def test_the_car_of_a_lift_is_shown_and_its_virtual_devices_are_chosen(page: Pag
         page.until(lambda: page.read(LIFT, 0x2305) == wanted, "choose the output panel")
 
 
-#: Each index of a data sheet for which the page has no words.
+#: The indexes of a data sheet for which the page has no help text.
 WITHOUT_HELP = """const [indices, personality, done] = arguments;
     import("./js/dictionary/help.js").then(({ help }) => done(indices.filter((index) => !help({ index }, personality))));"""
 

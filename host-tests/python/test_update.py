@@ -92,14 +92,14 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
     b = image(tmp_path / "b.img", "0.2.0")
     master = Master(simulator)
     master.ready()
-    # What a restarting node swallows must be noticed soon, and what a busy machine answers late is no loss.
+    # A request lost in a restart must be noticed soon, and a late answer of a busy host must not be an error.
     master.node.sdo.RESPONSE_TIMEOUT = 5.0
     until(lambda: master.read(IDENTIFICATION, 1) == identification(a), "run A")
     update_by_the_standard(master, b.read_bytes())
     assert master.read(IDENTIFICATION, 1) == identification(b)
     master.close()
 
-    # The two say the same version: a master that has only that to go by needs no force.
+    # Both images have the same version: a master that compares versions needs no force.
     report = nodectl(simulator, "update", a)
     assert report["result"] == "updated"
     assert (report["old_identification"], report["new_identification"]) == (identification(b), identification(a))
