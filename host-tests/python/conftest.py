@@ -18,7 +18,7 @@ def simulator():
 
 @pytest.fixture
 def master(simulator):
-    """A fresh connection to a node that was just reset, so that no test depends on another."""
+    """A new connection to a node that was just reset, so that no test depends on another."""
     master = Master(simulator)
     boot_up = master.listen(0x701)
     master.node.nmt.send_command(0x81)

@@ -29,7 +29,7 @@ ABSENT = 0x0602_0000
 
 
 def objects(node: int) -> dict[tuple[int, int], int]:
-    """What a node tells."""
+    """The objects of a node."""
     return {
         (0x1000, 0): 0x0002_0194,
         (0x1018, 1): 0,
@@ -44,7 +44,7 @@ def objects(node: int) -> dict[tuple[int, int], int]:
 
 
 class FullBus:
-    """The bus and its socketcand, for one client."""
+    """The bus and its socketcand server, for one client."""
 
     def __init__(self):
         self.listener = socket.create_server(("127.0.0.1", 0))
@@ -88,7 +88,7 @@ class FullBus:
             self.client.sendall("".join(f"< frame {id:03X} {now:.6f} {data.hex().upper()} >" for id, data in frames).encode())
 
     def run(self, seconds: float) -> None:
-        """Lets all nodes send for so long. What the host is too late for is sent later: the number of frames is that of the time."""
+        """Sends from all nodes for a time. When the host is late, frames are sent later: their number depends on the time only."""
         parcels = int(seconds / PARCEL)
         start, done = time.monotonic(), 0
         for parcel in range(1, parcels + 1):
@@ -99,7 +99,7 @@ class FullBus:
 
     @staticmethod
     def frame(number: int) -> tuple[int, bytes]:
-        """TPDO 1 of the nodes by turns, with the number of the turn as its value; a heartbeat now and then."""
+        """TPDO 1 of the nodes in turn, with the number of the turn as its value; heartbeats in between."""
         turn, node = divmod(number, len(NODES))
         if turn % 67 == 66:
             return 0x701 + node, b"\x05"
@@ -107,7 +107,7 @@ class FullBus:
 
 
 class Client:
-    """A page without a browser."""
+    """A client of the page's interface, without a browser."""
 
     def __init__(self, url: str):
         html = urllib.request.urlopen(url).read().decode()
@@ -131,7 +131,7 @@ class Client:
 
 
 def serve(bus: FullBus) -> tuple[subprocess.Popen, str]:
-    """The server on the bus, and its address."""
+    """The server on the bus, with its address."""
     address = f"socketcand://127.0.0.1:{bus.port}/vcan0"
     command = [os.environ["NODECTL_COMMAND"], "--json", "serve", address, "--page", "127.0.0.1:0"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

@@ -97,7 +97,7 @@ NAMES = {"default": "#d8dee9", "black": "#2e3440", "red": "#ff8a8a", "green": "#
 
 
 def terminal_of(command: list[str], seconds: float, rows: int = 30, columns: int = 110) -> pyte.Screen:
-    """What a program shows on a terminal of this size after some time."""
+    """The output of a program on a terminal of this size after some time."""
     screen = pyte.Screen(columns, rows)
     stream = pyte.ByteStream(screen)
     leader, follower = pty.openpty()

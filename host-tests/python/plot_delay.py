@@ -60,7 +60,7 @@ def measure(seconds: float) -> None:
 
 
 def names(page: Page) -> list[str]:
-    """The signals that are drawn."""
+    """The signals in the plots."""
     code = """return [...document.querySelectorAll("#view-live canvas")].flatMap((canvas) => Chart.getChart(canvas).data.datasets.map(({ label }) => label))"""
     return page.script(code)
 

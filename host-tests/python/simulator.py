@@ -52,7 +52,7 @@ class Simulator:
         return self.summary()
 
     def summary(self) -> dict:
-        """The summary of a run that ends."""
+        """The summary of a run that has ended."""
         output, _ = self.process.communicate(timeout=PATIENCE)
         assert self.process.returncode == 0
         (summary,) = output.splitlines()
@@ -69,7 +69,7 @@ class Simulator:
 
 
 class Master:
-    """A stock python-canopen network with node 1, and the frames that were heard."""
+    """A stock python-canopen network with node 1, and the received frames."""
 
     def __init__(self, simulator: Simulator):
         self.simulator = simulator
@@ -82,7 +82,7 @@ class Master:
             self.ready()
 
     def ready(self) -> "Master":
-        """Waits until the node answers: a simulator that has opened its ports has not booted its nodes yet."""
+        """Waits until the node answers: a simulator opens its ports before its nodes have booted."""
         self.node.sdo.RESPONSE_TIMEOUT = ONCE_MORE
         for _ in range(round(PATIENCE / ONCE_MORE)):
             try:
@@ -99,7 +99,7 @@ class Master:
         self.network.disconnect()
 
     def listen(self, cob_id: int) -> "Listener":
-        """Collects what comes with this COB-ID from now on."""
+        """Collects the frames with this COB-ID from now on."""
         return Listener(self.network, cob_id)
 
     def read(self, index: int, subindex: int = 0) -> int:
@@ -110,7 +110,7 @@ class Master:
 
 
 class Listener:
-    """Frames of one COB-ID, in their order."""
+    """Frames of one COB-ID, in order."""
 
     def __init__(self, network: canopen.Network, cob_id: int):
         self._frames: queue.Queue[tuple[float, bytes]] = queue.Queue()
@@ -121,7 +121,7 @@ class Listener:
         return self._frames.get(timeout=PATIENCE)
 
     def until(self, wanted) -> tuple[float, bytes]:
-        """The next frame whose data are as wanted."""
+        """The next frame with the wanted data."""
         while True:
             time, data = self.next()
             if wanted(data):

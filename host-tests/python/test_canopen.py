@@ -34,7 +34,7 @@ class NodeWithEds(Master):
         self.node.sdo.RESPONSE_TIMEOUT = PATIENCE
 
     def variables(self):
-        """Every entry of the EDS as the client's variable; the data types that an RPDO may map as dummies are none."""
+        """Every entry of the EDS as the client's variable, except for the data types that an RPDO may map as dummies."""
         for index, entry in self.node.object_dictionary.items():
             if index < 0x1000:
                 continue
@@ -75,7 +75,7 @@ def abort_code(action) -> int | None:
 
 
 def real_defaults() -> dict[tuple[int, int], float]:
-    """Defaults of REAL32 entries. The EDS has their bits, of which python-canopen makes no default."""
+    """Defaults of REAL32 entries. The EDS has the bits of the value, which python-canopen does not convert."""
     sheet = configparser.RawConfigParser(inline_comment_prefixes=(";",), strict=False)
     sheet.read(EDS, encoding="utf-8")
     defaults = {}
@@ -234,7 +234,7 @@ def test_three_nodes_without_a_node_id_are_found_and_moved_to_another_bit_rate()
 
 
 def test_tshark_finds_nothing_malformed_in_what_was_said(master: NodeWithEds, simulator):
-    """Runs last: the log holds all that the tests above said on the first simulator's bus."""
+    """Runs last: the log then holds all messages of the tests above on the first simulator's bus."""
     if shutil.which("tshark") is None:
         pytest.fail("tshark is missing; `cargo xtask test` installs it")
     master.node.nmt.send_command(0x01)

@@ -22,7 +22,7 @@ every_sheet = pytest.mark.parametrize("path", SHEETS, ids=lambda path: path.stem
 
 
 def entries(path: Path) -> int:
-    """Sections of the file that are an entry: those with a data type."""
+    """The sections of the file that are entries: those with a data type."""
     return path.read_text(encoding="utf-8").count("\nDataType=")
 
 

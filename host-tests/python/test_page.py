@@ -41,7 +41,7 @@ def server(simulator: Simulator):
 
 @pytest.fixture
 def page(driver, server: Server):
-    """The page as a user opens it, with both nodes heard and in operation."""
+    """The page as opened by a user, with both nodes known and Operational."""
     size(driver, 1440, 900)
     page = Page(driver, server.url)
     start(page)
@@ -64,7 +64,7 @@ def choose_node(page: Page, view: str, node: int) -> None:
 
 
 def sample_often(page: Page) -> None:
-    """TPDO 1 of the pressure node by its event timer, every 10 ms."""
+    """Sends TPDO 1 of the pressure node by its event timer, every 10 ms."""
     page.write(PRESSURE, 0x1800, 5, 10)
 
 
@@ -158,7 +158,7 @@ def choose_waveform(page: Page, board: str, quantity: str, form: str) -> None:
 
 
 def shown_quantity(page: Page, board: str, quantity: str) -> str:
-    """What the knobs of a quantity say."""
+    """The settings of a quantity's knobs."""
     code = "return document.querySelector(arguments[0]).closest('.quantity').innerText"
     return page.script(code, f"#view-stimuli {board} select[aria-label='Waveform of {quantity}']")
 
@@ -294,12 +294,12 @@ def test_the_keyboard_is_enough(page: Page):
     assert page.script("return document.activeElement.type") == "search"
 
 
-#: The elements that a screen reader announces by their names.
+#: The roles of elements that a screen reader announces by their names.
 NAMED = {"button", "checkbox", "combobox", "image", "img", "link", "progressbar", "searchbox", "slider", "spinbutton", "switch", "textbox"}
 
 
 def nameless(page: Page) -> list[str]:
-    """The controls and drawings for which the browser has no name to tell a screen reader."""
+    """The controls and drawings for which the browser has no accessible name."""
     nodes = page.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
     told = [node for node in nodes if not node["ignored"] and node["role"]["value"] in NAMED]
     assert len(told) > 8, "the tree has the controls"

@@ -52,12 +52,12 @@ def write(page: Page, label: str, text: str) -> None:
 
 
 def cams_are_read(page: Page) -> None:
-    """The cams are the last that is read of an encoder."""
+    """Waits for the cams, which the page reads last of an encoder."""
     page.until(lambda: page.find("input[aria-label='Cam 8 low']").is_enabled(), "show the cams")
 
 
 def shown(page: Page) -> float:
-    """The number that the panel shows large."""
+    """The number in the panel's large display."""
     text = page.text(f"{PANEL}:not([hidden]) output.big")
     return float(text.split()[0]) if text[:1] not in ("", "-") or text[1:2].isdigit() else float("nan")
 
@@ -183,7 +183,7 @@ def test_what_is_plotted_is_saved_as_a_table_and_as_a_drawing(page: Page, driver
 
 
 def test_the_bit_rate_of_all_nodes_is_changed(driver):
-    """The interface of the page keeps its rate, and so hears the nodes no more; one with the new rate does."""
+    """The interface of the page keeps its bit rate and so no longer hears the nodes; an interface with the new rate does."""
     simulator = Simulator("--bitrate", "500", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
     server = Server(simulator)
     page = Page(driver, server.url)

@@ -111,7 +111,7 @@ def test_slcan_clients_are_on_the_same_bus(master: Master):
 
 
 def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
-    """A ramp by 100 kPa in 4 s, then a step: the shape is known for each time stamp."""
+    """A ramp of 100 kPa in 4 s, then a step, so that the pressure at each time stamp is known."""
     simulator = Simulator("--bitrate", "1000", "--pressure", "ramp:100000,200000,4")
     master = Master(simulator)
     tpdo = master.listen(0x181)

@@ -30,7 +30,7 @@ FIELDS = [
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """The record of a bus on which everything happens: transfers of all kinds, refusals, PDOs, an emergency, a reset."""
+    """The record of a bus with all kinds of events: transfers, refusals, PDOs, an emergency, a reset."""
     log = tmp_path_factory.mktemp("trace") / "bus.log"
     simulator = Simulator("--bitrate", "1000", "--pressure", "const:250000", "--candump", str(log))
     master = Master(simulator)
