@@ -88,7 +88,7 @@ class FullBus:
             self.client.sendall("".join(f"< frame {id:03X} {now:.6f} {data.hex().upper()} >" for id, data in frames).encode())
 
     def run(self, seconds: float) -> None:
-        """Sends from all nodes for a time. When the host is late, frames are sent later: their number depends on the time only."""
+        """Sends from all nodes for a time. A late host sends frames later, but the same number of frames."""
         parcels = int(seconds / PARCEL)
         start, done = time.monotonic(), 0
         for parcel in range(1, parcels + 1):

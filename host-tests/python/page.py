@@ -155,7 +155,7 @@ class Page:
         return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE" and lost not in entry["message"]]
 
     def leave(self) -> None:
-        """Closes the page before its server ends: otherwise the page would keep reconnecting, and log an error each time."""
+        """Closes the page before its server ends: the page would log an error for each try to reconnect."""
         errors = self.console()
         self.driver.get("about:blank")
         assert errors == [], "errors in the page's console"

@@ -34,7 +34,7 @@ class NodeWithEds(Master):
         self.node.sdo.RESPONSE_TIMEOUT = PATIENCE
 
     def variables(self):
-        """Every entry of the EDS as the client's variable, except for the data types that an RPDO may map as dummies."""
+        """Every entry of the EDS as the client's variable, except for the dummy data types of RPDOs."""
         for index, entry in self.node.object_dictionary.items():
             if index < 0x1000:
                 continue

@@ -183,7 +183,7 @@ def test_what_is_plotted_is_saved_as_a_table_and_as_a_drawing(page: Page, driver
 
 
 def test_the_bit_rate_of_all_nodes_is_changed(driver):
-    """The interface of the page keeps its bit rate and so no longer hears the nodes; an interface with the new rate does."""
+    """The page's interface keeps its bit rate and no longer hears the nodes; one with the new rate does."""
     simulator = Simulator("--bitrate", "500", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
     server = Server(simulator)
     page = Page(driver, server.url)

@@ -45,7 +45,8 @@ impl Program {
     pub(crate) fn run(&mut self, request: Request) -> Result<Outcome> {
         let mailbox = self.machine.peripherals_mut();
         (mailbox.request, mailbox.is_done) = (request, false);
-        // The instructions of the empty loop are subtracted at the end: between two frames a node can do less than the empty loop.
+        // The instructions of the empty loop are subtracted at the end: between two frames a node may execute fewer
+        // instructions than the empty loop.
         let (mut instructions, mut empty) = (0_u64, 0);
         let end = self.machine.now() + LIMIT;
         while !self.is_done()? {

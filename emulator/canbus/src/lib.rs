@@ -16,17 +16,16 @@
 //! 2. calls `step` with all participants and the earliest instant that any board has reached.
 //!
 //! `step` returns the next event: the end of a frame for its receivers and, a bit later, for its transmitter, the
-//! end of the intermission, or a start of frame that is already requested. Boards are at that very instant when it
-//! end of the intermission, or a start of frame that is already requested. Boards have reached exactly that instant
-//! when it
-//! comes, so a frame requested in the last bit of an intermission takes part in the arbitration.
+//! end of the intermission, or a start of frame that is already requested. All boards have then reached exactly the
+//! instant of this event, so a frame requested in the last bit of an intermission takes part in the arbitration.
+//!
 //! While the bus is idle, only the quantum `Q` limits how far the boards run. A board may then have run up to `Q` past
 //! a start of frame that another board has caused. No event is missed as long as `Q` is shorter than the time between a
 //! start of frame and the first event that a receiver can notice:
 //!
 //! * frames without errors: the end of the shortest frame, so any `Q` of up to 43 bits is causal;
 //! * with injected errors, or participants at another bit rate: an error is reported no earlier than 12 bits after
-//! the start of frame (six to see the error, six of the flag). With `Q` of up to 12 bits this is causal too.
+//!   the start of frame (six to see the error, six of the flag). With `Q` of up to 12 bits this is causal too.
 //!
 //! Wake-up by a start of frame and the end of a wait for 11 recessive bits may be late by up to `Q`. Whatever `Q`
 //! is, the same input gives the same traffic.

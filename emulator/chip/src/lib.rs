@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `map`, `access`, `lane` | addresses: which peripheral answers, whether it is clocked, narrow accesses |
 //! | `stm32f4`, `schedule`, `clock_and_reset` | the peripherals together: time, interrupt lines, clocks, resets |
-//! | `converter`, `pins` | links between peripherals: timer to ADC to DMA to memory; encoders and buttons to their pins |
+//! | `converter`, `pins` | links of peripherals: timer to ADC to DMA to memory; encoders and buttons to their pins |
 //! | one file or folder each | the peripherals, which do not depend on each other |
 //! | `rules` | limits that silicon enforces: clocks, wait states, pins, sampling times |
 //! | `loss` | events that a test makes the chip lose |
@@ -18,8 +18,7 @@
 //! cannot answer as silicon would is recorded: [`Stm32f4::unmodelled`].
 //!
 //! The images do not use these peripherals of the chip: RTC, WWDG, TIM1 and TIM8, ADC2 and ADC3, DAC, USARTs, I2C, SAI,
-//! SDIO,
-//! USB, DCMI, CEC, FMC, QUADSPI and the power-down modes. They have a name in the map, but no model.
+//! SDIO, USB, DCMI, CEC, FMC, QUADSPI and the power-down modes. They have a name in the map, but no model.
 
 mod access;
 mod adc;

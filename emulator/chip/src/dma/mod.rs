@@ -1,9 +1,8 @@
 //! A DMA controller: eight streams (RM0390 section 9, RM0090 section 10).
 //!
-//! Modelled: direct mode between a peripheral and memory, circular and double buffer. Transfers take no time. Memory to
-//! memory,
-//! FIFO mode, bursts and flow control by the peripheral are not modelled: a write that selects one of these is
-//! recorded.
+//! Modelled: direct mode between a peripheral and memory, circular and double buffer. Transfers take no time. Not
+//! modelled: memory to memory, FIFO mode, bursts and flow control by the peripheral. A write that selects one of these
+//! is recorded.
 
 mod stream;
 
