@@ -1,4 +1,4 @@
-//! The programs take the place of the bootloader in memory.x: they start at reset and are small.
+//! Links the programs at the bootloader's place in memory.x: they start at reset and are small.
 
 use std::path::Path;
 use std::{env, fs};

@@ -70,7 +70,7 @@ def row(channel, unit, prefix, field, factor, scaling_offset, offset, digits):
 
 
 def cases():
-    """A grid of ordinary cases, and a fixed random choice of the rest."""
+    """A grid of ordinary cases, and random other cases with a fixed seed."""
     for unit, prefix in itertools.product(PASCAL, (0, -3, 3, -18, 18)):
         for field in (0, 1, 101325, 250000.5, 1000000, -1234.5):
             yield "pressure", unit, prefix, field, 1, 0, 0, 2

@@ -23,7 +23,7 @@ SPAN16, SPAN32 = (-(2**15), 2**15 - 1), (-(2**31), 2**31 - 1)
 
 
 def response_rows():
-    """From 0 to 1 bar at sample 1: for good, or for one sample."""
+    """Responses to 1 bar from sample 1 on (step) or at sample 1 only (impulse)."""
     for kind, constant in itertools.product((1, 2), (1, 2, 10, 100, 255)):
         length = settled_after(constant) if kind == 1 else 3 * constant + 2
         for stimulus in ("step", "impulse"):
@@ -34,13 +34,13 @@ def response_rows():
 
 
 def settled_after(constant):
-    """Samples until less than half a unit in the last place of a REAL32 is missing."""
+    """Number of samples until the output is within half a unit in the last place of a REAL32."""
     rest = 1 - Decimal(1) / constant
     return 1 if rest == 0 else int(26 * Decimal(2).ln() / -rest.ln()) + 2
 
 
 def chosen(length, constant):
-    """The beginning, then ever fewer, both sides of the ends of the first blocks, and the end."""
+    """The first samples, then fewer and fewer, the samples around the ends of the first blocks, and the last one."""
     samples, at = set(range(12)) | {length - 1}, 12.0
     while at < length:
         samples.add(int(at))
@@ -54,11 +54,11 @@ def unit_rows():
         power = Decimal(10) ** prefix
         for unit, field in itertools.product(PASCAL, ("-1234.5", "101325", "1000000")):
             value = single(field) / PASCAL[unit] / power
-            # Rounded twice: the divisor, the quotient.
+            # Rounded twice: the divisor and the quotient.
             yield unit_row("pressure", unit, prefix, field, value, 2 * abs(value))
         for unit, field in itertools.product(KELVIN, ("0", "233.15", "255.3722", "273.15", "310.15", "398.15")):
             value, zero = (KELVIN[unit](single(kelvin)) / power for kelvin in (field, 0))
-            # Rounded four times: the divisor, the quotient, the zero, the difference.
+            # Rounded four times: the divisor, the quotient, the zero and the difference.
             yield unit_row("temperature", unit, prefix, field, value, 2 * abs(value - zero) + abs(zero) + abs(value))
 
 
@@ -78,7 +78,7 @@ def digit_rows():
 
 
 def rounded(value):
-    """To the nearest REAL32, ties to even, in one step."""
+    """The nearest REAL32, ties to even, rounded once."""
     if value == 0:
         return value
     exponent = value.copy_abs().log10() / Decimal(2).log10()
@@ -87,7 +87,7 @@ def rounded(value):
 
 
 def neighbour(value, beside):
-    """The REAL32 so many places away from the nearest one."""
+    """The REAL32 that is `beside` places away from the nearest one."""
     bits = struct.unpack("<i", struct.pack("<f", float(value)))[0]
     return Decimal(struct.unpack("<f", struct.pack("<i", bits + beside))[0])
 
@@ -103,7 +103,7 @@ def real_rows():
     for span in ((0, 10), (-40, 125), (10, 0), (5, 5), ("-0.1", "0.1")):
         start, end = (single(limit) for limit in span)
         for limit, beside in itertools.product((start, end), (-1, 0, 1)):
-            # Beside 0 lie the smallest numbers of either sign.
+            # The neighbours of 0 are the smallest numbers of either sign.
             tiny = beside * Decimal(2) ** -149 if beside else Decimal(0)
             value = tiny if limit == 0 else neighbour(limit, beside)
             yield status_row("REAL32", start, end, value, overload(value, start, end))

@@ -21,7 +21,7 @@ LINEAR = (ROD, ROD_COUNTED, ROD_ABSOLUTE, ROD_CYCLIC)
 
 
 def steps(case):
-    """Native steps per revolution or in a rod, and how many positions the sensor tells apart."""
+    """Native steps per revolution or of a rod, and the number of positions that the sensor distinguishes."""
     bits = 2 ** (case["revolution_bits"] + case["step_bits"])
     return {
         SINGLE: 2 ** case["step_bits"],
@@ -56,7 +56,7 @@ def word_bits(case):
 
 
 def frame(case, total):
-    """What comes in: a timer count, or the bits of an SSI frame with the rest level before and two bits after."""
+    """The input: a timer count, or the bits of an SSI frame with the rest level before and two bits after the word."""
     position = total % 2 ** word_bits(case)
     if case["type"] not in ABSOLUTE:
         return format(position, "x")

@@ -18,7 +18,7 @@ def simulator():
 
 @pytest.fixture
 def master(simulator):
-    """A fresh connection to a node that was just reset, so that no test depends on another."""
+    """A new connection to a node that was just reset, so that no test depends on another."""
     master = Master(simulator)
     boot_up = master.listen(0x701)
     master.node.nmt.send_command(0x81)
@@ -30,7 +30,7 @@ def master(simulator):
 @pytest.fixture(scope="module")
 def driver():
     """One browser for all tests of a file."""
-    # The tests without a browser need no selenium.
+    # Tests without a browser do not need selenium.
     from page import browser
 
     driver = browser()

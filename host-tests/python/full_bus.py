@@ -20,16 +20,16 @@ import urllib.request
 import websocket
 
 NODES = range(1, 128)
-#: Frames a second. One with 8 bytes has 111 bits, interframe space included, and some stuff bits.
+#: Frames per second. A frame with 8 bytes has 111 bits, interframe space included, and some stuff bits.
 RATE = 8500
-#: Between two parcels of frames.
+#: Seconds between two parcels of frames.
 PARCEL = 0.005
 
 ABSENT = 0x0602_0000
 
 
 def objects(node: int) -> dict[tuple[int, int], int]:
-    """What a node tells."""
+    """The objects of a node."""
     return {
         (0x1000, 0): 0x0002_0194,
         (0x1018, 1): 0,
@@ -44,7 +44,7 @@ def objects(node: int) -> dict[tuple[int, int], int]:
 
 
 class FullBus:
-    """The bus and its socketcand, for one client."""
+    """The bus and its socketcand server, for one client."""
 
     def __init__(self):
         self.listener = socket.create_server(("127.0.0.1", 0))
@@ -53,7 +53,7 @@ class FullBus:
         self.running = threading.Event()
         self.lock = threading.Lock()
         self.sent = 0
-        #: The time of the first frame, by the clock of this program.
+        #: The time of the first frame, by this program's clock.
         self.first: float | None = None
         threading.Thread(target=self.serve, daemon=True).start()
 
@@ -88,7 +88,7 @@ class FullBus:
             self.client.sendall("".join(f"< frame {id:03X} {now:.6f} {data.hex().upper()} >" for id, data in frames).encode())
 
     def run(self, seconds: float) -> None:
-        """Lets all nodes send for so long. What the host is too late for is sent later: the number of frames is that of the time."""
+        """Sends from all nodes for a time. A late host sends frames later, but the same number of frames."""
         parcels = int(seconds / PARCEL)
         start, done = time.monotonic(), 0
         for parcel in range(1, parcels + 1):
@@ -99,7 +99,7 @@ class FullBus:
 
     @staticmethod
     def frame(number: int) -> tuple[int, bytes]:
-        """TPDO 1 of the nodes by turns, with the number of the turn as its value; a heartbeat now and then."""
+        """TPDO 1 of the nodes in turn, with the number of the turn as its value; heartbeats in between."""
         turn, node = divmod(number, len(NODES))
         if turn % 67 == 66:
             return 0x701 + node, b"\x05"
@@ -107,7 +107,7 @@ class FullBus:
 
 
 class Client:
-    """A page without a browser."""
+    """A client of the page's interface, without a browser."""
 
     def __init__(self, url: str):
         html = urllib.request.urlopen(url).read().decode()
@@ -131,7 +131,7 @@ class Client:
 
 
 def serve(bus: FullBus) -> tuple[subprocess.Popen, str]:
-    """The server on the bus, and its address."""
+    """The server on the bus, with its address."""
     address = f"socketcand://127.0.0.1:{bus.port}/vcan0"
     command = [os.environ["NODECTL_COMMAND"], "--json", "serve", address, "--page", "127.0.0.1:0"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -151,7 +151,7 @@ def cpu(process: subprocess.Popen) -> float:
     return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
-#: What a page shows: eight signals of four nodes.
+#: The signals of a page: eight signals of four nodes.
 SIGNALS = [f"{node}:6130:{sub}" for node in (1, 40, 80, 127) for sub in (1, 2)]
 
 

@@ -14,10 +14,10 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
 from simulator import PATIENCE, Simulator
 
-#: The view that is shown.
+#: The selector of the view on display.
 SHOWN = "main > section:not([hidden])"
 
-#: Between two looks at the page.
+#: Seconds between two checks of the page.
 POLL = 0.1
 
 
@@ -41,7 +41,7 @@ class Server:
 
 
 def browser(width: int = 1440, height: int = 900) -> webdriver.Chrome:
-    """A headless browser that keeps nothing of others."""
+    """A headless browser with an empty profile."""
     options = webdriver.ChromeOptions()
     for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--hide-scrollbars"):
         options.add_argument(argument)
@@ -58,7 +58,7 @@ def size(driver: webdriver.Chrome, width: int, height: int) -> None:
 
 
 class Page:
-    """What a user does with the page and sees on it. Waits end when the page shows what is waited for."""
+    """A user's actions and observations on the page. Waits end when the page shows the expected state."""
 
     def __init__(self, driver: webdriver.Chrome, url: str):
         self.driver = driver
@@ -83,7 +83,7 @@ class Page:
         return self.script("return document.querySelector(arguments[0])?.innerText ?? ''", selector)
 
     def says(self, selector: str, words: str) -> str:
-        """Waits until an element has these words."""
+        """Waits until an element contains this text."""
         return self.until(lambda: words in (text := self.text(selector)) and text, f"say {words!r} at {selector}")
 
     def view(self, name: str) -> None:
@@ -94,7 +94,7 @@ class Page:
         return self.driver.find_element(By.CSS_SELECTOR, f"{SHOWN} {selector}")
 
     def press(self, name: str, inside: str = "") -> None:
-        """Presses the button of this view with this name, when it is in use."""
+        """Presses the button of this view with this name, when the button is enabled."""
         code = """return [...document.querySelectorAll(arguments[0])].find((button) => button.offsetParent && !button.disabled
             && (button.ariaLabel ?? button.innerText).trim() === arguments[1])"""
         button = self.until(lambda: self.script(code, f"{SHOWN} {inside} button", name), f"offer {name!r}")
@@ -120,7 +120,7 @@ class Page:
         return field
 
     def drawn(self, signal: str) -> list[dict]:
-        """The points of a signal that its plot draws now; none while it has no plot."""
+        """The points of a signal in its plot now; none without a plot."""
         code = """const [name, unit] = [arguments[0], arguments[1]];
             for (const canvas of document.querySelectorAll("#view-live canvas"))
               for (const { label, data } of Chart.getChart(canvas).data.datasets) if (label === name) return data;
@@ -128,7 +128,7 @@ class Page:
         return self.script(code, signal, None)
 
     def open_object(self, address: str) -> str:
-        """Finds an object in the dictionary and opens its details. Returns the selector of these."""
+        """Finds an object in the dictionary and opens its details. Returns the selector of the details."""
         self.view("dictionary")
         self.until(lambda: self.script("return document.querySelectorAll('.objects tbody tr').length > 50"), "list the objects")
         self.fill("Search", address)
@@ -138,11 +138,11 @@ class Page:
         return f"{row} + tr.details"
 
     def request(self, what: str, **keys):
-        """Asks the server as the page does, and waits for the answer."""
+        """Sends a request to the server as the page does, and waits for the answer."""
         return self.script("return window.canopen.bus.request(arguments[0], arguments[1])", what, keys)
 
     def read(self, node: int, index: int, sub: int = 0):
-        """The value of an object. A node has one SDO channel for all: the tests read by the server, which shares it."""
+        """The value of an object. All clients share the SDO channel of a node, so the tests read through the server."""
         (value,) = self.request("read", node=node, objects=[[index, sub]])["values"]
         return value["value"]
 
@@ -150,12 +150,12 @@ class Page:
         self.request("write", node=node, index=index, sub=sub, value=value)
 
     def console(self) -> list[str]:
-        """What went wrong in the page's programs."""
+        """The errors of the page's scripts."""
         lost = "WebSocket connection to"
         return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE" and lost not in entry["message"]]
 
     def leave(self) -> None:
-        """Ends the page before its server ends: it would ask for the server again and again, and each try is an error in the console."""
+        """Closes the page before its server ends: the page would log an error for each try to reconnect."""
         errors = self.console()
         self.driver.get("about:blank")
         assert errors == [], "errors in the page's console"

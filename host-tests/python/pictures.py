@@ -22,7 +22,7 @@ from simulator import Simulator
 FOLDER = Path(__file__).parents[2] / "docs/pictures"
 DESK, PHONE = (1440, 900), (390, 844)
 
-#: A picture is a palette of so many colours: a page has few, and the file stays small.
+#: Number of colours in the palette of a picture: a page has few colours, and the file stays small.
 COLOURS = 64
 
 #: Seconds of the bus that the plots of a picture show.
@@ -57,7 +57,7 @@ def take_page(page: Page) -> None:
     page.press("Start all")
     page.says("tr[data-node='1'] td[data-label=State]", "operational")
     page.write(1, 0x1800, 5, 10)
-    # A fault of the device does not take the node out of Operational.
+    # A fault of the device leaves the node in Operational.
     page.write(1, 0x1029, 2, 1)
     begin = bus_time(page)
     page.view("live")
@@ -97,7 +97,7 @@ NAMES = {"default": "#d8dee9", "black": "#2e3440", "red": "#ff8a8a", "green": "#
 
 
 def terminal_of(command: list[str], seconds: float, rows: int = 30, columns: int = 110) -> pyte.Screen:
-    """What a program shows on a terminal of this size after some time."""
+    """The output of a program on a terminal of this size after some time."""
     screen = pyte.Screen(columns, rows)
     stream = pyte.ByteStream(screen)
     leader, follower = pty.openpty()

@@ -11,10 +11,10 @@ from full_bus import FullBus, cpu, memory, serve
 from page import Page, browser
 
 NODE = 1
-#: Seconds of the bus before the measurement begins: the page is warm then.
+#: Seconds of the bus before the measurement begins, so that the page has warmed up.
 WARM_UP = 3.0
 
-#: After each picture that is painted: how old the first sample is that the picture before did not show.
+#: After each painted picture: the age of the first sample that the previous picture did not show.
 DELAYS = """const [name, first, seconds, done] = arguments;
     const chart = [...document.querySelectorAll("#view-live canvas")].map((canvas) => Chart.getChart(canvas))
       .find(({ data }) => data.datasets.some(({ label }) => label === name));
@@ -60,7 +60,7 @@ def measure(seconds: float) -> None:
 
 
 def names(page: Page) -> list[str]:
-    """The signals that are drawn."""
+    """The signals in the plots."""
     code = """return [...document.querySelectorAll("#view-live canvas")].flatMap((canvas) => Chart.getChart(canvas).data.datasets.map(({ label }) => label))"""
     return page.script(code)
 

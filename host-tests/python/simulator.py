@@ -13,11 +13,10 @@ from pathlib import Path
 import can
 import canopen
 
-#: Host seconds after which a frame that does not come is a failure. They pass in no test that succeeds, however busy the
-#: machine is.
+#: Host seconds after which a missing frame is a failure. No passing test waits this long, however busy the machine is.
 PATIENCE = 120.0
 
-#: Host seconds after which a question is asked again that nobody may have heard.
+#: Host seconds after which a request is repeated that the node may have missed.
 ONCE_MORE = 2.0
 
 BOOT_UP = b"\x00"
@@ -26,7 +25,7 @@ BOOT_UP = b"\x00"
 class Simulator:
     """The `sim` program with one pressure node, served on free ports."""
 
-    #: Those that have been started; the end of the session stops the ones that a failed test has left.
+    #: The simulators that were started; the end of the session stops those that a failed test has left running.
     started: list["Simulator"] = []
 
     def __init__(self, *flags: str, speed: str = "max", bootloader: str = "bootloader"):
@@ -37,7 +36,7 @@ class Simulator:
         command += ["--socketcand", "127.0.0.1:0", "--slcan", "127.0.0.1:0", "--speed", speed, "--json", *flags]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         Simulator.started.append(self)
-        # The first line tells what is served.
+        # The first line lists the served addresses.
         line = self.process.stdout.readline()
         assert line, "the simulator has ended without serving clients"
         self.greeting = json.loads(line)
@@ -53,7 +52,7 @@ class Simulator:
         return self.summary()
 
     def summary(self) -> dict:
-        """The summary of a run that ends."""
+        """The summary of a run that has ended."""
         output, _ = self.process.communicate(timeout=PATIENCE)
         assert self.process.returncode == 0
         (summary,) = output.splitlines()
@@ -70,7 +69,7 @@ class Simulator:
 
 
 class Master:
-    """A stock python-canopen network with node 1, and the frames that were heard."""
+    """A stock python-canopen network with node 1, and the received frames."""
 
     def __init__(self, simulator: Simulator):
         self.simulator = simulator
@@ -78,12 +77,12 @@ class Master:
         self.network.connect(interface="socketcand", host="127.0.0.1", port=simulator.socketcand, channel="vcan0")
         self.node = self.network.add_node(1, canopen.ObjectDictionary())
         self.node.sdo.RESPONSE_TIMEOUT = PATIENCE
-        # The client may be faster than the node, which answers nothing before it has booted.
+        # The client may be faster than the node, which does not answer before it has booted.
         if any(board["id"] == 1 for board in simulator.greeting["boards"]):
             self.ready()
 
     def ready(self) -> "Master":
-        """Waits until the node answers: a simulator that has opened its ports has not booted its nodes yet."""
+        """Waits until the node answers: a simulator opens its ports before its nodes have booted."""
         self.node.sdo.RESPONSE_TIMEOUT = ONCE_MORE
         for _ in range(round(PATIENCE / ONCE_MORE)):
             try:
@@ -100,7 +99,7 @@ class Master:
         self.network.disconnect()
 
     def listen(self, cob_id: int) -> "Listener":
-        """Collects what comes with this COB-ID from now on."""
+        """Collects the frames with this COB-ID from now on."""
         return Listener(self.network, cob_id)
 
     def read(self, index: int, subindex: int = 0) -> int:
@@ -111,7 +110,7 @@ class Master:
 
 
 class Listener:
-    """Frames of one COB-ID, in their order."""
+    """Frames of one COB-ID, in order."""
 
     def __init__(self, network: canopen.Network, cob_id: int):
         self._frames: queue.Queue[tuple[float, bytes]] = queue.Queue()
@@ -122,7 +121,7 @@ class Listener:
         return self._frames.get(timeout=PATIENCE)
 
     def until(self, wanted) -> tuple[float, bytes]:
-        """The next frame whose data are as wanted."""
+        """The next frame with the wanted data."""
         while True:
             time, data = self.next()
             if wanted(data):

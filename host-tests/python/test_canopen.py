@@ -19,9 +19,9 @@ from simulator import PATIENCE, Master, Simulator
 
 EDS = Path(__file__).parents[2] / "eds" / "pressure.eds"
 
-#: Objects whose value is a command or belongs to the moment.
+#: Objects whose value is a command or changes with time.
 COMMANDS = {0x1010, 0x1011, 0x1F51, 0x2203, 0x2204, 0x6125}
-#: What the EDS gives a default for and the node measures or counts.
+#: Objects that have a default in the EDS although the node measures or counts the value.
 MEASURED = {0x1F56, 0x6100, 0x6130, 0x6150, 0x7130, 0x9130}
 
 
@@ -34,7 +34,7 @@ class NodeWithEds(Master):
         self.node.sdo.RESPONSE_TIMEOUT = PATIENCE
 
     def variables(self):
-        """Every entry of the EDS as the client's variable; the data types that an RPDO may map as dummies are none."""
+        """Every entry of the EDS as the client's variable, except for the dummy data types of RPDOs."""
         for index, entry in self.node.object_dictionary.items():
             if index < 0x1000:
                 continue
@@ -50,7 +50,7 @@ def simulator(tmp_path_factory):
     log = tmp_path_factory.mktemp("log") / "bus.log"
     simulator = Simulator("--bitrate", "1000", "--pressure", "const:250000", "--candump", str(log), speed="real")
     simulator.log = log
-    # It has booted once before anybody resets it, or that boot-up would be taken for the one of the reset.
+    # The node must have booted once before a reset, so that this boot-up is not taken for the one of the reset.
     Master(simulator).ready().close()
     yield simulator
     simulator.process.kill()
@@ -75,7 +75,7 @@ def abort_code(action) -> int | None:
 
 
 def real_defaults() -> dict[tuple[int, int], float]:
-    """Defaults of REAL32 entries. The EDS has their bits, of which python-canopen makes no default."""
+    """Defaults of REAL32 entries. The EDS has the bits of the value, which python-canopen does not convert."""
     sheet = configparser.RawConfigParser(inline_comment_prefixes=(";",), strict=False)
     sheet.read(EDS, encoding="utf-8")
     defaults = {}
@@ -111,7 +111,7 @@ def test_every_object_of_the_eds_is_written_or_refused(master: NodeWithEds):
     for number in (1, 2):
         master.write(0x1800 + number - 1, 1, 0x8000_0081 + 0x100 * number, 4)
         master.write(0x1A00 + number - 1, 0, 0, 1)
-    # The key to the calibration; "cali".
+    # The key to the calibration: "cali".
     master.write(0x2203, 0, 0x696C_6163, 4)
     for index, sub, variable, remote in master.variables():
         if index in COMMANDS or index == 0x2F00 or (index, sub) in ((0x2002, 2), (0x2003, 3)):
@@ -234,13 +234,13 @@ def test_three_nodes_without_a_node_id_are_found_and_moved_to_another_bit_rate()
 
 
 def test_tshark_finds_nothing_malformed_in_what_was_said(master: NodeWithEds, simulator):
-    """Runs last: the log holds all that the tests above said on the first simulator's bus."""
+    """Runs last: the log then holds all messages of the tests above on the first simulator's bus."""
     if shutil.which("tshark") is None:
         pytest.fail("tshark is missing; `cargo xtask test` installs it")
     master.node.nmt.send_command(0x01)
     master.network.send_message(0x80, b"")
     master.listen(0x701).next()
-    # What the simulator writes is complete up to here when it has ended.
+    # The log is complete when the simulator has ended.
     simulator.quit()
     fields = ["_ws.col.Protocol", "canopen.function_code", "_ws.malformed", "_ws.expert.message"]
     command = ["tshark", "-r", str(simulator.log), "-d", "can.subdissector,canopen", "-T", "fields"]

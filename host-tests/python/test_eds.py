@@ -22,7 +22,7 @@ every_sheet = pytest.mark.parametrize("path", SHEETS, ids=lambda path: path.stem
 
 
 def entries(path: Path) -> int:
-    """Sections of the file that are an entry: those with a data type."""
+    """The sections of the file that are entries: those with a data type."""
     return path.read_text(encoding="utf-8").count("\nDataType=")
 
 
@@ -44,7 +44,7 @@ def test_python_canopen_has_every_entry(path: Path):
         if index >= 0x1000:
             variables += [entry] if isinstance(entry, od.ODVariable) else list(entry.subindices.values())
     assert len(variables) == entries(path)
-    # It takes no bits for a real number: such an entry has no default here, and none that is wrong.
+    # The importer does not accept bits for a real number: such an entry has no default here, and no wrong one.
     reals = [variable.default for variable in variables if variable.data_type == od.REAL32]
     assert set(reals) <= {None, 0.0}
 
@@ -97,5 +97,5 @@ def test_a_dump_of_a_node_is_read_by_all(simulator: Simulator, npm: Path, tmp_pa
     assert (dictionary[0x1017].value, dictionary[0x1017].default) == (500, 1000)
     done = subprocess.run(["node", "-e", SCRIPT, npm, path], capture_output=True, text=True, check=False)
     assert json.loads(done.stdout)["count"] == entries(path)
-    # Lely reads the bits of a real number.
+    # Lely accepts the bits of a real number.
     assert "ParameterValue=0x3E800000" in path.read_text(encoding="utf-8")

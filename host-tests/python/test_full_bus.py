@@ -60,5 +60,5 @@ def test_a_trace_shows_every_frame_or_says_how_many_are_missing(served):
             rows += len(message["rows"])
             lost += message["lost"]
     assert rows > 0
-    # The other page has read nothing of this: what waits for it is bounded.
+    # The other page has read nothing so far: its queue is bounded.
     assert memory(process) < 100e6

@@ -1,4 +1,4 @@
-"""The golden values in the tree are what their scripts compute."""
+"""The golden values in the tree equal the output of their scripts."""
 
 import subprocess
 import sys

@@ -57,7 +57,7 @@ class Bench:
         return self.frames[cob_id].get(timeout=PATIENCE)
 
     def state(self, command: str, code: int) -> None:
-        """Commands a state and waits for the heartbeat that shows it."""
+        """Commands a state and waits for the heartbeat with this state."""
         self.node.nmt.state = command
         while self.next(0x700 + NODE) != bytes([code]):
             pass

@@ -13,7 +13,7 @@ EDS = ROOT / "eds" / "lift.eds"
 TABLE = ROOT / "host-tests" / "tables" / "lift417.csv"
 NODE_ID = 33
 
-#: What the node has of the table: its own units produce these and consume those. What has one CAN-ID for all nodes is off.
+#: The node's PDOs in the table: its units produce and consume these. PDOs with one CAN-ID for all nodes are off.
 PRODUCED = {2, 130, 258, 263, 264, 385, 386}
 OFF = {258, 263, 264, 385, 386}
 CONSUMED = {2, 3, 4, 5, 6, 7, 8, 257}
@@ -70,7 +70,7 @@ def test_a_master_reads_what_the_node_sends():
         node = master.node = master.network.add_node(NODE_ID, str(EDS))
         master.ready()
         assert node.sdo[0x1000].raw == 0x000001A1
-        # Car position unit and load measuring unit.
+        # The choice of virtual devices: car position unit and load measuring unit.
         node.sdo[0x2305].raw = 0x03
         assert node.sdo[0x1000].raw == 0x000001A1
         assert [node.sdo[0x6000][sub].raw for sub in range(3)] == [2, 0x0600, 0x0A00]

@@ -10,13 +10,13 @@ from selenium.webdriver.support.select import Select
 from simulator import Simulator
 
 PRESSURE, ENCODER = 1, 2
-#: 1029h:2: a fault of the device does not take it out of Operational.
+#: 1029h:2: a fault of the device leaves the node in Operational.
 STAY_OPERATIONAL = 1
 VIEWS = ["overview", "live", "dictionary", "trace", "commissioning", "update", "stimuli"]
 PROCESS_VALUE, SAME_AS_INTEGER = "Pressure process value", "Pressure process value INTEGER16"
 
 
-#: The newest time of the bus that the page has heard of.
+#: The newest bus time that the page has received.
 BUS_TIME = "return window.canopen.recorder.t"
 
 
@@ -41,7 +41,7 @@ def server(simulator: Simulator):
 
 @pytest.fixture
 def page(driver, server: Server):
-    """The page as a user opens it, with both nodes heard and in operation."""
+    """The page as opened by a user, with both nodes known and Operational."""
     size(driver, 1440, 900)
     page = Page(driver, server.url)
     start(page)
@@ -64,7 +64,7 @@ def choose_node(page: Page, view: str, node: int) -> None:
 
 
 def sample_often(page: Page) -> None:
-    """TPDO 1 of the pressure node by its event timer, every 10 ms."""
+    """Sends TPDO 1 of the pressure node by its event timer, every 10 ms."""
     page.write(PRESSURE, 0x1800, 5, 10)
 
 
@@ -92,7 +92,7 @@ def test_a_plot_follows_a_step_of_the_stimulus(page: Page):
     page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["y"] > 3.9, "plot the step")
     points = [point for point in page.drawn(PROCESS_VALUE) if point["x"] > before]
     risen = next(point["x"] for point in points if point["y"] > 3.9)
-    # The plot may have been up to one message behind the bus when the stimulus was sent.
+    # The plot may have been one message behind the bus when the stimulus was sent.
     assert before + 0.5 <= risen <= after + 0.5 + 1
     assert all(point["y"] < 2.1 for point in points if point["x"] < before + 0.5), "nothing is plotted before it happens"
     steps = [later["x"] - earlier["x"] for earlier, later in zip(points, points[1:])]
@@ -125,7 +125,7 @@ def test_a_waveform_moves_the_plot(page: Page):
     choose_node(page, "live", PRESSURE)
     page.until(lambda: page.drawn(PROCESS_VALUE)[-1]["y"] > 4.9, "plot the end of the ramp")
     values = [point["y"] for point in page.drawn(PROCESS_VALUE)]
-    # What was there before the ramp may lie between its ends.
+    # Values from before the ramp may lie between its ends.
     begin = max((at for at, value in enumerate(values) if value <= 1.5), default=0)
     ramp = [value for value in values[begin:] if 1.5 < value < 4.5]
     # A sample comes every 10 ms, and the ramp rises by 2 bar a second.
@@ -158,7 +158,7 @@ def choose_waveform(page: Page, board: str, quantity: str, form: str) -> None:
 
 
 def shown_quantity(page: Page, board: str, quantity: str) -> str:
-    """What the knobs of a quantity say."""
+    """The settings of a quantity's knobs."""
     code = "return document.querySelector(arguments[0]).closest('.quantity').innerText"
     return page.script(code, f"#view-stimuli {board} select[aria-label='Waveform of {quantity}']")
 
@@ -294,12 +294,12 @@ def test_the_keyboard_is_enough(page: Page):
     assert page.script("return document.activeElement.type") == "search"
 
 
-#: What a screen reader says by its name.
+#: The roles of elements that a screen reader announces by their names.
 NAMED = {"button", "checkbox", "combobox", "image", "img", "link", "progressbar", "searchbox", "slider", "spinbutton", "switch", "textbox"}
 
 
 def nameless(page: Page) -> list[str]:
-    """The controls and drawings for which the browser has no name to tell a screen reader."""
+    """The controls and drawings for which the browser has no accessible name."""
     nodes = page.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
     told = [node for node in nodes if not node["ignored"] and node["role"]["value"] in NAMED]
     assert len(told) > 8, "the tree has the controls"

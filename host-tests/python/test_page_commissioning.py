@@ -11,7 +11,7 @@ from selenium.webdriver.common.keys import Keys
 from simulator import PATIENCE, Simulator
 
 PRESSURE, ENCODER, LIFT, NEW = 1, 2, 33, 5
-#: A board that has a number on the simulator and no node-ID on the bus.
+#: A board with a number in the simulator and without a node-ID on the bus.
 WITHOUT_ID = 201
 PROCESS_VALUE = "Pressure process value"
 EDS = Path(__file__).parents[2] / "eds"
@@ -52,12 +52,12 @@ def write(page: Page, label: str, text: str) -> None:
 
 
 def cams_are_read(page: Page) -> None:
-    """The cams are the last that is read of an encoder."""
+    """Waits for the cams, which the page reads last of an encoder."""
     page.until(lambda: page.find("input[aria-label='Cam 8 low']").is_enabled(), "show the cams")
 
 
 def shown(page: Page) -> float:
-    """The number that the panel shows large."""
+    """The number in the panel's large display."""
     text = page.text(f"{PANEL}:not([hidden]) output.big")
     return float(text.split()[0]) if text[:1] not in ("", "-") or text[1:2].isdigit() else float("nan")
 
@@ -121,7 +121,7 @@ def test_what_is_being_edited_stays_when_the_nodes_are_heard_again(page: Page):
     for command, state in (("stop", "stopped"), ("start", "operational")):
         page.request("nmt", node=PRESSURE, command=command)
         page.until(lambda: page.script(STATE, PRESSURE) == state, f"hear that a node is {state}")
-    # As when the server was away.
+    # As after an interruption of the server.
     page.script("window.canopen.bus.dispatchEvent(new CustomEvent('connected'))")
     for _ in range(3):
         assert page.read(ENCODER, 0x6310, 2) != 77
@@ -138,7 +138,7 @@ def test_the_car_of_a_lift_is_shown_and_its_virtual_devices_are_chosen(page: Pag
         page.until(lambda: page.read(LIFT, 0x2305) == wanted, "choose the output panel")
 
 
-#: Each index of a data sheet for which the page has no words.
+#: The indexes of a data sheet for which the page has no help text.
 WITHOUT_HELP = """const [indices, personality, done] = arguments;
     import("./js/dictionary/help.js").then(({ help }) => done(indices.filter((index) => !help({ index }, personality))));"""
 
@@ -183,7 +183,7 @@ def test_what_is_plotted_is_saved_as_a_table_and_as_a_drawing(page: Page, driver
 
 
 def test_the_bit_rate_of_all_nodes_is_changed(driver):
-    """The interface of the page keeps its rate, and so hears the nodes no more; one with the new rate does."""
+    """The page's interface keeps its bit rate and no longer hears the nodes; one with the new rate does."""
     simulator = Simulator("--bitrate", "500", "--node", "1:pressure", "--node", "2:encoder", "--control", "127.0.0.1:0", speed="real")
     server = Server(simulator)
     page = Page(driver, server.url)

@@ -9,7 +9,7 @@ from test_update import identification, image
 
 
 def checked(page: Page, file: Path) -> str:
-    """Has the page check a file, and waits for what it says."""
+    """Makes the page check a file, and waits for the result."""
     page.field("Program").send_keys(str(file))
     return page.says("#view-update .outcome", "nothing is changed")
 

@@ -1,4 +1,4 @@
-"""`nodectl record --arrow`: the stream is what an independent reader of Apache Arrow takes it for."""
+"""`nodectl record --arrow`: an independent reader of Apache Arrow reads the stream with the right values."""
 
 import csv
 import os

@@ -12,7 +12,7 @@ STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
 #: One step of the 12-bit converter in pascal: the transducer gives 80 % of its supply over 1 MPa.
 ADC_STEP = 1_000_000 / 4096 / 0.8
 
-#: The process value is in bar unless 6131h says otherwise.
+#: The process value is in bar unless 6131h selects another unit.
 BAR = 100_000
 
 
@@ -55,7 +55,7 @@ def test_tpdo1_follows_a_constant_pressure(master: Master, pressure: int):
     master.simulator.command(f"pressure 1=const:{pressure}")
     master.node.nmt.send_command(0x01)
     tpdo = master.listen(0x181)
-    # The terminal and the bus are two ways to the simulator: some TPDOs may have been measured before the change.
+    # Terminal and bus are separate connections to the simulator: some TPDOs may have been measured before the change.
     tpdo.until(lambda data: math.isclose(pascal(data), pressure, abs_tol=ADC_STEP))
     assert pascal(tpdo.next()[1]) == pytest.approx(pressure, abs=ADC_STEP)
 
@@ -106,12 +106,12 @@ def test_slcan_clients_are_on_the_same_bus(master: Master):
     node = network.add_node(1, canopen.ObjectDictionary())
     node.sdo.RESPONSE_TIMEOUT = PATIENCE
     assert node.sdo.upload(0x1000, 0) == struct.pack("<I", 0x0002_0194)
-    # It closes the bus as well.
+    # The call also closes the bus.
     network.disconnect()
 
 
 def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
-    """A ramp by 100 kPa in 4 s, then a step: the shape is known for each time stamp."""
+    """A ramp of 100 kPa in 4 s, then a step, so that the pressure at each time stamp is known."""
     simulator = Simulator("--bitrate", "1000", "--pressure", "ramp:100000,200000,4")
     master = Master(simulator)
     tpdo = master.listen(0x181)
@@ -121,7 +121,7 @@ def test_ramps_and_steps_are_followed_and_the_run_is_summed_up():
     for _ in range(10):
         time, data = tpdo.next()
         ramp = 100_000 + 100_000 * min(time / 4, 1)
-        # Sampled up to two milliseconds before the time stamp, which is the end of the frame.
+        # The sample is up to two milliseconds older than the time stamp, which is the end of the frame.
         assert pascal(data) == pytest.approx(ramp, abs=ADC_STEP + 50)
     simulator.command("pressure step:150000,300000,0.5")
     before, _ = tpdo.until(lambda data: math.isclose(pascal(data), 150_000, abs_tol=ADC_STEP))

@@ -35,7 +35,7 @@ def test_the_page_is_there_as_long_as_the_simulator_however_that_ends(end):
 
 
 def test_from_elsewhere_nothing_goes_without_the_token():
-    """A server for other machines tells its address with the token, and gives nothing to who does not have it."""
+    """A server for other machines shows its address with the token, and refuses clients without the token."""
     simulator = with_page("0.0.0.0:0")
     url = simulator.greeting["page"]
     place, token = url.split("?token=")

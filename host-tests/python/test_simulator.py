@@ -1,4 +1,4 @@
-"""How the simulator starts and ends, as a script sees it."""
+"""Start and end of the simulator as a script sees them."""
 
 import signal
 

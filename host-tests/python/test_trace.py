@@ -30,7 +30,7 @@ FIELDS = [
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """The record of a bus on which everything happens: transfers of all kinds, refusals, PDOs, an emergency, a reset."""
+    """The record of a bus with all kinds of events: transfers, refusals, PDOs, an emergency, a reset."""
     log = tmp_path_factory.mktemp("trace") / "bus.log"
     simulator = Simulator("--bitrate", "1000", "--pressure", "const:250000", "--candump", str(log))
     master = Master(simulator)
@@ -81,19 +81,19 @@ def number(text: str) -> int:
 
 def test_the_same_transfers_with_the_same_values(log):
     frames = [row for row in of_tshark(log) if row["canopen.sdo.ccs"] or row["canopen.sdo.scs"]]
-    # The first frame of each transfer, and what is refused: their index, sub-index and abort code.
+    # Index and sub-index of the first frame of each transfer, and abort codes of the refused transfers.
     begins = [row for row in frames if row["canopen.sdo.ccs"] and row["canopen.sdo.main_idx"] and not row["canopen.sdo.abort_code"]]
     wanted = [(number(row["canopen.sdo.main_idx"]), number(row["canopen.sdo.sub_idx"])) for row in begins]
     lines = [line for line in of_nodectl(log) if line["kind"] == "sdo"]
-    # The first frame of a block transfer is nothing but bytes to tshark.
+    # tshark does not decode the first frame of a block transfer.
     objects = [line["values"][0]["object"] for line in lines if "(blocks, " not in line["text"]]
     assert objects == [f"{index:04X}h:{sub}" for index, sub in wanted]
-    # Text in the segments of a block looks like aborts of objects that nobody has asked for.
+    # To tshark, text in the segments of a block looks like aborts of objects that were never requested.
     refused = [row for row in frames if row["canopen.sdo.abort_code"] and row["canopen.sdo.scs"]]
     refused = [row for row in refused if number(row["canopen.sdo.main_idx"] or "0") in {index for index, _ in wanted}]
     aborts = [number(row["canopen.sdo.abort_code"]) for row in refused]
     assert [line["abort"] for line in lines if "refused" in line["text"]] == aborts and len(aborts) >= 2
-    # What was read in one frame.
+    # Values that were read in one frame.
     is_read = [row for row in frames if row["canopen.sdo.scs"].endswith("2") and row["canopen.sdo.main_idx"]]
     read = [row for row in is_read if row["canopen.sdo.e"] in ("1", "True")]
     told = {(row["canopen.sdo.main_idx"], row["canopen.sdo.sub_idx"]): row["canopen.sdo.data.bytes"] for row in read}
@@ -101,7 +101,7 @@ def test_the_same_transfers_with_the_same_values(log):
     for (index, sub), data in told.items():
         name = f"{number(index):04X}h:{number(sub)}"
         values = [line["values"][0]["value"] for line in lines if line["values"][0]["object"] == name]
-        # A question that was asked before the node had booted has no answer.
+        # A request from before the node's boot-up has no answer.
         (value, *_) = [value for value in values if value is not None]
         assert value == int.from_bytes(bytes.fromhex(data.replace(":", "")), "little"), name
     texts = [line["text"] for line in lines if line["values"][0]["object"] == "1008h:0"]

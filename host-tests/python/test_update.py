@@ -29,7 +29,7 @@ def simulator():
 
 
 def image(path: Path, version: str) -> Path:
-    """The application, signed as another version: its identification differs with a word that is added to its code."""
+    """The application, signed as another version, with another identification because a word is added to its code."""
     elf = Path(os.environ["NODE_IMAGES"]) / "firmware"
     signed = elf.with_name("firmware.img").read_bytes()
     code = path.with_suffix(".bin")
@@ -40,12 +40,12 @@ def image(path: Path, version: str) -> Path:
 
 
 def identification(file: Path) -> int:
-    """CRC-32 of the code, where docs/update.md has it."""
+    """CRC-32 of the code, at the place given in docs/update.md."""
     return int.from_bytes(file.read_bytes()[28:32], "little")
 
 
 def until(condition, what: str):
-    """Asks again and again, as a master does that does not know how long a step takes."""
+    """Repeats a request, like a master that does not know how long a step takes."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         try:
@@ -58,7 +58,7 @@ def until(condition, what: str):
 
 
 def command_that_restarts(master: Master, command: int) -> None:
-    """It may be acknowledged or not."""
+    """Sends a command; the node may restart before it acknowledges."""
     try:
         master.write(CONTROL, 1, command, 1)
     except canopen.SdoCommunicationError:
@@ -92,14 +92,14 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
     b = image(tmp_path / "b.img", "0.2.0")
     master = Master(simulator)
     master.ready()
-    # What a restarting node swallows must be noticed soon, and what a busy machine answers late is no loss.
+    # A request lost in a restart must be noticed soon, and a late answer of a busy host must not be an error.
     master.node.sdo.RESPONSE_TIMEOUT = 5.0
     until(lambda: master.read(IDENTIFICATION, 1) == identification(a), "run A")
     update_by_the_standard(master, b.read_bytes())
     assert master.read(IDENTIFICATION, 1) == identification(b)
     master.close()
 
-    # The two say the same version: a master that has only that to go by needs no force.
+    # Both images have the same version: a master that compares versions needs no force.
     report = nodectl(simulator, "update", a)
     assert report["result"] == "updated"
     assert (report["old_identification"], report["new_identification"]) == (identification(b), identification(a))
@@ -107,7 +107,7 @@ def test_an_update_by_python_canopen_and_back_by_nodectl(simulator: Simulator, t
 
 
 def test_the_holder_of_its_key_opens_a_node_with_the_standard_library():
-    """The bootloader has a key, and no program that its owner has signed: as docs/update.md says it in Python."""
+    """The bootloader has a key, but no program signed by its owner. The Python code is that of docs/update.md."""
     simulator = Simulator("--bitrate", "1000", speed="real", bootloader="bootloader-guarded")
     master = Master(simulator)
     assert master.read(0x1000) == BOOT

@@ -1,10 +1,10 @@
-//! What a device has left to its caller, until a test asks for it.
+//! The requests of a device to its caller, kept until a test asks for them.
 
 use std::collections::VecDeque;
 
 use canopen::{Action, Next};
 
-/// Actions in their order, and whether there are new parameters.
+/// The requested actions in order, and whether there are new parameters.
 #[derive(Debug, Default)]
 pub struct Asked {
     actions: VecDeque<Action>,
@@ -12,7 +12,7 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// Keeps what follows from a call.
+    /// Keeps the requests that a call has returned.
     pub fn keep(&mut self, next: Next) {
         self.actions.extend(next.action);
         self.parameters |= next.parameters;
@@ -23,7 +23,7 @@ impl Asked {
         self.actions.pop_front()
     }
 
-    /// Whether there are new parameters; once.
+    /// Whether there are new parameters; resets the flag.
     pub fn take_parameters(&mut self) -> bool {
         std::mem::take(&mut self.parameters)
     }

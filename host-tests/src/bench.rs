@@ -1,4 +1,4 @@
-//! A node with its parameter store on a bench, without a bus: frames in and out, and the time under control.
+//! A node with its parameter store on a bench, without a bus: a test passes frames in and out, and controls the time.
 
 use canopen::sdo::Multiplexer;
 use canopen::{Action, Duration, Frame, Instant, Next, NodeId, QueueFull, Transmit};
@@ -12,7 +12,7 @@ use crate::sdo::{Channel, Client, Failure};
 /// Node-ID of the node on the bench.
 pub const ID: u8 = 0x21;
 
-/// A transmit queue that keeps all it gets.
+/// A transmit queue that keeps all frames.
 #[derive(Debug, Default)]
 pub struct Queue(pub Vec<Frame>);
 
@@ -34,21 +34,21 @@ pub struct Bench {
     pub protocol: Protocol,
     /// The sampling half.
     pub measurement: Measurement,
-    /// What it has sent.
+    /// The sent frames.
     pub out: Queue,
-    /// The time.
+    /// The current time.
     pub now: Instant,
-    /// What it stores.
+    /// The parameter store.
     pub store: Flash,
-    /// What is read of the encoder.
+    /// The readings of the encoder.
     pub encoder: RawEncoder,
-    /// Which buttons are pressed.
+    /// The buttons that are pressed.
     pub buttons: [bool; 2],
-    /// What it is where nothing is stored.
+    /// The setup of a node without a stored device record.
     setup: Setup,
     actions: VecDeque<Action>,
     has_parameters: bool,
-    /// What is wrong with the device record.
+    /// The fault of the device record, if any.
     boot_data: Option<&'static Fault>,
 }
 
@@ -76,7 +76,8 @@ pub fn setup() -> Setup {
 pub const CHIP: ChipThermometer =
     ChipThermometer { offset: 303.15 - 940.0 * 80.0 / 270.0, slope: 1500.0 * 80.0 / 270.0 };
 
-/// The readings of an intact sensor at this pressure in Pa and temperature in K: 16 conversions at VDDA = 3.3 V.
+/// The readings of an intact sensor at this pressure in Pa and temperature in K: sums of 16 conversions at VDDA = 3.3
+/// V.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
@@ -93,7 +94,7 @@ pub fn raw(pascal: f64, kelvin: f64) -> RawSample {
     }
 }
 
-/// As the firmware takes what is stored of the device.
+/// The setup from the stored device record, as the firmware reads it.
 fn stored_setup(record: DeviceRecord, unless_stored: &Setup) -> Setup {
     Setup {
         personality: Personality::numbered(record.personality()).expect("a personality"),
@@ -103,7 +104,7 @@ fn stored_setup(record: DeviceRecord, unless_stored: &Setup) -> Setup {
     }
 }
 
-/// A board that is switched on for the first time.
+/// The power-on state of a new board.
 #[must_use]
 pub fn intact() -> PowerOn {
     PowerOn { thermometer: CHIP, ..PowerOn::default() }
@@ -112,15 +113,15 @@ pub fn intact() -> PowerOn {
 /// An empty parameter store.
 ///
 /// # Panics
-/// When it cannot be prepared.
+/// When the store cannot be prepared.
 #[must_use]
 pub fn empty_store() -> Flash {
     Store::prepare(View::open(Memory(ERASED.to_vec()), PAGES).expect("pages")).expect("a store")
 }
 
-/// The job that the node asks for; `None` when there is none.
+/// The store job that the node requests; `None` without a request.
 ///
-/// As in the firmware, a job may wait for the values of new parameters: they come with the next samples.
+/// As in the firmware, a job may wait for the values of new parameters, which come with the next samples.
 pub fn take_job(protocol: &mut Protocol, now: Instant, out: &mut impl Transmit) -> Option<StoreJob> {
     let mut job = StoreJob::new(Personality::default());
     for _ in 0..4 {
@@ -132,7 +133,7 @@ pub fn take_job(protocol: &mut Protocol, now: Instant, out: &mut impl Transmit) 
     None
 }
 
-/// Stores at once what the node asks to be stored.
+/// Carries out the store job of the node at once.
 pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &mut impl Transmit) {
     if let Some(mut job) = take_job(protocol, now, out) {
         let result = job.run(store);
@@ -141,7 +142,7 @@ pub fn run_job(protocol: &mut Protocol, store: &mut Flash, now: Instant, out: &m
 }
 
 impl Bench {
-    /// A node that has booted, its boot-up message out of the way.
+    /// A node that has booted; its boot-up message is already taken.
     #[must_use]
     pub fn booted() -> Bench {
         Bench::with_flash(ERASED.to_vec())
@@ -196,7 +197,7 @@ impl Bench {
         Bench::start(self.store.into_flash().0, &self.setup, PowerOn { retained, ..intact() })
     }
 
-    /// The same, with one bit changed of what was stored last.
+    /// Switches the power off and on, with one bit of the last stored record changed.
     ///
     /// # Panics
     /// When nothing is stored.
@@ -205,7 +206,8 @@ impl Bench {
         let mut flash = self.store.into_flash().0;
         let (first_page, _) = flash.split_at(flash.len() / 2);
         let last = first_page.iter().rposition(|&byte| byte != 0xFF).expect("something is stored");
-        // Behind the last record, which ends in its check, are the commit word and the closing mark, four bytes each.
+        // After the last record, which ends with its checksum, come the commit word and the closing mark, four bytes
+        // each.
         flash[last - 8] ^= 1;
         Bench::start(flash, &self.setup, intact())
     }
@@ -219,13 +221,13 @@ impl Bench {
         self.keep(next);
     }
 
-    /// The next thing that the node has left to its firmware, but for storing, which it has got.
+    /// The next action that the node requests from the firmware. Store jobs are already done.
     pub fn take_action(&mut self) -> Option<Action> {
         self.poll();
         self.actions.pop_front()
     }
 
-    /// Keeps what follows from a call, and stores what the node wants stored.
+    /// Keeps the requests that a call has returned, and carries out store jobs.
     fn keep(&mut self, next: Next) {
         self.has_parameters |= next.parameters;
         match next.action {
@@ -240,7 +242,7 @@ impl Bench {
         self.poll();
     }
 
-    /// A fault that the firmware has found, or that is gone.
+    /// Reports a fault that the firmware has found, or its end.
     pub fn set_fault(&mut self, fault: Fault, active: bool) {
         let _ = self.protocol.set_fault(&fault, active, self.now);
         self.poll();
@@ -251,7 +253,7 @@ impl Bench {
         self.out.0.drain(..).map(|frame| (frame.id(), frame.data().to_vec())).collect()
     }
 
-    /// Hands over a frame the way the filters do.
+    /// Passes a frame to the node, as the acceptance filters do.
     pub fn receive(&mut self, frame: &Frame) {
         let is_process = self.protocol.process_ids().any(|id| id == frame.id());
         let is_service = self.protocol.service_ids().any(|id| id == frame.id());
@@ -270,7 +272,7 @@ impl Bench {
         self.receive(&Frame::new(0, &[command, ID]).expect("a frame"));
     }
 
-    /// Does what is due and returns the next deadline.
+    /// Does all work that is due and returns the next deadline.
     pub fn poll(&mut self) -> Instant {
         loop {
             let process = self.protocol.poll_process(self.now, &mut self.out).process;
@@ -336,7 +338,7 @@ impl Bench {
     }
 }
 
-/// The node answers at once or never.
+/// The SDO channel; the node answers at once or not at all.
 impl Channel for Bench {
     fn send(&mut self, request: [u8; 8]) {
         self.receive(&Frame::new(0x600 + u16::from(ID), &request).expect("a frame"));

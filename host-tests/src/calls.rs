@@ -1,36 +1,37 @@
-//! Calls of a lift panel: whether what the bus saw of the buttons tells everything that happened to them.
+//! Calls of a lift panel: checks whether the frames on the bus report every transition of the buttons.
 
 /// A button that was pressed or released.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Transition {
-    /// When, in microseconds.
+    /// The instant in microseconds.
     pub at: u64,
-    /// Which button, from 0.
+    /// The number of the button, from 0 on.
     pub button: usize,
     /// Whether it is pressed now.
     pub is_pressed: bool,
 }
 
-/// How the transitions of the two buttons of one panel reached the bus.
+/// How the log reports the transitions of a panel's two buttons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict {
-    /// Transitions that were told on their own, in their order.
+    /// Transitions that are reported individually, in order.
     pub told: usize,
-    /// Transitions that a full state covered.
+    /// Transitions that are covered by a full state.
     pub covered: usize,
-    /// Full states: one word for each button in a row.
+    /// Full states: one word for each button, in order.
     pub full_states: usize,
 }
 
-/// Checks a log against what happened: every transition is told once, in its order, or is covered by a full state that is
-/// told after it. A word of the log was formed at most `lag` microseconds after the transitions that it knows of.
+/// Checks a log against the transitions. Every transition is reported once and in order, or is covered by a later full
+/// state. A word of the log was formed at most `lag` microseconds after the latest transition that it contains.
 ///
-/// The log is read with the fewest full states that explain it.
+/// Of several interpretations of the log, the one with the fewest full states counts.
 ///
 /// # Errors
-/// The first word that nothing explains, or the number of transitions that the end of the log does not tell.
+/// The first word without an explanation, or the number of transitions that are missing at the end of the log.
 pub fn verify(transitions: &[Transition], log: &[Transition], lag: u64) -> Result<Verdict, String> {
-    // What is possible after each word: the next transition to tell, and whether the second half of a full state is due.
+    // The possible states after each word: the next transition to report, and whether the second half of a full state
+    // is due.
     let mut possible = vec![(0_usize, false, Verdict::default())];
     for (place, word) in log.iter().enumerate() {
         let made = transitions.partition_point(|transition| transition.at <= word.at);
@@ -55,7 +56,7 @@ pub fn verify(transitions: &[Transition], log: &[Transition], lag: u64) -> Resul
                 add((told, false, verdict));
             }
             for at in told.max(known)..=made {
-                // A start may interrupt a full state: another one begins.
+                // A start may interrupt a full state; a new full state then begins.
                 if word.button == 0 && is_so(at) {
                     let covered = verdict.covered + at - told;
                     add((at, true, Verdict { covered, full_states: verdict.full_states + 1, ..verdict }));
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn a_word_that_is_missing_twice_or_too_early_is_not() {
-        // The last transition keeps the words before it from being a full state of what was known by then.
+        // The last transition prevents the interpretation of the words before it as a full state.
         let more = [HAPPENED[0], HAPPENED[1], HAPPENED[2], HAPPENED[3], at(50, 0, true)];
         assert!(verify(&more, &more.map(later), 0).is_ok());
         for missing in 0..5 {

@@ -1,4 +1,4 @@
-//! A small device with what the pressure node has not: an object of several KiB, for long transfers.
+//! A small device with an object of several KiB, which the pressure node lacks, for long transfers.
 
 use canopen::dictionary::{Access, Dictionary, Object, Type};
 use canopen::sdo::{Abort, Multiplexer};
@@ -9,15 +9,15 @@ use crate::network::Unit;
 
 /// Node-ID of the device.
 pub const ID: u8 = 9;
-/// Its object of up to [`CAPACITY`] bytes.
+/// The object of up to [`CAPACITY`] bytes.
 pub const DOMAIN: Multiplexer = Multiplexer { index: 0x2000, sub: 0 };
-/// A text of up to [`TEXT_CAPACITY`] bytes, which lives in the image.
+/// A text of up to [`TEXT_CAPACITY`] bytes, stored in the process image.
 pub const TEXT: Multiplexer = Multiplexer { index: 0x2001, sub: 0 };
-/// A plain UNSIGNED32.
+/// An UNSIGNED32.
 pub const WORD: Multiplexer = Multiplexer { index: 0x2002, sub: 0 };
-/// Most bytes of the domain.
+/// Maximum size of the domain in bytes.
 pub const CAPACITY: usize = 8192;
-/// Most bytes of the text.
+/// Maximum size of the text in bytes.
 pub const TEXT_CAPACITY: u8 = 60;
 
 const fn parameter(at: Multiplexer, kind: Type) -> Object {
@@ -32,10 +32,10 @@ const ROWS: &[Object] = &[
 ];
 const DICTIONARY: Dictionary = canopen::dictionary!(ROWS);
 
-/// The content of the domain. A download replaces it when it is complete.
+/// The content of the domain. A complete download replaces it.
 #[derive(Debug, Default)]
 pub struct Store {
-    /// What a client can read.
+    /// The content that a client can read.
     pub content: Vec<u8>,
     incoming: Vec<u8>,
 }
@@ -77,13 +77,13 @@ impl DomainDevice {
         DomainDevice { device: Device::new(&DICTIONARY, node_id, Store::default()), asked: Asked::default() }
     }
 
-    /// What is stored.
+    /// The stored content.
     #[must_use]
     pub fn content(&self) -> &[u8] {
         &self.device.application().content
     }
 
-    /// Stores something.
+    /// Replaces the stored content.
     pub fn set_content(&mut self, content: &[u8]) {
         self.device.application_mut().content = content.to_vec();
     }

@@ -1,4 +1,4 @@
-//! What the tests that cross crates share.
+//! Common parts of the tests that use several crates.
 
 pub mod asked;
 pub mod bench;

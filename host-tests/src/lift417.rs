@@ -4,33 +4,33 @@ use crate::tables::Row;
 
 const TABLE: &str = include_str!("../tables/lift417.csv");
 
-/// What the table says of a PDO.
+/// A PDO of the table.
 #[derive(Clone, Debug)]
 pub struct Pdo {
-    /// It is a TPDO.
+    /// Whether the PDO is a TPDO.
     pub is_produced: bool,
-    /// Its number.
+    /// The number of the PDO.
     pub number: u16,
     /// Index of the communication parameter.
     pub communication: u16,
     /// Index of the mapping parameter.
     pub mapping: u16,
-    /// CAN-ID; the node-ID is to be added to it where `is_relative`.
+    /// CAN-ID; with `is_relative` the node-ID is added.
     pub base: u32,
-    /// The CAN-ID depends on the node-ID.
+    /// Whether the CAN-ID depends on the node-ID.
     pub is_relative: bool,
-    /// Index, sub-index and bits; none for a multiplexed PDO.
+    /// Index, sub-index and bits of the mapped objects; none for a multiplexed PDO.
     pub objects: Vec<(u16, u8, u8)>,
 }
 
 impl Pdo {
-    /// The CAN-ID in a node.
+    /// The CAN-ID of the PDO in a node.
     #[must_use]
     pub fn cob_id(&self, node_id: u8) -> u32 {
         self.base + if self.is_relative { node_id.into() } else { 0 }
     }
 
-    /// The entries of its mapping parameter.
+    /// The entries of the mapping parameter.
     #[must_use]
     pub fn entries(&self) -> Vec<u32> {
         let entry = |&(index, sub, bits): &(u16, u8, u8)| {
@@ -45,8 +45,8 @@ impl Pdo {
         if self.objects.is_empty() { 0xFF } else { u8::try_from(self.objects.len()).expect("at most 64") }
     }
 
-    /// The flags of its COB-ID by default in that node: producers forbid remote frames, but for the multiplexed PDO, and
-    /// what has one CAN-ID for all nodes is off until the node is chosen to be such a virtual device.
+    /// The default flags of the COB-ID. TPDOs forbid remote frames, except for the multiplexed PDO. A PDO with the same
+    /// CAN-ID in all nodes is off until the node is configured as the virtual device that sends it.
     #[must_use]
     pub fn flags(&self) -> u32 {
         match (self.is_produced, self.number) {
@@ -56,7 +56,7 @@ impl Pdo {
         }
     }
 
-    /// Whether the node in personality lift has it: its own units produce these and consume those.
+    /// Whether a node in personality lift has the PDO: the node's units produce these TPDOs and consume these RPDOs.
     #[must_use]
     pub fn is_of_the_node(&self) -> bool {
         match self.is_produced {
@@ -66,7 +66,7 @@ impl Pdo {
     }
 }
 
-/// The PDO objects of the node: nothing of them can be changed but flags, type and times.
+/// The PDO objects of the node: only flags, type and times are writable.
 pub fn rows() -> impl Iterator<Item = Row> {
     pdos().filter(Pdo::is_of_the_node).flat_map(|pdo| [communication(&pdo), mapping(&pdo)].concat())
 }
@@ -120,7 +120,7 @@ fn name(pdo: &Pdo, what: &str) -> &'static str {
     format!("{direction} {} {what} parameter", pdo.number).leak()
 }
 
-/// All of them.
+/// All PDOs of the table.
 pub fn pdos() -> impl Iterator<Item = Pdo> {
     TABLE.lines().skip(1).map(parse)
 }

@@ -1,4 +1,4 @@
-//! The LSS master of crate `canopen` on a bus of a test: finds devices without a node-ID and gives them one.
+//! The LSS master of crate `canopen` on a simulated bus: finds devices without a node-ID and gives them one.
 
 use canopen::client::lss::{self, Fastscan, Options};
 use canopen::client::{Service, Step};
@@ -8,8 +8,8 @@ use canopen::{Duration, Instant, NodeId};
 use crate::network::{Network, Unit};
 
 const RESPONSE: u16 = 0x7E4;
-/// How long nobody answers before nobody is taken to be there: the frames of question and answer at 1 Mbit/s, and as
-/// much again. Once is enough.
+/// The time after which a missing answer means that no device is there: the frames of request and answer at 1 Mbit/s,
+/// doubled. One attempt is enough.
 const OPTIONS: Options = Options { timeout: Duration(600), retries: 0 };
 
 /// The master of one network.
@@ -44,12 +44,13 @@ impl<'a, U: Unit> Master<'a, U> {
         }
     }
 
-    /// Finds one device and leaves it in the state configuration.
+    /// Finds one device and leaves the device in the LSS state configuration.
     pub fn fastscan(&mut self) -> Option<Identity> {
         self.run(Fastscan::new(OPTIONS)).ok().flatten()
     }
 
-    /// Gives the device in the state configuration a node-ID, stores it and lets it boot. `false` when it refuses.
+    /// Gives the device in the state configuration a node-ID, stores the node-ID and lets the device boot. `false` when
+    /// the device refuses.
     pub fn configure(&mut self, node_id: NodeId) -> bool {
         let is_set = self.run(lss::set_node_id(Some(node_id), OPTIONS)).is_ok();
         let is_stored = self.run(lss::store(OPTIONS)).is_ok();

@@ -1,33 +1,33 @@
-//! The SDO client of crate `canopen` for tests, over whatever carries frames to one server and back.
+//! The SDO client of crate `canopen` for tests, over any channel that carries frames to one server and back.
 //!
-//! It is stricter than a client in the field: it tries once, and any frame that does not fit ends the transfer, but for
-//! one that the bus has repeated (a lost acknowledge).
+//! The client is stricter than a client in the field: it tries once, and any unexpected frame ends the transfer, except
+//! for a frame that the bus has repeated (after a lost acknowledge).
 
 use canopen::client::sdo::{BlockDownload, BlockUpload, Buffer, Download, Error, Options, Upload};
 use canopen::client::{Service, Step, Taken};
 use canopen::sdo::{BlockSize, Multiplexer};
 use canopen::{Duration, Frame, Instant, NodeId};
 
-/// What carries frames to an SDO server and back.
+/// A channel to an SDO server and back.
 pub trait Channel {
     /// Sends a request.
     fn send(&mut self, request: [u8; 8]);
 
-    /// The oldest response that has come by now.
+    /// The oldest response that has arrived.
     fn received(&mut self) -> Option<[u8; 8]>;
 
-    /// The next response; `None` when none comes within the time-out of the client.
+    /// Waits for the next response; `None` when none arrives within the time-out of the client.
     fn wait(&mut self) -> Option<[u8; 8]>;
 }
 
-/// Why a transfer came to nothing.
+/// The reason why a transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// The server gave up, with this abort code.
     Refused(u32),
     /// There was no response.
     Silence,
-    /// This is not the response to the request.
+    /// The response does not fit the request.
     Unexpected([u8; 8]),
     /// The data does not match the CRC or the size at the end of an upload.
     Corrupt,
@@ -39,11 +39,11 @@ pub struct Client<'a, C> {
     channel: &'a mut C,
 }
 
-/// More than any object of a test has.
+/// Buffer size: no object of a test is larger.
 const MEMORY: usize = 1 << 20;
-/// The channel knows the server; a client has to be told some node-ID.
+/// The channel addresses the server; the client needs any node-ID.
 const NODE: NodeId = NodeId::new(1).expect("a node-ID");
-/// The channel has the time-out. The client's own time stands still while it waits for the channel.
+/// The channel has the time-out, so the client's own time does not advance while it waits for the channel.
 const OPTIONS: Options = Options {
     timeout: Duration::from_millis(1000),
     limit: Duration(u64::MAX),
@@ -57,10 +57,10 @@ impl<'a, C: Channel> Client<'a, C> {
         Client { channel }
     }
 
-    /// Reads a value, by whichever of the two simple transfers the server chooses.
+    /// Reads a value, by expedited or segmented transfer as the server chooses.
     ///
     /// # Errors
-    /// Why it failed.
+    /// The reason of the failure.
     pub fn read(&mut self, at: Multiplexer) -> Result<Vec<u8>, Failure> {
         let mut memory = vec![0; MEMORY];
         let mut upload = Upload::new(NODE, at, Buffer::new(&mut memory), OPTIONS);
@@ -68,18 +68,18 @@ impl<'a, C: Channel> Client<'a, C> {
         Ok(upload.into_sink().as_slice().to_vec())
     }
 
-    /// Writes a value: up to four bytes at once, more in segments.
+    /// Writes a value: up to four bytes expedited, more in segments.
     ///
     /// # Errors
-    /// Why it failed.
+    /// The reason of the failure.
     pub fn write(&mut self, at: Multiplexer, value: &[u8]) -> Result<(), Failure> {
         self.run(&mut Download::new(NODE, at, value, OPTIONS))
     }
 
-    /// Reads a value in blocks of so many segments (1 to 127) and checks its CRC.
+    /// Reads a value by block transfer with `block_size` segments per block (1 to 127) and checks its CRC.
     ///
     /// # Errors
-    /// Why it failed.
+    /// The reason of the failure.
     ///
     /// # Panics
     /// With another block size.
@@ -92,23 +92,23 @@ impl<'a, C: Channel> Client<'a, C> {
         Ok(upload.into_sink().as_slice().to_vec())
     }
 
-    /// Writes a value in blocks of the size that the server wants, with a CRC.
+    /// Writes a value by block transfer with the server's block size and a CRC.
     ///
     /// # Errors
-    /// Why it failed.
+    /// The reason of the failure.
     pub fn write_blocks(&mut self, at: Multiplexer, value: &[u8]) -> Result<(), Failure> {
         self.run(&mut BlockDownload::new(NODE, at, value, OPTIONS))
     }
 
-    /// Gives a transfer up.
+    /// Aborts a transfer.
     pub fn abort(&mut self, at: Multiplexer) {
         let mut transfer = Download::new(NODE, at, &[], OPTIONS);
         transfer.abort();
-        // The client says that it has been given up.
+        // The result is always "cancelled".
         let _ = self.run(&mut transfer);
     }
 
-    /// What has come late belongs to no transfer.
+    /// Runs a transfer; frames that have arrived before it are discarded.
     fn run(&mut self, service: &mut impl Service<Output = Result<(), Error>>) -> Result<(), Failure> {
         while self.channel.received().is_some() {}
         let mut now = Instant(0);

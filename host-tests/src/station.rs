@@ -1,4 +1,4 @@
-//! A node as a station of a network: both halves, its parameter store, and what its sensors read.
+//! A node as a station of a network: both halves, the parameter store, and the sensors.
 
 use canopen::{Action, Duration, Frame, Instant, NodeId, Transmit};
 use node::{BitRate, Measurement, Protocol, Setup};
@@ -10,13 +10,13 @@ use crate::network::Unit;
 
 const SAMPLE_PERIOD: Duration = Duration::from_millis(1);
 
-/// What a station measures.
+/// The sensors of a station.
 pub trait Sensors {
-    /// What its sensors read now.
+    /// The current readings.
     fn read(&mut self, now: Instant) -> Inputs;
 }
 
-/// A pressure that does not change.
+/// A constant pressure.
 impl Sensors for RawSample {
     fn read(&mut self, _: Instant) -> Inputs {
         let position = RawEncoder::default();
@@ -24,21 +24,21 @@ impl Sensors for RawSample {
     }
 }
 
-/// A node, and what it measures.
+/// A node with its sensors.
 #[derive(Debug)]
 pub struct Station<S> {
     /// The CANopen half.
     pub protocol: Protocol,
     /// The sampling half.
     pub measurement: Measurement,
-    /// What it stores.
+    /// The parameter store.
     pub store: Flash,
     sensors: S,
     next_sample: Instant,
     asked: Asked,
 }
 
-/// A pressure node whose readings do not change.
+/// A pressure node with constant readings.
 pub type PressureNode = Station<RawSample>;
 
 impl PressureNode {
@@ -50,7 +50,7 @@ impl PressureNode {
 }
 
 impl<S: Sensors> Station<S> {
-    /// A node that has stored nothing yet.
+    /// A node without stored parameters.
     #[must_use]
     pub fn new(setup: &Setup, sensors: S) -> Station<S> {
         Station {

@@ -1,4 +1,4 @@
-//! The tables of tables/: what the documents say of every object, in rows. The node's own tables are others.
+//! The tables in tables/: every object of the documents, in rows. The node's own tables are not derived from them.
 
 use std::collections::BTreeMap;
 
@@ -8,25 +8,25 @@ use product::{REVISION, VENDOR_ID};
 use crate::bench::{ID, setup};
 use crate::lift417;
 
-/// The CMP 8271: its communication segment, its own objects and CiA 404.
+/// The objects of the CMP 8271: the communication segment, the manufacturer's objects and CiA 404.
 const TRANSMITTER: &str = include_str!("../tables/cia404.csv");
-/// How a transmitter is calibrated.
+/// The calibration of a transmitter.
 const CALIBRATION: &str = include_str!("../tables/calibration.csv");
-/// What every node has of CiA 301 beyond that, and objects of its own.
+/// Further objects of CiA 301 in every node, and the node's own objects.
 const COMMUNICATION: &str = include_str!("../tables/cia301.csv");
 /// CiA 406, classes C1 and C2.
 const ENCODER: &str = include_str!("../tables/cia406.csv");
-/// Which sensors an encoder has.
+/// The sensors of an encoder.
 const SENSORS: &str = include_str!("../tables/encoder_sensors.csv");
-/// What is different in the communication segment of an encoder.
+/// Differences in the communication segment of an encoder.
 const ENCODER_ALONE: &str = include_str!("../tables/encoder.csv");
-/// What is different in that of both in one, and the types of the two devices.
+/// Differences in the communication segment of the combined node, and the types of its two devices.
 const COMBINED: &str = include_str!("../tables/combined.csv");
 
-/// What a lift device has beyond CiA 301 and its PDOs.
+/// The objects of a lift device besides CiA 301 and the PDOs.
 const LIFT: &str = include_str!("../tables/lift.csv");
 
-/// What a table says of an entry.
+/// An entry of a table.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// Index.
@@ -39,7 +39,7 @@ pub struct Row {
     pub kind: &'static str,
     /// const, ro, wo or rw.
     pub access: &'static str,
-    /// A value, or a word in capitals for one that is not in the table.
+    /// A value, or a word in capitals for a value that is not in the table.
     pub default: &'static str,
     /// no, tpdo or rpdo.
     pub mapping: &'static str,
@@ -48,13 +48,13 @@ pub struct Row {
 impl Row {
     fn parse(line: &'static str) -> Row {
         let cells: Vec<&str> = line.split(',').collect();
-        // The table of CiA 406 has one column more: what is mandatory.
+        // The table of CiA 406 has a further column: the category (mandatory or not).
         let [index, sub, name, kind, access, default, mapping, ..] = cells[..] else { panic!("{line}") };
         let index = u16::try_from(integer(index)).expect("an index");
         Row { index, sub: sub.parse().expect("a sub-index"), name, kind, access, default, mapping }
     }
 
-    /// Bytes of a value; `None` for what has any length.
+    /// Size of a value in bytes; `None` for a type of variable length.
     ///
     /// # Panics
     /// When the table names a type that does not exist.
@@ -71,16 +71,16 @@ impl Row {
         }
     }
 
-    /// Whether it takes a value.
+    /// Whether the entry is writable.
     #[must_use]
     pub fn is_writable(&self) -> bool {
         matches!(self.access, "rw" | "wo")
     }
 
-    /// The default value as an upload gives it; `None` for what is measured or cannot be read.
+    /// The default value as an upload returns it; `None` for a measured value or an unreadable object.
     ///
     /// # Panics
-    /// When the table has no value of its type.
+    /// When the default in the table does not fit the type.
     #[must_use]
     pub fn default(&self, personality: Personality) -> Option<Vec<u8>> {
         let number = |value: i64| value.to_le_bytes()[..self.size().expect("a number")].to_vec();
@@ -104,10 +104,10 @@ impl Row {
         })
     }
 
-    /// The value of a mapping parameter that maps it.
+    /// The value of a mapping parameter that maps the object.
     ///
     /// # Panics
-    /// When it has more than 31 bytes.
+    /// When the object has more than 31 bytes.
     #[must_use]
     pub fn mapping_entry(&self) -> [u8; 4] {
         let bits = u8::try_from(self.size().unwrap_or(0) * 8).expect("bits");
@@ -128,12 +128,12 @@ fn rows(table: &'static str) -> impl Iterator<Item = Row> {
     table.lines().skip(1).map(Row::parse)
 }
 
-/// Whether an object belongs to the transmitter itself, and not to every device.
+/// Whether an object belongs to the transmitter itself, not to every device.
 fn is_transmitter(row: &Row) -> bool {
     row.index == 0x1002 || row.index >= 0x2000
 }
 
-/// In a module of two devices the second has its profile 800h higher (CiA 301, 7.5.2.1).
+/// In a module of two devices, the profile of the second is 800h higher (CiA 301, 7.5.2.1).
 fn as_second_device(row: Row) -> Row {
     let shift = if row.index >= 0x6000 { 0x800 } else { 0 };
     Row { index: row.index + shift, ..row }
@@ -143,7 +143,7 @@ fn is_pdo(row: &Row) -> bool {
     (0x1400..=0x1BFF).contains(&row.index)
 }
 
-/// Every entry that the documents give a node of this personality.
+/// All entries that the documents specify for a node of this personality.
 #[must_use]
 pub fn table(personality: Personality) -> Vec<Row> {
     let (transmitter, common) = (rows(TRANSMITTER).chain(rows(CALIBRATION)), rows(COMMUNICATION));
@@ -165,7 +165,7 @@ pub fn table(personality: Personality) -> Vec<Row> {
             common.chain(sensors).chain(rows(CALIBRATION)).chain(lift417::rows()).chain(rows(LIFT)).collect()
         }
     };
-    // What comes later is more special.
+    // Later tables are more specific and replace earlier entries.
     let entries: BTreeMap<_, _> = all.into_iter().map(|row| ((row.index, row.sub), row)).collect();
     entries.into_values().collect()
 }

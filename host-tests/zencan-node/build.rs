@@ -1,4 +1,4 @@
-//! The dictionary is generated from the description of the node that `cargo xtask bench` measures.
+//! Generates the dictionary from the description of the node that `cargo xtask bench` measures.
 
 use std::path::Path;
 

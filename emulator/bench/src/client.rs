@@ -1,4 +1,5 @@
-//! The client at the other end of the bus. It adds up what its requests cost the node, and does not take a wrong answer.
+//! The SDO client at the other end of the bus. The client adds up the instructions that its requests take in the node,
+//! and rejects a wrong answer.
 
 use anyhow::{Context, Result, bail, ensure};
 use canopen::client::sdo::{BlockDownload, BlockUpload, Buffer, Download, Error, Options, Upload};
@@ -13,7 +14,7 @@ use crate::program::Program;
 /// The node-ID of every program.
 const ID: u16 = 1;
 const NODE: NodeId = NodeId::new(1).expect("a node-ID");
-/// More than any object of the programs has.
+/// Bytes for an uploaded value: no object of the programs is larger.
 const MEMORY: usize = 1024;
 /// Every transfer is tried once.
 const OPTIONS: Options = Options {
@@ -23,7 +24,7 @@ const OPTIONS: Options = Options {
     block_size: BlockSize::MAX,
 };
 
-/// A program, the time, and the count.
+/// A program with its virtual time and the count of its instructions.
 pub(crate) struct Client {
     program: Program,
     now: u64,
@@ -35,12 +36,12 @@ impl Client {
         Client { program, now: 0, spent: 0 }
     }
 
-    /// The count since the last call.
+    /// Instructions counted since the last call.
     pub(crate) fn take_spent(&mut self) -> u64 {
         std::mem::take(&mut self.spent)
     }
 
-    /// Where the instructions are since the last call.
+    /// Visits of each block of instructions since the last call.
     pub(crate) fn take_profile(&mut self) -> Vec<Visits> {
         self.program.take_profile()
     }
@@ -51,7 +52,7 @@ impl Client {
         Ok(outcome.frames)
     }
 
-    /// One pass of the node so many microseconds later.
+    /// One pass of the node, `later` microseconds after the last request.
     pub(crate) fn pass(&mut self, later: u64) -> Result<Vec<Frame>> {
         self.now += later;
         self.run(Request { command: Command::Pass, now: self.now, frame: None })
@@ -62,7 +63,7 @@ impl Client {
         self.run(Request { command, now: self.now, frame })
     }
 
-    /// A frame of somebody else's.
+    /// A frame with an identifier that the node does not use.
     pub(crate) fn foreign(&mut self) -> Result<Vec<Frame>> {
         self.send(Command::Sort, 0x5A5, &[1, 2, 3, 4, 5, 6, 7, 8])
     }
@@ -79,7 +80,7 @@ impl Client {
         self.send(Command::Process, 0x200 + ID, &data)
     }
 
-    /// A transfer, from its first request to its last. The node answers at once or never.
+    /// A transfer, from its first request to its last. The node answers at once or not at all.
     fn transfer<S: Service<Output = Result<(), Error>>>(
         &mut self,
         service: &mut S,
@@ -87,14 +88,14 @@ impl Client {
         loop {
             match service.next(Instant(self.now)) {
                 Step::Send(request) => self.exchange(service, &request)?,
-                // The client does not wait: an answer that has not come is none.
+                // The node answers in the same run: when no answer has come, none will come.
                 Step::Wait(_) => return Ok(Err(Error::NoAnswer)),
                 Step::Done(result) => return Ok(result),
             }
         }
     }
 
-    /// One frame to the node; what it answers goes to the client.
+    /// Sends one frame to the node and passes the answers of the node to the client.
     fn exchange(&mut self, service: &mut impl Service, request: &Frame) -> Result<()> {
         for answer in self.send(Command::Serve, request.id(), request.data())? {
             let taken = service.on_frame(&answer, Instant(self.now));
@@ -103,7 +104,7 @@ impl Client {
         Ok(())
     }
 
-    /// Reads a value; the abort code where there is none.
+    /// Reads a value; the inner error is the abort code.
     pub(crate) fn read(&mut self, at: Multiplexer) -> Result<Result<Vec<u8>, u32>> {
         let mut memory = [0; MEMORY];
         let mut upload = Upload::new(NODE, at, Buffer::new(&mut memory), OPTIONS);

@@ -1,18 +1,19 @@
-//! The registers between a program and us. `bench/src/registers.rs` has the other end, at the same addresses.
+//! The registers between the program and this process. `bench/src/registers.rs` holds the program's side, at the same
+//! addresses.
 
 use canbus::Time;
 use canopen::Frame;
 use chip::{BusFault, Effect, IrqLines, Memory, Peripherals};
 
-/// What the program is to do: the numbers that it reads.
+/// The task of the program; the program reads the number from a register.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Command {
     /// The empty loop.
     #[default]
     Nothing = 0,
-    /// Time has passed, nothing has come.
+    /// Time has passed and no frame has come.
     Pass = 1,
-    /// A frame, up to the point where it is known for whom it is.
+    /// A frame, processed up to the point where the node knows whether the frame is for the node.
     Sort = 2,
     /// NMT, SYNC or RPDO.
     Process = 3,
@@ -20,7 +21,7 @@ pub(crate) enum Command {
     Serve = 4,
 }
 
-/// What is asked of the program.
+/// A request to the program.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Request {
     pub(crate) command: Command,
@@ -51,11 +52,11 @@ fn word_of(frame: &Frame) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
-/// The registers, and what the program has written into them.
+/// The registers: the request, and the values that the program has written.
 #[derive(Default)]
 pub(crate) struct Mailbox {
     pub(crate) request: Request,
-    /// The count runs.
+    /// Instructions are being counted.
     pub(crate) counts: bool,
     pub(crate) is_done: bool,
     pub(crate) has_panicked: bool,
@@ -83,7 +84,7 @@ impl Mailbox {
             0x48 => self.has_panicked = true,
             _ => return None,
         }
-        // Whoever counts has to look: the machine stops before its next block.
+        // The machine stops before its next block, so that the caller sees the change of the count or the end.
         self.poke |= offset >= 0x40;
         Some(())
     }
@@ -92,7 +93,7 @@ impl Mailbox {
 impl Peripherals for Mailbox {
     fn read(&mut self, address: u32, _: u8, _: Time) -> Result<u32, BusFault> {
         match address - 0x4000_0000 {
-            // There is always room on the bus.
+            // The bus always has room for a frame.
             0x30 => Ok(1),
             offset => self.request.word(offset).ok_or(BusFault),
         }

@@ -1,10 +1,10 @@
 //! `cargo xtask bench`: counts the instructions of CANopen nodes on the emulated Cortex-M4, operation by operation.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
-//! | `operations`, `client` | what is measured, and the client that makes the node do it |
+//! | `operations`, `client` | the operations that are measured, and the client that makes the node carry them out |
 //! | `program`, `mailbox` | an image on the emulated core, its registers, the count |
-//! | `sizes`, `profile` | what an image takes, and where its instructions are |
+//! | `sizes`, `profile` | flash and RAM of an image, and the functions that its instructions belong to |
 //! | `report`, `page` | the tables, and the page that states them |
 
 mod client;

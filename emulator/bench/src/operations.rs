@@ -1,4 +1,4 @@
-//! What is measured, and what CANopenNode has published for it.
+//! The measured operations, each with the number that CANopenNode has published.
 
 use anyhow::{Result, ensure};
 use canopen::sdo::Multiplexer;
@@ -9,9 +9,9 @@ use crate::program::Program;
 /// One row of the table.
 pub(crate) struct Operation {
     pub(crate) name: &'static str,
-    /// CANopenNode 9b8beed on a Cortex-M4, with -Os and with -O2.
+    /// Published for CANopenNode 9b8beed on a Cortex-M4, with -Os and with -O2.
     pub(crate) published: [Option<u64>; 2],
-    /// Brings the node into the state for it; not counted.
+    /// Brings the node into the state that the operation needs; not counted.
     prepare: fn(&mut Client) -> Result<()>,
     run: fn(&mut Client) -> Result<()>,
 }
@@ -31,7 +31,7 @@ const PARAMETER: Multiplexer = Multiplexer { index: 0x2002, sub: 0 };
 const TEXT: Multiplexer = Multiplexer { index: 0x2003, sub: 0 };
 const DOMAIN: Multiplexer = Multiplexer { index: 0x2004, sub: 1 };
 
-/// All of them, in the order of the table.
+/// All operations, in the order of the table.
 pub(crate) const OPERATIONS: [Operation; 13] = [
     operation("idle, one pass", [359, 343], |client| nothing(client, 0)),
     operation("idle 1 ms tick", [364, 336], |client| nothing(client, 1000)),
@@ -76,7 +76,7 @@ pub(crate) const OPERATIONS: [Operation; 13] = [
 ];
 
 impl Operation {
-    /// Instructions of the second time: the first one may find something to set up.
+    /// Instructions of the second run: the first run may have to set something up.
     pub(crate) fn measure(&self, client: &mut Client) -> Result<u64> {
         (self.prepare)(client)?;
         (self.run)(client)?;
@@ -108,7 +108,8 @@ fn reads(client: &mut Client, at: Multiplexer, expected: Result<Vec<u8>, u32>) -
     Ok(())
 }
 
-/// Makes the first TPDOs those of transmission type 1 and the others event-driven. Four are valid in any case.
+/// Gives the first `count` TPDOs transmission type 1 and makes the others event-driven. Four TPDOs are valid in any
+/// case.
 fn set_synchronous(client: &mut Client, count: u16) -> Result<()> {
     client.nmt(0x80)?;
     for number in 0..4 {

@@ -1,4 +1,4 @@
-//! The page that states the figures: its tables are between two markers, written and checked by the command.
+//! The page that states the figures. Its tables are between two markers; the command writes and checks them.
 
 use std::ops::Range;
 use std::path::Path;
@@ -7,9 +7,9 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::report::Report;
 
-/// How much worse than stated a number may be, in per cent: what a harmless change of the code makes.
+/// How much worse than stated a number may be, in per cent. A harmless change of the code stays below this limit.
 const TOLERANCE: u64 = 5;
-/// The same for another compiler than the stated one, whose choices are its own.
+/// The limit in per cent when the compiler is not the stated one: another compiler makes other choices.
 const OTHER_COMPILER: u64 = 25;
 
 /// Replaces the tables.
@@ -20,7 +20,7 @@ pub(crate) fn write(path: &Path, report: &Report) -> Result<()> {
     std::fs::write(path, text).with_context(|| path.display().to_string())
 }
 
-/// An error names every number of ours that is worse than stated.
+/// Compares our numbers with the page. The error names every number that is worse than stated.
 pub(crate) fn check(path: &Path, report: &Report) -> Result<()> {
     let text = read(path)?;
     let stated = &text[place(&text, report.optimisation.name())?];
@@ -46,7 +46,7 @@ fn worse(stated: &str, report: &Report, tolerance: u64) -> Result<Vec<String>> {
     Ok(worse)
 }
 
-/// The number of ours in the line of this name.
+/// Our number in the line with this name.
 fn number(stated: &str, name: &str) -> Option<u64> {
     let start = format!("| {name} | ");
     let line = stated.lines().find_map(|line| line.strip_prefix(&start))?;
@@ -57,7 +57,7 @@ fn read(path: &Path) -> Result<String> {
     std::fs::read_to_string(path).with_context(|| path.display().to_string())
 }
 
-/// What is between the markers of these tables.
+/// The range between the markers of the table `name`.
 fn place(text: &str, name: &str) -> Result<Range<usize>> {
     let (begin, end) = (format!("<!-- bench: {name} -->\n"), format!("<!-- end of bench: {name} -->"));
     let start = text.find(&begin).with_context(|| format!("the page has no {begin:?}"))? + begin.len();

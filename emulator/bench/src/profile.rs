@@ -1,4 +1,4 @@
-//! Where the instructions of an operation are: by function of the source, inlined ones too.
+//! The functions of the source, inlined ones too, that the instructions of an operation belong to.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,7 +8,7 @@ use anyhow::{Result, anyhow};
 use emulator::Visits;
 use object::{Object, ObjectSection};
 
-/// Functions with fewer of the instructions than one in so many are not worth a line.
+/// A function with less than one in this many of the instructions gets no line.
 const WORTH: u64 = 200;
 
 /// The functions of an image, most instructions first.
@@ -34,7 +34,7 @@ pub(crate) fn functions(path: &Path, visits: &[Visits]) -> Result<Vec<(String, u
     Ok(functions)
 }
 
-/// Where the Thumb instructions of a block begin.
+/// Offsets of the Thumb instructions in a block.
 fn instructions(code: &[u8]) -> impl Iterator<Item = usize> {
     let mut next = 0;
     std::iter::from_fn(move || {

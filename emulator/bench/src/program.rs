@@ -1,4 +1,4 @@
-//! A program on the emulated core: one request at a time, and what it took.
+//! A program on the emulated core: runs one request at a time and counts its instructions.
 
 use std::path::Path;
 
@@ -9,20 +9,20 @@ use emulator::{Machine, Model, Stop, Visits};
 
 use crate::mailbox::{Mailbox, Request};
 
-/// No operation takes this long.
+/// Time limit of a request: no operation takes this long.
 const LIMIT: Time = Time::from_millis(1000);
 
 /// A program that waits for its next request.
 pub(crate) struct Program {
     machine: Machine<Mailbox>,
-    /// What the empty loop takes.
+    /// Instructions of the empty loop.
     empty: u64,
 }
 
-/// What a request took and brought.
+/// The result of a request: the instructions and the frames.
 #[derive(Debug)]
 pub(crate) struct Outcome {
-    /// The empty loop subtracted.
+    /// Instructions without those of the empty loop.
     pub(crate) instructions: u64,
     pub(crate) frames: Vec<Frame>,
 }
@@ -35,7 +35,7 @@ impl Program {
         machine.load_elf(&file)?;
         machine.power_on(Time::ZERO);
         let mut program = Program { machine, empty: 0 };
-        // The first one lets it start up.
+        // The start-up code runs before the first request; only the second run is the empty loop alone.
         program.run(Request::default())?;
         program.empty = program.run(Request::default())?.instructions;
         Ok(program)
@@ -45,7 +45,8 @@ impl Program {
     pub(crate) fn run(&mut self, request: Request) -> Result<Outcome> {
         let mailbox = self.machine.peripherals_mut();
         (mailbox.request, mailbox.is_done) = (request, false);
-        // The instructions of the empty loop are subtracted at the end: between two frames a node can do less than the empty loop.
+        // The instructions of the empty loop are subtracted at the end: between two frames a node may execute fewer
+        // instructions than the empty loop.
         let (mut instructions, mut empty) = (0_u64, 0);
         let end = self.machine.now() + LIMIT;
         while !self.is_done()? {
@@ -66,7 +67,7 @@ impl Program {
         Ok(Outcome { instructions, frames: std::mem::take(&mut self.machine.peripherals_mut().sent) })
     }
 
-    /// Where the counted instructions of the last requests are.
+    /// Visits of each block of counted instructions since the last call.
     pub(crate) fn take_profile(&mut self) -> Vec<Visits> {
         self.machine.take_profile()
     }

@@ -1,4 +1,4 @@
-//! The tables: ours beside the others.
+//! The tables: our figures beside those of other libraries.
 
 use std::fmt;
 use std::path::Path;
@@ -15,7 +15,7 @@ use crate::sizes::Sizes;
 const PUBLISHED_FLASH: u64 = 19_620;
 const PUBLISHED_RAM: u64 = 6_600;
 
-/// What the images are optimised for; all of them are linked with LTO.
+/// The optimisation of the images; all images are linked with LTO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Optimisation {
     /// opt-level "s", as the firmware is flashed; CANopenNode's -Os.
@@ -25,7 +25,7 @@ pub(crate) enum Optimisation {
 }
 
 impl Optimisation {
-    /// Its name in the markers of the page.
+    /// The name of the optimisation in the markers of the page.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Optimisation::Size => "size",
@@ -46,27 +46,27 @@ impl Optimisation {
     }
 }
 
-/// The other libraries that are run: the name of the image, and of the library.
+/// The other libraries that are measured: the name of the image, and of the library.
 const OTHERS: [(&str, &str); 2] = [("zencan", "zencan-node"), ("canopen-rs", "canopen-rs")];
 
-/// A line: ours, those of [`OTHERS`], and CANopenNode.
+/// A line of a table: our figure, those of [`OTHERS`], and CANopenNode's.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Row {
     pub(crate) name: &'static str,
     pub(crate) cells: [Option<u64>; OTHERS.len() + 2],
 }
 
-/// All that was measured.
+/// All measured figures.
 pub(crate) struct Report {
     pub(crate) optimisation: Optimisation,
-    /// As the compiler names itself.
+    /// The compiler's name and version, as the compiler prints them.
     pub(crate) compiler: String,
     pub(crate) operations: Vec<Row>,
     pub(crate) sizes: Vec<Row>,
 }
 
 impl Report {
-    /// Runs the images in a directory.
+    /// Runs the images in a directory and measures them.
     pub(crate) fn measure(images: &Path, optimisation: Optimisation) -> Result<Report> {
         let ours = images.join("ours");
         Ok(Report {
@@ -100,13 +100,13 @@ fn operations(images: &Path, optimisation: Optimisation) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// What the operation takes in somebody else's library, if the library can do the operation.
+/// The instructions of the operation in another library; `None` when the library cannot do the operation.
 fn measure(operation: &Operation, name: &str, client: &mut Client) -> Option<u64> {
     let taken = operation.measure(client);
     if let Err(error) = &taken {
         eprintln!("{name}, {}: {error:#}", operation.name);
     }
-    // A library that is never asked what time it is does nothing when time passes.
+    // A library that never reads the time executes no instruction for a pass of time: no figure.
     taken.ok().filter(|&instructions| instructions > 0)
 }
 

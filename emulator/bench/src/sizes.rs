@@ -1,4 +1,4 @@
-//! What a node takes of flash and RAM: its image without what every image has.
+//! Flash and RAM of a node: the size of its image less that of an empty image.
 
 use std::path::Path;
 
@@ -12,14 +12,14 @@ pub(crate) struct Sizes {
     pub(crate) code: u64,
     /// Constants, the dictionary among them.
     pub(crate) constants: u64,
-    /// Variables with an initial value: they take flash too.
+    /// Variables with an initial value: they take RAM, and flash for the initial value.
     pub(crate) initialised: u64,
-    /// Variables that begin as zero.
+    /// Variables that are zero at start-up.
     pub(crate) zeroed: u64,
 }
 
 impl Sizes {
-    /// Of the program in an ELF file. The stack is not in it, and neither is the vector table.
+    /// The sizes of the program in an ELF file, without the stack and the vector table.
     pub(crate) fn of(path: &Path) -> Result<Sizes> {
         let file = std::fs::read(path).with_context(|| path.display().to_string())?;
         let elf = object::File::parse(file.as_slice())?;
@@ -32,7 +32,7 @@ impl Sizes {
         })
     }
 
-    /// Without what another image has as well.
+    /// The sizes less those of an empty image.
     pub(crate) fn without(self, empty: Sizes) -> Sizes {
         Sizes {
             code: self.code.saturating_sub(empty.code),

@@ -8,7 +8,7 @@ use crate::{
 
 /// Sends frames of random content, one after the other, at a chosen share of the bus.
 ///
-/// At a load of 1 it always has a frame ready, so the bus is never idle. Its identifiers decide whom it delays.
+/// At a load of 1 a frame is always ready, so the bus is never idle. The identifiers decide which nodes are delayed.
 #[derive(Clone, Debug)]
 pub struct Babbler {
     bit: Time,
@@ -22,7 +22,7 @@ pub struct Babbler {
 }
 
 impl Babbler {
-    /// Base identifiers that belong to nobody in a CANopen network with nodes 1 to 127: 700h and 780h to 7E3h.
+    /// Base identifiers that no node of a CANopen network with nodes 1 to 127 uses: 780h to 7E3h.
     pub fn foreign() -> Vec<embedded_can::Id> {
         (0x780..0x7E4).filter_map(StandardId::new).map(embedded_can::Id::from).collect()
     }
@@ -45,7 +45,7 @@ impl Babbler {
         Babbler { bit, load, identifiers, bytes: None, rng, frame, due: Time::ZERO, sent: 0 }
     }
 
-    /// Fixes the number of data bytes, 0 to 8; otherwise it is random.
+    /// Fixes the number of data bytes, 0 to 8; otherwise the number is random.
     #[must_use]
     pub fn with_bytes(mut self, bytes: usize) -> Babbler {
         self.bytes = Some(bytes.min(8));
@@ -58,7 +58,7 @@ impl Babbler {
         self.sent
     }
 
-    /// From the start of one frame to the start of the next that makes the load.
+    /// The span between the starts of two frames that makes the load.
     fn period(&self) -> Time {
         Time(((self.bit * frame_bits(&self.frame)).0 as f64 / self.load) as u64)
     }
@@ -72,7 +72,7 @@ fn draw(rng: &mut Rng, identifiers: &[embedded_can::Id], bytes: Option<usize>) -
     Frame::data(id, &data[..len]).expect("at most eight bytes")
 }
 
-/// It repeats what fails and is beyond error confinement: a test wants its load whatever happens.
+/// The babbler repeats failed frames and ignores error confinement, so that a test has its load under all conditions.
 impl Controller for Babbler {
     fn attachment(&mut self, _at: Time) -> Attachment {
         Attachment::Active { timing: BitTiming::nominal(self.bit) }
@@ -92,7 +92,7 @@ impl Controller for Babbler {
 
     fn sent(&mut self, at: Time) {
         let begun = at.since(self.bit * (frame_bits(&self.frame) - 3));
-        // When the bus kept it from sending in time it does not catch up.
+        // When the bus has delayed the frame, the babbler does not catch up.
         self.due = begun + self.period();
         self.frame = draw(&mut self.rng, &self.identifiers, self.bytes);
         self.sent += 1;

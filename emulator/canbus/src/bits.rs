@@ -4,7 +4,7 @@ use crc::{CRC_15_CAN, Crc, Table};
 
 use crate::{ExtendedId, Frame, Id, StandardId};
 
-/// A level of the wire. Recessive is `true`, so the wire is the logical AND of all that drive it.
+/// A level of the wire. Recessive is `true`, so the wire is the logical AND of all driven levels.
 pub(crate) type Level = bool;
 pub(crate) const DOMINANT: Level = false;
 pub(crate) const RECESSIVE: Level = true;
@@ -19,20 +19,21 @@ pub(crate) const END_OF_FRAME_BITS: usize = 7;
 /// Recessive bits between two frames.
 pub(crate) const INTERMISSION_BITS: u64 = 3;
 
-/// Its initial value is zero, so zeros in front of the first bit change nothing: a bit string that is not a
-/// whole number of bytes is checked right-aligned.
+/// The CRC of a frame. The initial value is zero, so zeros in front of the first bit change nothing: a bit string that
+/// is not a whole number of bytes is checked right-aligned.
 const CRC: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_15_CAN);
 
-/// What a transmitter has to know about a bit that it sends.
+/// How a transmitter treats a bit of its own that it reads back with the other level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Field {
-    /// Identifier, SRR, IDE of an extended frame, RTR: reading dominant instead of recessive is a lost arbitration.
+    /// Identifier, SRR, IDE of an extended frame, RTR: a recessive bit read back dominant means that the arbitration is
+    /// lost.
     Arbitration,
-    /// A stuff bit inside the arbitration field: the same is an error there.
+    /// A stuff bit inside the arbitration field: a recessive one read back dominant is an error.
     ArbitrationStuff,
-    /// Sent recessive; a receiver answers dominant.
+    /// The ACK slot: sent recessive, answered dominant by a receiver.
     Ack,
-    /// Everything else.
+    /// Any other bit.
     Other,
 }
 
@@ -71,7 +72,7 @@ impl BitString {
     }
 }
 
-/// Start of frame to the last CRC bit, without stuff bits.
+/// The bits from start of frame to the last CRC bit, without stuff bits.
 fn unstuffed(frame: &Frame) -> BitString {
     let mut bits = BitString::default();
     bits.push(0, 1);
@@ -113,7 +114,7 @@ fn tail_bit(n: usize) -> Bit {
     Bit { level: RECESSIVE, field: if n == 1 { Field::Ack } else { Field::Other } }
 }
 
-/// Bits after the start of frame in which a transmitter may lose to another.
+/// Bits after the start of frame in which a transmitter may lose the arbitration.
 fn arbitration_bits(id: Id) -> usize {
     match id {
         Id::Standard(_) => 12,
@@ -121,13 +122,13 @@ fn arbitration_bits(id: Id) -> usize {
     }
 }
 
-/// Where the CRC sequence of a frame ends, as soon as its header says so.
+/// The number of the bit after the CRC sequence, known once the header is complete.
 pub(crate) fn crc_end(bits: &BitString) -> Option<u32> {
     let header = header_bits(bits)?;
     (bits.len >= header).then(|| header + 8 * u32::from(data_bytes(bits, header)) + CRC_BITS)
 }
 
-/// Start of frame to data length code, once the IDE bit tells the format.
+/// Bits from start of frame to data length code, known once the IDE bit has come.
 fn header_bits(bits: &BitString) -> Option<u32> {
     (bits.len >= 14).then(|| if bits.field(13, 1) == 1 { 39 } else { 19 })
 }
@@ -136,12 +137,12 @@ fn data_bytes(bits: &BitString, header: u32) -> u8 {
     if is_remote(bits, header) { 0 } else { dlc(bits, header) }
 }
 
-/// RTR stands seven bits before the end of the header in both formats.
+/// The RTR bit is seven bits before the end of the header in both formats.
 fn is_remote(bits: &BitString, header: u32) -> bool {
     bits.field(header - 7, 1) == 1
 }
 
-/// Codes above eight mean eight bytes (ISO 11898-1:2015, 10.4.2.4).
+/// Data length codes above eight mean eight bytes (ISO 11898-1:2015, 10.4.2.4).
 fn dlc(bits: &BitString, header: u32) -> u8 {
     bits.field(header - 4, 4).min(8) as u8
 }

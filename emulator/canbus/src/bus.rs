@@ -1,4 +1,4 @@
-//! The bus: who may begin a frame and when, and who hears what of it.
+//! The bus: decides when a frame begins and which participant sends it, and tells all participants about the frame.
 
 use crate::slot::{Contender, Slot};
 use crate::{Attachment, Controller, Event, Faults, Time};
@@ -6,7 +6,7 @@ use crate::{Attachment, Controller, Event, Faults, Time};
 /// Bits that an error-passive transmitter waits longer than others (ISO 11898-1:2015, 10.4.6.4).
 const SUSPEND_BITS: u64 = 8;
 
-/// A CAN bus. Its participants are lent to it for each step; see the crate documentation.
+/// A CAN bus. The caller lends the participants to the bus for each step; see the crate documentation.
 #[derive(Debug, Default)]
 pub struct Bus {
     /// Bit errors on the wire.
@@ -15,10 +15,10 @@ pub struct Bus {
     /// The end of the last intermission.
     free: Time,
     recessive: Time,
-    /// Error-passive transmitters that let others go first.
+    /// Error-passive transmitters whose transmission is suspended.
     suspended: Vec<usize>,
     suspended_until: Time,
-    /// Participants that know what the wire does.
+    /// Number of participants that have been told the state of the wire.
     known: usize,
     frames: u64,
     busy: Time,
@@ -30,21 +30,21 @@ impl Bus {
         Bus::default()
     }
 
-    /// Time from a start of frame to the end of an intermission, summed up to `now`: divided by the time passed
-    /// it is the bus load.
+    /// Time from a start of frame to the end of an intermission, summed up to `now`. Divided by the elapsed time, this
+    /// is the bus load.
     pub fn busy(&self, now: Time) -> Time {
         self.busy + self.slot.as_ref().map_or(Time::ZERO, |slot| now.min(slot.end()) - slot.start())
     }
 
-    /// Frames begun, whatever became of them. The next one has this number for the fault injector.
+    /// Frames begun, including those that failed. The fault injector gives the next frame this number.
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// Lets everything up to `now` happen and returns the next instant at which something will: an event of the
-    /// frame on the wire, its end, or the next start of frame; `Time::NEVER` while nobody has a request.
+    /// Processes everything up to `now` and returns the instant of the next event: an event of the frame on the wire,
+    /// the end of the frame, or the next start of frame; `Time::NEVER` when no participant requests a frame.
     ///
-    /// A participant is known by its place in `participants`; new ones go to the end. `log` gets the traffic.
+    /// The place in `participants` identifies a participant; new ones go to the end. `log` gets the traffic.
     pub fn step(
         &mut self,
         participants: &mut [&mut dyn Controller],
@@ -75,13 +75,13 @@ impl Bus {
         }
     }
 
-    /// The earliest instant at which a participant with this request may begin.
+    /// The earliest instant at which a participant with this request may begin a frame.
     fn wish(&self, participant: usize, requested: Option<Time>) -> Option<Time> {
         let suspended = self.suspended.contains(&participant);
         Some(requested?.max(if suspended { self.suspended_until } else { Time::ZERO }))
     }
 
-    /// Tells newcomers what the wire does.
+    /// Tells new participants the state of the wire.
     fn welcome(&mut self, participants: &mut [&mut dyn Controller]) {
         for participant in participants.iter_mut().skip(self.known) {
             match &self.slot {
@@ -92,12 +92,12 @@ impl Bus {
         self.known = participants.len();
     }
 
-    /// Start of frame: works out the whole course of the frame.
+    /// Start of frame: computes the whole course of the frame.
     fn begin(&mut self, participants: &mut [&mut dyn Controller], start: Time) {
         let attachments: Vec<Attachment> = participants.iter_mut().map(|p| p.attachment(start)).collect();
         let contenders = self.contenders(participants, &attachments, start);
         if contenders.is_empty() {
-            // Whoever made the request has left the bus in the meantime: look again a little later.
+            // The participant that made the request has left the bus in the meantime: look again a little later.
             self.free = start + Time::from_micros(1);
             return;
         }

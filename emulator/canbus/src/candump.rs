@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use crate::{ExtendedId, Frame, Id, StandardId, Time};
 
-/// One line of `candump -L`: when, on which interface, what.
+/// One line of `candump -L`: the time, the interface and the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Record {
     /// The instant, to the microsecond.
@@ -16,7 +16,7 @@ pub struct Record {
     pub frame: Frame,
 }
 
-/// A line that is no record of a classic CAN frame.
+/// The line is no record of a classic CAN frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotARecord;
 
@@ -58,7 +58,7 @@ impl FromStr for Frame {
     }
 }
 
-/// Three digits are a base identifier, eight an extended one.
+/// Three digits are a base identifier, eight digits an extended identifier.
 fn parse_id(digits: &str) -> Option<Id> {
     let raw = parse_hex(digits)?;
     match digits.len() {

@@ -1,24 +1,24 @@
-//! Error confinement (ISO 11898-1:2015, 12.1.4): the two counters and what follows from them.
+//! Error confinement (ISO 11898-1:2015, 12.1.4): the two error counters and the states that follow from them.
 
 use crate::{BusError, ErrorReport};
 
 /// From this count on a controller is error passive.
 const PASSIVE: u16 = 128;
-/// From this transmit error count on it is bus-off.
+/// From this transmit error count on a controller is bus-off.
 const BUS_OFF: u16 = 256;
-/// From this count on it warns.
+/// From this count on the warning flag is set.
 const WARNING: u16 = 96;
-/// Where a correct reception puts the receive error counter of a controller that was error passive by it.
+/// The receive error counter after a correct reception by a controller whose counter was above 127.
 const REC_AFTER_PASSIVE: u16 = 120;
 
-/// How far a controller may still disturb others.
+/// The error state of a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorState {
-    /// It sends active error flags.
+    /// Error active: the node sends active error flags.
     Active,
-    /// It sends passive error flags and waits longer between two frames of its own.
+    /// Error passive: the node sends passive error flags and waits longer between two of its frames.
     Passive,
-    /// It is off the bus until it has seen 128 times 11 recessive bits.
+    /// Bus-off: the node takes no part in the traffic until 128 sequences of 11 recessive bits have passed.
     BusOff,
 }
 
@@ -40,7 +40,7 @@ impl Confinement {
         self.rec
     }
 
-    /// The state that the counters mean.
+    /// The error state that follows from the counters.
     pub fn state(&self) -> ErrorState {
         match self.tec.max(self.rec.min(BUS_OFF - 1)) {
             BUS_OFF.. => ErrorState::BusOff,
@@ -72,7 +72,7 @@ impl Confinement {
             let weight = if self.is_exempt(report) { 0 } else { 8 };
             self.tec = (self.tec + weight + stuck).min(BUS_OFF + 8);
         } else {
-            // Rules a and b: who was first to see the error sees the others' flags after its own.
+            // Rules a and b: the first receiver to detect the error sees the flags of the others after its own flag.
             let weight = if report.dominant_after_flag > 0 { 9 } else { 1 };
             self.rec = (self.rec + weight + stuck).min(BUS_OFF - 1);
         }

@@ -1,4 +1,4 @@
-//! What the bus asks of everything that is wired to it.
+//! The interface between the bus and every participant.
 
 use crate::{BitTiming, Frame, Time};
 
@@ -7,25 +7,25 @@ use crate::{BitTiming, Frame, Time};
 pub enum Attachment {
     /// Not on the bus: in initialisation, asleep, without power, synchronising, or bus-off.
     Off,
-    /// Hears everything, sends and acknowledges nothing (silent mode).
+    /// Hears everything, but neither sends nor acknowledges (silent mode).
     Silent {
-        /// Its bit.
+        /// The bit timing.
         timing: BitTiming,
     },
-    /// Takes part; its error flags destroy a frame that it sees as faulty.
+    /// Takes part in the traffic; the error flag destroys a frame in which this controller detects an error.
     Active {
-        /// Its bit.
+        /// The bit timing.
         timing: BitTiming,
     },
-    /// Takes part, but signals errors only recessively.
+    /// Takes part in the traffic, but sends only passive (recessive) error flags.
     Passive {
-        /// Its bit.
+        /// The bit timing.
         timing: BitTiming,
     },
 }
 
 impl Attachment {
-    /// Its bit; `None` off the bus.
+    /// The bit timing; `None` off the bus.
     pub fn timing(self) -> Option<BitTiming> {
         match self {
             Attachment::Off => None,
@@ -35,7 +35,7 @@ impl Attachment {
         }
     }
 
-    /// The same with another bit.
+    /// The attachment with another bit timing.
     pub(crate) fn with(self, timing: BitTiming) -> Attachment {
         match self {
             Attachment::Off => Attachment::Off,
@@ -45,20 +45,20 @@ impl Attachment {
         }
     }
 
-    /// Whether it may send.
+    /// Whether the controller may send.
     pub(crate) fn can_send(self) -> bool {
         matches!(self, Attachment::Active { .. } | Attachment::Passive { .. })
     }
 }
 
-/// Errors as ISO 11898-1 names them and the LEC field of bxCAN counts them.
+/// The errors of ISO 11898-1, in the order of the LEC field of bxCAN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BusError {
     /// Six equal bits in a row.
     Stuff,
     /// A fixed-form bit has the wrong level.
     Form,
-    /// Nobody acknowledged.
+    /// No node acknowledged the frame.
     Ack,
     /// A recessive bit was read back dominant.
     BitRecessive,
@@ -68,45 +68,45 @@ pub enum BusError {
     Crc,
 }
 
-/// What one participant saw of an error on the wire. `Confinement` makes TEC and REC of it.
+/// An error on the wire as one participant saw it. `Confinement` counts TEC and REC from the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ErrorReport {
-    /// What it detected first.
+    /// The first error that the participant detected.
     pub error: BusError,
-    /// Whether it was sending the frame.
+    /// Whether the participant was sending the frame.
     pub transmitting: bool,
-    /// Dominant bits that it saw while it sent a passive error flag.
+    /// Dominant bits on the wire during the participant's passive error flag.
     pub dominant_in_flag: u16,
-    /// Dominant bits in a row that it saw right after its error flag: others' flags.
+    /// Dominant bits in a row right after the participant's error flag: the flags of other participants.
     pub dominant_after_flag: u16,
 }
 
 /// A CAN controller as the bus sees it: a bxCAN peripheral, a node in this process, or a network client.
 ///
-/// The bus calls these in the order of virtual time. `at` is the instant of the event on the wire, which for
-/// `start_of_frame` may lie up to one quantum of the co-simulation before what the participant has already done
-/// (see the crate documentation).
+/// The bus calls the methods in the order of virtual time. `at` is the instant of the event on the wire. For
+/// `start_of_frame` that instant may lie up to one quantum of the co-simulation before the time to which the
+/// participant has already run (see the crate documentation).
 pub trait Controller {
-    /// How it takes part at `at`.
+    /// How the controller takes part at `at`.
     fn attachment(&mut self, at: Time) -> Attachment;
 
-    /// The earliest instant at which it wants to begin a frame, as far as it knows now; `None` without a request.
-    /// The bus begins none of its frames before it.
+    /// The earliest instant at which the controller requests to begin a frame, as known now; `None` without a request.
+    /// The bus begins none of the controller's frames earlier.
     fn requested(&self) -> Option<Time>;
 
-    /// The frame that wins inside this controller at `at`; `None` when nothing was requested up to `at`.
+    /// The frame that the controller sends first at `at`; `None` when nothing was requested up to `at`.
     fn pending(&mut self, at: Time) -> Option<Frame>;
 
-    /// A frame begins on the wire; with `transmitting` it is the one that `pending` gave.
+    /// A frame begins on the wire; with `transmitting` the frame is the one that `pending` returned.
     fn start_of_frame(&mut self, transmitting: bool, at: Time);
 
-    /// Its frame lost the arbitration; it goes on as a receiver.
+    /// The controller's frame lost the arbitration; the controller goes on as a receiver.
     fn lost(&mut self, at: Time);
 
-    /// Its frame was sent and acknowledged; `at` is the end of frame.
+    /// The controller's frame was sent and acknowledged; `at` is the end of frame.
     fn sent(&mut self, at: Time);
 
-    /// A frame of somebody else's is valid: `at` is the last but one bit of the end of frame.
+    /// A frame of another participant is valid: `at` is the last but one bit of the end of frame.
     fn received(&mut self, frame: &Frame, at: Time);
 
     /// An error destroyed the frame on the wire; `at` is the end of the last error flag that this participant saw.

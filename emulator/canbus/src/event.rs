@@ -1,32 +1,32 @@
-//! What the bus tells about its traffic.
+//! Events of the traffic that the bus reports.
 
 use crate::{BusError, Frame, Time};
 
-/// Something on the wire that a bus analyser would show.
+/// An event on the wire that a bus analyser would show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A frame was received without error by somebody.
+    /// At least one participant received a frame without error.
     Frame {
-        /// Its start of frame.
+        /// The start of frame.
         start: Time,
-        /// The end of its end of frame.
+        /// The end of the end of frame.
         end: Time,
         /// The frame.
         frame: Frame,
-        /// Who sent it, by its place in the slice that `Bus::step` gets.
+        /// The sender: its place in the slice that `Bus::step` gets.
         transmitter: usize,
     },
-    /// An error frame followed the frame that somebody began.
+    /// A frame ended with an error frame.
     Error {
         /// The start of frame.
         start: Time,
         /// The end of the error flags.
         end: Time,
-        /// The frame that was to be sent.
+        /// The frame that failed.
         frame: Frame,
-        /// What its transmitter detected.
+        /// The error that the transmitter detected.
         error: BusError,
-        /// Who tried to send it.
+        /// The sender: its place in the slice that `Bus::step` gets.
         transmitter: usize,
     },
 }

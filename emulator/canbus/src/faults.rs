@@ -2,15 +2,15 @@
 
 use fastrand::Rng;
 
-/// Which bit of a frame, as its transmitter counts them.
+/// The position of a bit in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Position {
-    /// Stuff bits counted, the start of frame is 0.
+    /// The number of the bit, counted with stuff bits; the start of frame is 0.
     Bit(usize),
     /// The ACK slot.
     AckSlot,
-    /// The last bit of the end of frame. The receivers have accepted the frame by then: a transmitter that reads
-    /// it dominant repeats what was received, as ISO 11898-1 allows.
+    /// The last bit of the end of frame. The receivers have already accepted the frame: a transmitter that reads this
+    /// bit dominant repeats the frame, as ISO 11898-1 allows, and the receivers get it twice.
     LastBit,
 }
 
@@ -25,12 +25,12 @@ impl Position {
     }
 }
 
-/// Who reads the bit inverted.
+/// The participants that read the bit inverted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SeenBy {
     /// All participants.
     Everyone,
-    /// All that began the frame.
+    /// All participants that began the frame.
     Transmitters,
     /// One participant, by its place in the slice that `Bus::step` gets.
     Participant(usize),
@@ -39,11 +39,11 @@ pub enum SeenBy {
 /// A bit error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The number of the frame on this bus; attempts count, the first is 0.
+    /// The number of the frame on this bus: every attempt counts, the first is 0.
     pub frame: u64,
     /// The bit.
     pub position: Position,
-    /// Its victims.
+    /// The participants that read the bit inverted.
     pub seen_by: SeenBy,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct Flip {
     pub(crate) seen_by: SeenBy,
 }
 
-/// The bit errors of a bus: those scheduled one by one, and random ones.
+/// The bit errors of a bus: scheduled ones and random ones.
 #[derive(Clone, Debug, Default)]
 pub struct Faults {
     scheduled: Vec<Fault>,
@@ -67,8 +67,8 @@ impl Faults {
         self.scheduled.push(fault);
     }
 
-    /// From now on a frame has one bit at random that everyone reads inverted, with this probability (0 to 1).
-    /// The same seed gives the same errors.
+    /// From now on, with this probability (0 to 1), every participant reads one random bit of a frame inverted. The
+    /// same seed gives the same errors.
     pub fn noise(&mut self, seed: u64, probability: f64) {
         self.noise = Some((Rng::with_seed(seed), probability));
     }

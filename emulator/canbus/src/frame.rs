@@ -39,10 +39,11 @@ impl Frame {
         self.len
     }
 
-    /// The arbitration field as one number: of two frames on the wire the lower one wins.
+    /// The arbitration field as one number: of two frames on the wire, the one with the lower number wins.
     ///
-    /// The bits are identifier, RTR, IDE for a base frame and base identifier, SRR, IDE, identifier extension, RTR
-    /// for an extended one, so base wins over extended and data over remote (ISO 11898-1:2015, 10.4.2).
+    /// The bits of a base frame are identifier, RTR, IDE; those of an extended frame are base identifier, SRR, IDE,
+    /// identifier extension, RTR. So a base frame wins over an extended one, and a data frame over a remote one (ISO
+    /// 11898-1:2015, 10.4.2).
     pub fn arbitration(&self) -> u32 {
         match self.id {
             Id::Standard(id) => u32::from(id.as_raw()) << 21 | u32::from(self.remote) << 20,

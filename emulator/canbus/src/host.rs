@@ -6,17 +6,18 @@ use crate::confinement::{Confinement, ErrorState};
 use crate::monitor::Monitor;
 use crate::{Attachment, BitTiming, Controller, ErrorReport, Frame, Time};
 
-/// Which of the waiting frames is sent first.
+/// The order in which waiting frames are sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// The one that would win an arbitration; equal ones in the order of their requests.
+    /// The frame that would win an arbitration goes first; frames with equal identifiers in the order of their
+    /// requests.
     #[default]
     Priority,
-    /// The one requested first.
+    /// The frame requested first goes first.
     Fifo,
 }
 
-/// A frame and its instant: of the request, or of its end on the wire.
+/// A frame with the instant of its request or of its end on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamped {
     /// The instant.
@@ -25,8 +26,8 @@ pub struct Stamped {
     pub frame: Frame,
 }
 
-/// A controller with a transmit and a receive queue of any length. It recovers from bus-off by itself and keeps
-/// its queue over it.
+/// A controller with a transmit and a receive queue of any length. It recovers from bus-off automatically and keeps its
+/// queues.
 #[derive(Clone, Debug)]
 pub struct HostNode {
     timing: BitTiming,
@@ -43,7 +44,7 @@ pub struct HostNode {
 }
 
 impl HostNode {
-    /// A node with bits of this length, sampled at 87.5 %; see [`Time::of_cycle`].
+    /// A node with bits of this length, sampled at 87.5 % of the bit; see [`Time::of_cycle`].
     pub fn new(bit: Time) -> HostNode {
         HostNode {
             timing: BitTiming::nominal(bit),
@@ -59,7 +60,7 @@ impl HostNode {
         }
     }
 
-    /// Gives it another bit.
+    /// Sets another bit timing.
     #[must_use]
     pub fn with_timing(mut self, timing: BitTiming) -> HostNode {
         self.timing = timing;
@@ -73,21 +74,21 @@ impl HostNode {
         self
     }
 
-    /// Makes it listen only: it neither sends nor acknowledges.
+    /// Switches to silent mode: the node neither sends nor acknowledges.
     #[must_use]
     pub fn silent(mut self) -> HostNode {
         self.silent = true;
         self
     }
 
-    /// Makes it keep what it has sent for [`HostNode::take_sent`].
+    /// Keeps sent frames for [`HostNode::take_sent`].
     #[must_use]
     pub fn keep_sent(mut self) -> HostNode {
         self.keeps_sent = true;
         self
     }
 
-    /// Changes the bit rate, between two frames.
+    /// Changes the bit rate between two frames.
     pub fn set_bit(&mut self, bit: Time) {
         self.timing = BitTiming::nominal(bit);
     }
@@ -97,13 +98,13 @@ impl HostNode {
         self.transmit.push(Stamped { at, frame });
     }
 
-    /// Forgets the frames that wait, and returns how many those were.
+    /// Discards the waiting frames and returns their number.
     pub fn forget(&mut self) -> u64 {
         self.on_wire = None;
         self.transmit.drain(..).len() as u64
     }
 
-    /// Frames that wait, the one on the wire included.
+    /// Number of waiting frames, the one on the wire included.
     pub fn backlog(&self) -> usize {
         self.transmit.len()
     }
@@ -127,7 +128,7 @@ impl HostNode {
         self.confinement.state() == ErrorState::BusOff
     }
 
-    /// The place of the frame that goes first among those requested up to `at`.
+    /// The place of the frame to send first, of the frames requested up to `at`.
     fn choose(&self, at: Time) -> Option<usize> {
         let ready = self.transmit.iter().enumerate().filter(|(_, queued)| queued.at <= at);
         let first = match self.order {

@@ -3,8 +3,8 @@
 //! The bus runs the protocol of ISO 11898-1 (classic CAN) bit by bit: stuffing, bitwise arbitration, the ACK slot,
 //! error and overload flags with their superposition, delimiters, intermission and suspended transmission. Its
 //! participants are [`Controller`]s: register-level models of a CAN peripheral, [`HostNode`]s in this process and
-//! network clients, a [`Babbler`]. They are lent to the bus for each call, so an emulated board can keep its
-//! controller inside of itself.
+//! network clients, a [`Babbler`]. The caller lends the participants to the bus for each call, so an emulated board can
+//! own its controller.
 //!
 //! # Co-simulation
 //!
@@ -16,16 +16,16 @@
 //! 2. calls `step` with all participants and the earliest instant that any board has reached.
 //!
 //! `step` returns the next event: the end of a frame for its receivers and, a bit later, for its transmitter, the
-//! end of the intermission, or a start of frame that is already requested. Boards are at that very instant when it
-//! comes, so a frame requested in the last bit of an intermission takes part in the arbitration.
+//! end of the intermission, or a start of frame that is already requested. All boards have then reached exactly the
+//! instant of this event, so a frame requested in the last bit of an intermission takes part in the arbitration.
 //!
-//! While the bus is idle only the quantum `Q` bounds the boards. A board may then have run up to `Q` past a start
-//! of frame that another one has caused. Nothing is missed as long as `Q` is shorter than what lies between a start
-//! of frame and the first thing that a receiver can notice:
+//! While the bus is idle, only the quantum `Q` limits how far the boards run. A board may then have run up to `Q` past
+//! a start of frame that another board has caused. No event is missed as long as `Q` is shorter than the time between a
+//! start of frame and the first event that a receiver can notice:
 //!
 //! * frames without errors: the end of the shortest frame, so any `Q` of up to 43 bits is causal;
 //! * with injected errors, or participants at another bit rate: an error is reported no earlier than 12 bits after
-//!   the start of frame (six to see it, six of the flag). With `Q` of up to 12 bits this is causal too.
+//!   the start of frame (six to see the error, six of the flag). With `Q` of up to 12 bits this is causal too.
 //!
 //! Wake-up by a start of frame and the end of a wait for 11 recessive bits may be late by up to `Q`. Whatever `Q`
 //! is, the same input gives the same traffic.
@@ -55,12 +55,13 @@
 //! # Simplifications
 //!
 //! * A controller begins at the instant of its request when the bus is idle, not at the next edge of its bit clock.
-//! * Propagation takes no time, and an edge is seen in the quantum in which it comes. So the sample point of participants with the same
-//!   clock does not matter; with clocks that differ every participant samples where its [`BitTiming`] says and resynchronises.
-//! * A participant at another bit rate than the transmitter begins afresh with each frame, and delays the next one
-//!   by its error flag only.
-//! * At most one overload frame follows a frame and none an error frame; a disturbed delimiter is waited out and
-//!   not counted again.
+//! * Propagation takes no time, and a controller sees an edge in the quantum in which the edge comes. So the sample
+//!   point does not matter among participants with the same clock. With different clocks, every participant samples
+//!   where its [`BitTiming`] says and resynchronises.
+//! * A participant at another bit rate than the transmitter starts anew with each frame, and only its error flag can
+//!   delay the next frame.
+//! * At most one overload frame follows a frame, and none follows an error frame. A participant waits until a disturbed
+//!   delimiter is over and does not count the disturbance as another error.
 
 mod babbler;
 mod bits;

@@ -1,16 +1,16 @@
-//! Watches for sequences of recessive bits: one to join the bus, 128 to come back from bus-off.
+//! Watches for sequences of recessive bits: one sequence to join the bus, 128 to recover from bus-off.
 
 use crate::Time;
 
-/// Recessive bits in a row that tell that the bus is idle.
+/// Recessive bits in a row that mean an idle bus.
 const SEQUENCE_BITS: u64 = 11;
 
-/// A controller's view of when the wire is recessive, and what it waits for.
+/// A controller's view of the wire: since when the wire is recessive, and the wait for recessive sequences.
 #[derive(Clone, Copy, Debug)]
 pub struct Monitor {
     recessive: Option<Time>,
     wait: Option<Wait>,
-    /// When the last wait ended.
+    /// The instant at which the last wait ended.
     ended: Time,
 }
 
@@ -18,7 +18,7 @@ pub struct Monitor {
 struct Wait {
     /// Sequences still to be seen.
     sequences: u64,
-    /// No bit before this counts.
+    /// Bits before this instant do not count.
     from: Time,
 }
 
@@ -32,12 +32,12 @@ impl Monitor {
     /// Sequences of eleven recessive bits that end the bus-off state (ISO 11898-1:2015, 12.1.4.4).
     pub const BUS_OFF_SEQUENCES: u64 = 128;
 
-    /// On a wire that is recessive since power-on; waits for nothing.
+    /// A monitor of a wire that is recessive since power-on, without a wait.
     pub fn new() -> Monitor {
         Monitor { recessive: Some(Time::ZERO), wait: None, ended: Time::ZERO }
     }
 
-    /// Whether it waits.
+    /// Whether a wait is under way.
     pub fn is_waiting(&self) -> bool {
         self.wait.is_some()
     }
@@ -47,12 +47,12 @@ impl Monitor {
         self.recessive.is_none()
     }
 
-    /// Begins to wait for that many sequences, counted from `now`.
+    /// Begins a wait for `sequences` sequences, counted from `now`.
     pub fn wait(&mut self, sequences: u64, now: Time) {
         self.wait = Some(Wait { sequences, from: now });
     }
 
-    /// Waits no longer.
+    /// Ends the wait.
     pub fn cancel(&mut self) {
         self.wait = None;
     }
@@ -62,7 +62,7 @@ impl Monitor {
         self.recessive = Some(since);
     }
 
-    /// A frame begins: the sequences that end here count, the incomplete one is lost.
+    /// A frame begins: the complete sequences before it count, an incomplete one does not.
     pub fn busy(&mut self, at: Time, bit: Time) {
         if let (Some(wait), Some(recessive)) = (&mut self.wait, self.recessive) {
             let seen = at.since(recessive.max(wait.from)).0 / (bit * SEQUENCE_BITS).0.max(1);
@@ -71,7 +71,7 @@ impl Monitor {
         self.recessive = None;
     }
 
-    /// When the wait ends if the wire stays as it is; `Time::NEVER` while it is busy or without a wait.
+    /// The instant at which the wait ends if no frame begins; `Time::NEVER` during a frame or without a wait.
     pub fn due(&self, bit: Time) -> Time {
         match (self.wait, self.recessive) {
             (Some(wait), Some(recessive)) => {
@@ -81,12 +81,12 @@ impl Monitor {
         }
     }
 
-    /// When the controller may take part: the end of the wait, or of the last one. It begins no frame before it.
+    /// The instant from which on the controller may begin a frame: the end of the current or of the last wait.
     pub fn ready(&self, bit: Time) -> Time {
         if self.is_waiting() { self.due(bit) } else { self.ended }
     }
 
-    /// Whether the wait has ended by `now`; then it is over.
+    /// Whether the wait has ended by `now`; if so, the wait is removed.
     pub fn poll(&mut self, now: Time, bit: Time) -> bool {
         let due = self.due(bit);
         let done = due <= now && due != Time::NEVER;

@@ -1,14 +1,14 @@
-//! The receiving half of a CAN controller: levels in, a frame or an error out (ISO 11898-1:2015, 10.4 to 10.6).
+//! The receiving half of a CAN controller: levels in, frames or errors out (ISO 11898-1:2015, 10.4 to 10.6).
 
 use crate::bits::{BitString, DOMINANT, END_OF_FRAME_BITS, Level, RECESSIVE, STUFF_RUN, crc_end, decode};
 use crate::{BusError, Frame};
 
-/// What a bit meant to the receiver.
+/// The meaning of a bit for the receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Seen {
     /// The frame goes on.
     Nothing,
-    /// The next bit is the ACK slot; with `true` the receiver answers.
+    /// The next bit is the ACK slot; with `true` the receiver acknowledges.
     AckSlotNext(bool),
     /// The frame is valid; one bit of its end is left.
     Valid(Frame),
@@ -18,7 +18,7 @@ pub(crate) enum Seen {
     Error(BusError),
 }
 
-/// Takes a frame apart, one bit on the wire at a time.
+/// Decodes a frame from the bits on the wire, one bit at a time.
 #[derive(Clone, Debug)]
 pub(crate) struct Receiver {
     bits: BitString,
@@ -29,12 +29,12 @@ pub(crate) struct Receiver {
 }
 
 impl Receiver {
-    /// Waits for the start of frame.
+    /// A receiver that waits for the start of frame.
     pub(crate) fn new() -> Receiver {
         Receiver { bits: BitString::default(), last: RECESSIVE, run: 0, tail: None }
     }
 
-    /// Whether it has seen a start of frame.
+    /// Whether the receiver has seen a start of frame.
     pub(crate) fn is_inside(&self) -> bool {
         self.bits.len > 0
     }

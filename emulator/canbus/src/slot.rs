@@ -1,5 +1,5 @@
-//! The time from a start of frame to the end of its intermission: its course is worked out at the start of frame
-//! and told to the participants as it comes true.
+//! The time from a start of frame to the end of its intermission. The course of the frame is computed at the start of
+//! frame; each participant is told of an event when its instant comes.
 
 use std::collections::VecDeque;
 
@@ -34,8 +34,8 @@ enum Item {
 }
 
 impl Slot {
-    /// What becomes of the frames that `contenders` begin at `start`; `None` without any. `flips` gives the bit
-    /// errors of a frame of that many bits.
+    /// Computes the course of the frames that `contenders` begin at `start`; `None` without a contender. `flips`
+    /// returns the bit errors of a frame of the given number of bits.
     pub(crate) fn plan(
         start: Time,
         contenders: &[Contender],
@@ -79,17 +79,17 @@ impl Slot {
         self.winner.timing.bit()
     }
 
-    /// Those who won the arbitration: one, unless several sent the same identifier.
+    /// The participants that won the arbitration: one, unless several sent the same identifier.
     pub(crate) fn transmitters(&self) -> &[usize] {
         &self.transmitters
     }
 
-    /// When the next thing happens.
+    /// The instant of the next event.
     pub(crate) fn next(&self) -> Time {
         self.agenda.front().map_or(self.end, |(at, _)| *at)
     }
 
-    /// Tells the next thing that happens; `false` when nothing is left.
+    /// Reports the next event; `false` when none is left.
     pub(crate) fn proceed(
         &mut self,
         participants: &mut [&mut dyn Controller],
@@ -110,7 +110,7 @@ impl Slot {
         true
     }
 
-    /// Whether nobody sends any more, because of a reset or a power cut in the middle of the frame.
+    /// Whether no transmitter is left, because of a reset or a power cut in the middle of the frame.
     fn is_abandoned(&self, participants: &mut [&mut dyn Controller], at: Time) -> bool {
         self.transmitters
             .iter()
@@ -128,7 +128,7 @@ impl Slot {
         agenda.into()
     }
 
-    /// The frame was sent, or at least somebody has received it.
+    /// The event of a frame that was sent, or that at least one participant has received.
     fn frame_event(&self, course: &Course) -> Option<(Time, Event)> {
         let find =
             |test: fn(&Notice) -> bool| course.happenings.iter().find(|h| test(&h.notice)).map(|h| h.at);
@@ -138,7 +138,7 @@ impl Slot {
         Some((end, Event::Frame { start: self.start, end, frame, transmitter }))
     }
 
-    /// What kept the transmitter from sending it.
+    /// The error that made the transmission fail.
     fn failure(&self, taps: &[Tap], course: &Course) -> Option<(Time, Event)> {
         course.happenings.iter().find_map(|Happening { at, tap, notice }| match notice {
             Notice::Error(report) if taps[*tap].members.contains(&self.winner.participant) => {
@@ -154,13 +154,13 @@ impl Slot {
     }
 }
 
-/// One tap for all participants that are alike: attached in the same way, with bits of the same length, and sending the same
-/// frame or none. One for each victim of a bit error.
+/// One tap for all participants that behave alike: same attachment, same bit length, and the same frame or none to
+/// send. Each victim of a bit error has a tap of its own.
 fn taps(contenders: &[Contender], attachments: &[Attachment], timing: BitTiming, flips: &[Flip]) -> Vec<Tap> {
     let mut taps: Vec<Tap> = Vec::new();
     for (n, attachment) in attachments.iter().enumerate() {
         let Some(own) = attachment.timing() else { continue };
-        // In step with the transmitter all edges come at the begin of a bit: where in the bit it is sampled makes no difference.
+        // In step with the transmitter, all edges come at the begin of a bit: the sample point makes no difference.
         let own = if own.bit() == timing.bit() { timing } else { own };
         let contender = contenders.iter().find(|contender| contender.participant == n);
         let nature =
@@ -184,7 +184,7 @@ fn tell(participants: &mut [&mut dyn Controller], n: usize, notice: &Notice, at:
     }
 }
 
-/// What receivers make of a frame that stops in the middle: six recessive bits.
+/// A frame that stops in the middle is a stuff error for the receivers: they see six recessive bits.
 fn cut_short(notice: Notice) -> Notice {
     match notice {
         Notice::Received(_) => Notice::Error(ErrorReport {

@@ -1,15 +1,16 @@
-//! The protocol engine of one participant for one frame: what it drives, bit by bit, and what it makes of the wire.
+//! The protocol engine of one participant for one frame: the levels that it drives, bit by bit, and its reaction to the
+//! wire.
 
 use crate::bits::{Bit, DOMINANT, Field, INTERMISSION_BITS, Level, RECESSIVE, encode};
 use crate::receiver::{Receiver, Seen};
 use crate::{Attachment, BusError, ErrorReport, Frame};
 
-/// Bits of an error or overload flag, and equal bits that complete a passive one.
+/// Bits of an error or overload flag; also the equal bits that complete a passive error flag.
 const FLAG_BITS: u8 = 6;
 /// Recessive bits of the delimiter after the first one.
 const DELIMITER_BITS: u8 = 7;
 
-/// What happened to a participant.
+/// An event that a participant is told of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Notice {
     Lost,
@@ -28,7 +29,7 @@ enum Phase {
     PassiveFlag { run: u8, last: Level },
     /// Waits until the flags of all others have ended.
     AfterFlag,
-    /// Counts down what is left of the delimiter.
+    /// Counts down the remaining bits of the delimiter.
     Delimiter { left: u8 },
     /// Counts down the bits between two frames.
     Intermission { left: u8 },
@@ -36,23 +37,23 @@ enum Phase {
     Done,
 }
 
-/// One participant, or several that cannot be told apart on the wire.
+/// One participant, or several participants with identical behaviour on the wire.
 #[derive(Clone, Debug)]
 pub(crate) struct Station {
     attachment: Attachment,
-    /// What it sends, and how far it is; `None` once it only listens.
+    /// The bits to send, and the number of bits sent; `None` for a receiver.
     sending: Option<(Vec<Bit>, usize)>,
     receiver: Receiver,
     phase: Phase,
     drive: Level,
     report: Option<ErrorReport>,
-    /// No overload flag comes any more: one was sent, or the frame was faulty.
+    /// No further overload flag: one was sent, or the frame was faulty.
     overloaded: bool,
     resumed: bool,
 }
 
 impl Station {
-    /// At its start of frame, about to send `frame` or only to listen.
+    /// A station at its start of frame: with a frame to send, or a receiver.
     pub(crate) fn new(attachment: Attachment, frame: Option<&Frame>) -> Station {
         let sending = frame.map(|frame| (encode(frame), 0));
         let drive = if sending.is_some() { DOMINANT } else { RECESSIVE };
@@ -68,19 +69,20 @@ impl Station {
         }
     }
 
-    /// The level that it puts on the wire.
+    /// The level that the station drives.
     pub(crate) fn drives(&self) -> Level {
         self.drive || self.is_silent()
     }
 
-    /// Ready for the next frame: this one is over, or its start was never noticed, as when a bit error hides the
-    /// start of frame of an error-passive transmitter, who then gives up without a dominant bit.
+    /// Whether the station is ready for the next frame: this frame is over, or the station never noticed its start. The
+    /// latter happens when a bit error hides the start of frame of an error-passive transmitter, which then gives up
+    /// without a dominant bit.
     pub(crate) fn is_done(&self) -> bool {
         let unaware = self.phase == Phase::Frame && self.sending.is_none() && !self.receiver.is_inside();
         self.phase == Phase::Done || unaware
     }
 
-    /// Whether its dominant error flag is on the wire or may still come.
+    /// Whether the station's dominant error flag is on the wire or may still come.
     pub(crate) fn threatens(&self) -> bool {
         let active = matches!(self.attachment, Attachment::Active { .. });
         active
@@ -90,12 +92,12 @@ impl Station {
             }
     }
 
-    /// Gives up the error report that waits for the end of others' flags.
+    /// Takes the error report that would otherwise wait for the end of the flags of other stations.
     pub(crate) fn take_report(&mut self) -> Option<Notice> {
         self.report.take().map(Notice::Error)
     }
 
-    /// Takes the level at its sample point and decides what to drive in the next bit.
+    /// Samples the wire and decides the level to drive in the next bit.
     pub(crate) fn sample(&mut self, wire: Level) -> Option<Notice> {
         // A silent controller hears its own dominant bits as if they were on the wire (RM0390, bxCAN silent mode).
         let level = wire && (self.drive || !self.is_silent());
@@ -147,7 +149,7 @@ impl Station {
         }
     }
 
-    /// A transmitter compares what it sent with what it reads (ISO 11898-1:2015, 10.11 and 10.8).
+    /// A transmitter compares the level sent with the level read back (ISO 11898-1:2015, 10.11 and 10.8).
     fn sample_sending(&mut self, bits: Vec<Bit>, n: usize, level: Level) -> Option<Notice> {
         let sent = bits[n];
         let next = bits.get(n + 1).map(|bit| bit.level);
@@ -186,7 +188,8 @@ impl Station {
         None
     }
 
-    /// Begins an error flag. The counters of transmitter and receiver go by what the station was when it failed.
+    /// Begins an error flag. Whether the error counts as a transmit or as a receive error depends on the role at the
+    /// moment of the error.
     fn fail(&mut self, error: BusError) {
         let transmitting = self.sending.is_some();
         self.report = Some(ErrorReport { error, transmitting, dominant_in_flag: 0, dominant_after_flag: 0 });
@@ -197,8 +200,8 @@ impl Station {
         }
     }
 
-    /// Begins an overload flag, which even an error-passive station sends dominant: no error, nothing is counted.
-    /// Two would be allowed; one keeps it finite.
+    /// Begins an overload flag. Even an error-passive station sends it dominant, because an overload is no error and is
+    /// not counted. The standard allows two overload flags; the model sends one, so that a frame always ends.
     fn overload(&mut self) {
         if self.overloaded {
             return self.enter(Phase::AfterFlag);
@@ -231,7 +234,8 @@ impl Station {
         self.take_report()
     }
 
-    /// Only a participant at another bit rate can disturb a delimiter. It has been counted already: just wait.
+    /// Only a participant at another bit rate can disturb a delimiter. The error has already been counted: the station
+    /// just waits.
     fn sample_delimiter(&mut self, left: u8, level: Level) {
         if level == DOMINANT {
             return self.enter(Phase::AfterFlag);
@@ -243,7 +247,7 @@ impl Station {
         );
     }
 
-    /// Dominant in the first two bits is an overload condition (ISO 11898-1:2015, 10.4.6).
+    /// A dominant level in the first two bits is an overload condition (ISO 11898-1:2015, 10.4.6).
     fn sample_intermission(&mut self, left: u8, level: Level) {
         if level == DOMINANT && left > 1 {
             return self.overload();
@@ -251,7 +255,8 @@ impl Station {
         self.step(left, |left| Phase::Intermission { left }, Phase::Done);
     }
 
-    /// Only the flag of a participant at another bit rate comes now: it looks like a start of frame. Once is enough.
+    /// Only the flag of a participant at another bit rate can come now. The flag looks like a start of frame; the
+    /// station follows one such flag only.
     fn sample_idle(&mut self, level: Level) {
         if level == DOMINANT && !self.resumed {
             self.resumed = true;

@@ -3,18 +3,18 @@
 use core::fmt;
 use core::ops::{Add, AddAssign, Mul, Sub};
 
-/// An instant, or a span, of virtual time: a count of 1/10080 microseconds since power-on.
+/// An instant or a span of virtual time: a count of 1/10080 microseconds since power-on.
 ///
-/// The unit is the least one in which a cycle of every clock in the system is a whole number: 168 MHz is 60,
-/// 144 MHz is 70, the 16 MHz HSI is 630, the 32 kHz LSI is 315000, a bit at 1 Mbit/s is 10080. So boards with
-/// different clocks and the bus never drift apart by rounding. 64 bits last 58 years.
+/// A cycle of every clock in the system is a whole number of units: 168 MHz is 60, 144 MHz is 70, the 16 MHz HSI is
+/// 630, the 32 kHz LSI is 315000, a bit at 1 Mbit/s is 10080. So boards with different clocks and the bus never drift
+/// apart by rounding. 64 bits last 58 years.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Time(pub u64);
 
 impl Time {
     /// Power-on.
     pub const ZERO: Time = Time(0);
-    /// Later than anything that happens.
+    /// Later than any event.
     pub const NEVER: Time = Time(u64::MAX);
     /// Units in a microsecond.
     pub const PER_MICRO: u64 = 10_080;
@@ -48,7 +48,7 @@ impl Time {
         self.0 / Self::PER_MICRO
     }
 
-    /// Seconds, for people.
+    /// Seconds, for display.
     #[allow(clippy::cast_precision_loss)]
     #[inline]
     pub fn as_secs_f64(self) -> f64 {

@@ -1,8 +1,9 @@
-//! Bit timing: where in a bit a controller samples, and how far it moves to stay in step with others (ISO 11898-1:2015, 11.3).
+//! Bit timing: the sample point of a controller, and the size of its resynchronisation steps (ISO 11898-1:2015, 11.3).
 
 use crate::Time;
 
-/// One bit as a controller clocks it: one quantum of synchronisation and two segments, the sample point between the segments.
+/// One bit as a controller clocks it: one quantum of synchronisation and two segments, with the sample point between
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitTiming {
     bit: Time,
@@ -12,7 +13,8 @@ pub struct BitTiming {
 }
 
 impl BitTiming {
-    /// A bit of this length; segments (with the propagation segment in the first one) and resynchronisation jump width in quanta.
+    /// A bit of this length; segments (the first one with the propagation segment) and resynchronisation jump width in
+    /// quanta.
     ///
     /// # Panics
     /// When a segment or the jump width is 0: no controller has such a bit.
@@ -34,27 +36,28 @@ impl BitTiming {
         self.bit
     }
 
-    /// Whether resynchronisation may keep the two in step: their bits differ by one per cent at most.
+    /// Whether resynchronisation may keep two participants in step: their bit lengths differ by at most one per cent.
     pub(crate) fn is_near(self, other: BitTiming) -> bool {
         self.bit.0.abs_diff(other.bit.0) * 100 <= other.bit.0
     }
 
-    /// From the begin of a bit to its sample point.
+    /// The span from the begin of a bit to its sample point.
     pub(crate) fn sample_point(self) -> Time {
         self.quanta(1 + u64::from(self.segment1))
     }
 
-    /// How much sooner the next bit begins for an edge that comes `early` before it.
+    /// The span by which the next bit begins sooner, for an edge that comes `early` before it.
     pub(crate) fn sooner(self, early: Time) -> Time {
         self.quanta(early.0.div_ceil(self.quantum()).min(self.jump.into()))
     }
 
-    /// How much longer the bit gets for an edge that comes `late` after its begin. An edge in the first quantum is in time.
+    /// The span by which the bit becomes longer, for an edge that comes `late` after its begin. An edge in the first
+    /// quantum is in time.
     pub(crate) fn longer(self, late: Time) -> Time {
         self.quanta((late.0 / self.quantum()).min(self.jump.into()))
     }
 
-    /// A quantum, rounded down; only comparisons use the quotient, so that no rounding adds up.
+    /// The length of a quantum, rounded down. It only serves for comparisons, so the rounding does not add up.
     fn quantum(self) -> u64 {
         (self.bit.0 / self.count()).max(1)
     }

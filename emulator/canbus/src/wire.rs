@@ -1,40 +1,40 @@
-//! The wire: stations with bit clocks of their own drive it and sample it, from a start of frame until it is idle.
+//! The wire: stations with their own bit clocks drive and sample it, from a start of frame until the wire is idle.
 
 use crate::bits::{DOMINANT, Level, RECESSIVE};
 use crate::faults::{Flip, SeenBy};
 use crate::station::{Notice, Station};
 use crate::{Attachment, BitTiming, Frame, Time};
 
-/// What makes participants alike on the wire.
+/// The properties in which participants with identical behaviour on the wire agree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Nature {
     pub(crate) attachment: Attachment,
-    /// What it begins to send.
+    /// The frame that the participant begins to send.
     pub(crate) frame: Option<Frame>,
 }
 
 /// A station and its bit clock.
 pub(crate) struct Tap {
-    /// The participants that it stands for.
+    /// The participants that the tap stands for.
     pub(crate) members: Vec<usize>,
-    /// What its members have in common; `None` for one that is unlike all others.
+    /// The common properties of the members; `None` for a participant that has no equal.
     pub(crate) nature: Option<Nature>,
     contender: bool,
     station: Station,
     timing: BitTiming,
-    /// When the current bit began by the bit clock, and its number.
+    /// The instant at which the current bit began by the bit clock; `number` is the number of the bit.
     began: Time,
     number: usize,
-    /// What is driven since when, and what was driven before.
+    /// The driven level, the instant since which it is driven, and the level driven before.
     drives: Level,
     driven: Time,
     drove: Level,
-    /// When what is driven last changed from recessive to dominant.
+    /// The instant of the last change of the driven level from recessive to dominant.
     turned: Option<Time>,
-    /// What was sampled last, and when.
+    /// The last sampled level, and the instant of the sample.
     last: Level,
     sampled: Time,
-    /// One edge in a bit moves the clock.
+    /// Whether an edge has moved the clock in this bit: at most one edge does.
     is_synchronised: bool,
 }
 
@@ -71,7 +71,8 @@ impl Tap {
         self.began + self.timing.sample_point()
     }
 
-    /// Whether the next frame has to wait for it. A station at another rate can delay it by a flag only.
+    /// Whether the next frame has to wait for the station. A station at another rate can delay the next frame by its
+    /// flag only.
     fn is_busy(&self, timing: BitTiming) -> bool {
         if self.timing.is_near(timing) { !self.station.is_done() } else { self.station.threatens() }
     }
@@ -80,17 +81,17 @@ impl Tap {
         if at < self.driven { self.drove } else { self.drives }
     }
 
-    /// Until when it holds the level that it has at `at`.
+    /// The instant until which the station holds the level that it drives at `at`.
     fn holds_until(&self, at: Time) -> Time {
         if at < self.driven { self.driven } else { self.began + self.timing.bit() }
     }
 
-    /// Whether an edge between its last sample point and its next one would move its clock.
+    /// Whether an edge between the last and the next sample point would move the clock.
     fn looks_for_edges(&self) -> bool {
         !self.is_synchronised && self.last == RECESSIVE
     }
 
-    /// An edge from recessive to dominant that others have made since its last sample point: resynchronisation.
+    /// Resynchronisation: another station has made an edge from recessive to dominant since the last sample point.
     fn on_edge(&mut self, edge: Time) {
         if edge < self.began {
             let began = self.began - self.timing.sooner(self.began - edge);
@@ -98,7 +99,7 @@ impl Tap {
             self.turned = self.turned.map(|at| if at == self.driven { driven } else { at });
             (self.began, self.driven) = (began, driven);
         } else if self.drives == RECESSIVE {
-            // Somebody who sends a dominant bit does not follow an edge that comes late: it may be the echo of its own.
+            // A station that sends a dominant bit does not follow a late edge: the edge may be an echo of its own bit.
             self.began += self.timing.longer(edge - self.began);
         }
         self.is_synchronised = true;
@@ -109,7 +110,7 @@ impl Tap {
         let level = wire ^ flipped;
         (self.last, self.sampled) = (level, self.sample_point());
         let notice = self.station.sample(level);
-        // An error is reported for the instant at which the last flag has ended, the rest for the end of its bit.
+        // An error is reported for the end of the last error flag, any other notice for the end of its bit.
         let began = self.began;
         self.began += self.timing.bit();
         self.number += 1;
@@ -132,7 +133,7 @@ impl Tap {
     }
 }
 
-/// Something that happened to the members of a tap.
+/// An event for the members of a tap.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Happening {
     pub(crate) at: Time,
@@ -140,18 +141,18 @@ pub(crate) struct Happening {
     pub(crate) notice: Notice,
 }
 
-/// Everything that happened, in order, and when the wire was free again.
+/// All events in order, and the instant at which the wire is free again.
 #[derive(Clone, Debug)]
 pub(crate) struct Course {
     pub(crate) happenings: Vec<Happening>,
-    /// When the last dominant bit ended.
+    /// The end of the last dominant bit.
     pub(crate) recessive: Time,
     /// End of the intermission.
     pub(crate) end: Time,
 }
 
-/// Runs the wire from the start of frame at `start` until the stations at about the rate of the transmitter are ready for the
-/// next frame. `flips` are the bits that some of them read inverted.
+/// Runs the wire from the start of frame at `start` until all stations at about the transmitter's bit rate are ready
+/// for the next frame. `flips` are the bits that some stations read inverted.
 pub(crate) fn run(taps: &mut [Tap], start: Time, timing: BitTiming, flips: &[Flip]) -> Course {
     let mut course = Course { happenings: Vec::new(), recessive: start, end: start };
     taps.iter_mut().for_each(|tap| tap.start(start));
@@ -173,7 +174,7 @@ pub(crate) fn run(taps: &mut [Tap], start: Time, timing: BitTiming, flips: &[Fli
     course
 }
 
-/// Moves the bit clocks to the edges that came since their last sample points. An edge at the begin of a bit moves none.
+/// Moves the bit clocks to the edges since their last sample points. An edge at the begin of a bit moves no clock.
 fn synchronise(taps: &mut [Tap]) {
     for n in 0..taps.len() {
         let tap = &taps[n];
@@ -189,7 +190,8 @@ fn synchronise(taps: &mut [Tap]) {
     }
 }
 
-/// A station at another rate may still be in its flag or delimiter. The next frame overtakes it: it reports now.
+/// A station at another bit rate may still be in its flag or delimiter. It reports its error now, because the next
+/// frame begins.
 fn finish(taps: &mut [Tap], course: &mut Course) {
     for (n, tap) in taps.iter_mut().enumerate() {
         let report = tap.station.take_report();

@@ -50,7 +50,7 @@ fn a_lone_transmitter_becomes_passive_and_stays_there() {
     let active = attempt + 6 + 8 + 3;
     let mut events = run(&mut bus, &mut nodes, BIT * (16 * active));
     assert_eq!((events.len(), counters(&nodes[0])), (16, (128, 0)));
-    // A passive flag is as long, but then the transmission is suspended for eight bits.
+    // A passive flag is as long, but the transmission is then suspended for eight bits.
     events.extend(run(&mut bus, &mut nodes, BIT * (16 * active + 100 * (active + 8))));
     assert_eq!((events.len(), counters(&nodes[0])), (116, (128, 0)));
     assert!(events.iter().all(|event| matches!(event, Event::Error { error: BusError::Ack, .. })));
@@ -60,7 +60,7 @@ fn a_lone_transmitter_becomes_passive_and_stays_there() {
 fn every_bit_that_everyone_reads_inverted_costs_one_attempt() {
     let frame = standard(0x2A5, &[0x55, 0x00, 0xFF]);
     let bits = frame_bits(&frame) as usize - 3;
-    // Inverted, the recessive ACK slot would be dominant anyway: see below.
+    // The ACK slot is left out: the next test covers a lost acknowledge.
     for bit in (0..bits).filter(|bit| *bit != bits - 9) {
         let mut bus = with_fault(Position::Bit(bit), SeenBy::Everyone);
         let mut nodes = [node(), node(), node()];
@@ -68,8 +68,9 @@ fn every_bit_that_everyone_reads_inverted_costs_one_attempt() {
         let events = run(&mut bus, &mut nodes, Time::from_millis(2));
         let [first, .., Event::Frame { start, .. }] = events.as_slice() else { panic!("{bit}: {events:?}") };
         assert_eq!(bus.frames(), 2, "bit {bit}");
-        // The bit, an error flag of six to twelve bits, its delimiter, the intermission. Losing the arbitration
-        // to nobody, in the first bits, is noticed by the sixth recessive bit after it.
+        // The bit, an error flag of six to twelve bits, its delimiter, the intermission. A flip in the first bits makes
+        // the transmitter lose the arbitration without a winner; the error is then detected at the sixth recessive bit
+        // in a row.
         let overhead = start.0 / BIT.0 - (bit as u64 + 1) - 8 - 3;
         assert!((6..=12).contains(&overhead), "bit {bit}: {overhead}");
         let copies = if bit == bits - 1 { 2 } else { 1 };
@@ -107,13 +108,14 @@ fn an_error_in_the_last_bit_sends_a_frame_twice() {
 #[test]
 fn a_receiver_alone_with_its_crc_error_pays_nine() {
     let frame = standard(0x181, &[0x33]);
-    // A data bit that neither makes nor hides six equal bits for the victim.
+    // Inverting this data bit neither makes nor hides six equal bits for the victim.
     let mut bus = with_fault(Position::Bit(26), SeenBy::Participant(2));
     let mut nodes = [node(), node(), node()];
     nodes[0].send(frame, Time::ZERO);
     let events = run(&mut bus, &mut nodes, Time::from_millis(1));
     assert_eq!(events.len(), 2);
-    // One less each for the frame that followed: 8 - 1 for the transmitter, 1 - 1 and 1 + 8 - 1 for the receivers.
+    // Each counter is one less for the frame that followed: 8 - 1 for the transmitter, 1 - 1 and 1 + 8 - 1 for the
+    // receivers.
     assert_eq!(nodes.iter().map(counters).collect::<Vec<_>>(), [(7, 0), (0, 0), (0, 8)]);
 }
 
@@ -156,7 +158,7 @@ fn traffic_counts_for_the_recovery_from_bus_off() {
     assert_eq!(place, Some(127));
 }
 
-/// Also when the hidden bit is the start of frame of an error-passive transmitter, which no receiver ever notices.
+/// A hidden bit may also be the start of frame of an error-passive transmitter, which no receiver ever notices.
 #[test]
 fn a_bus_that_destroys_every_frame_goes_on() {
     let mut nodes = [node(), node()];
@@ -185,7 +187,7 @@ fn an_identifier_used_twice_is_a_bit_error() {
     assert!(events.iter().all(error));
     assert!(nodes[..2].iter().all(|node| counters(node).0 > 0));
     assert!(frames(&mut nodes[2]).is_empty());
-    // Both retransmit at the same instant until both are error passive: now the dominant bit wins.
+    // Both retransmit at the same instant until both are error passive: from then on the dominant bit wins.
     run(&mut bus, &mut nodes, Time::from_millis(4));
     assert_eq!(frames(&mut nodes[2]), [standard(0x181, &[0x0F]), standard(0x181, &[0xF0])]);
 }
@@ -202,7 +204,7 @@ fn the_same_frame_at_the_same_time_is_one_frame() {
 
 #[test]
 fn an_error_passive_transmitter_lets_others_go_first() {
-    // Alone it becomes passive.
+    // A node alone on the bus becomes error passive.
     let mut nodes = vec![node()];
     let mut bus = Bus::new();
     nodes[0].send(standard(0x10, &[]), Time::ZERO);
@@ -226,7 +228,7 @@ fn a_listener_at_another_bit_rate_disturbs_until_it_is_passive() {
     for rate in [125_000, 250_000, 500_000, 800_000] {
         let mut nodes = [node(), node(), HostNode::new(Time::of_cycle(rate))];
         let mut bus = Bus::new();
-        // Something to send all the time: whatever fails is repeated.
+        // Always a frame to send: a failed frame is repeated.
         for n in 0..500_u16 {
             nodes[0].send(standard(0x181, &[n.to_le_bytes(); 4].concat()), Time::ZERO);
         }
@@ -250,7 +252,7 @@ fn a_transmitter_at_another_bit_rate_gets_nothing_through() {
         assert!(events.iter().all(|event| matches!(event, Event::Error { transmitter: 2, .. })), "{rate}");
         assert!(nodes[..2].iter_mut().all(|node| frames(node).is_empty()), "{rate}");
         assert!(nodes.iter().all(|node| node.confinement().state() != ErrorState::Active), "{rate}");
-        // Set right, it is heard, and every frame takes one from its counter.
+        // At the right bit rate the node is heard, and every frame reduces its counter by one.
         nodes[2].set_bit(BIT);
         run(&mut bus, &mut nodes, Time::from_millis(25));
         assert_eq!(frames(&mut nodes[0]).len(), 1, "{rate}");
@@ -287,7 +289,7 @@ fn noise_is_repeatable_and_loses_nothing() {
     assert_eq!(received.len(), 1000);
 }
 
-/// The same cases in every run.
+/// Property tests run the same cases each time.
 fn fixed() -> ProptestConfig {
     ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
 }

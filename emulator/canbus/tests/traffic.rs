@@ -22,7 +22,7 @@ fn any_frame() -> impl Strategy<Value = Frame> {
     let id = prop_oneof![
         (0..0x800_u16).prop_map(|raw| Id::from(StandardId::new(raw).unwrap())),
         (0..1_u32 << 29).prop_map(|raw| Id::from(ExtendedId::new(raw).unwrap())),
-        // Stuffing is dense among equal bits.
+        // Equal bits need many stuff bits.
         prop_oneof![Just(0), Just(0x1FFF_FFFF)].prop_map(|raw| Id::from(ExtendedId::new(raw).unwrap())),
     ];
     let byte = prop_oneof![Just(0_u8), Just(0xFF), Just(0xF8), any::<u8>()];
@@ -32,7 +32,7 @@ fn any_frame() -> impl Strategy<Value = Frame> {
     })
 }
 
-/// An encoder of its own: bit by bit, with the shift register of the CAN specification (Bosch 2.0, 3.1.1).
+/// An independent encoder: bit by bit, with the shift register of the CAN specification (Bosch 2.0, 3.1.1).
 fn bits_by_hand(frame: &Frame) -> u64 {
     fn push(bits: &mut Vec<bool>, value: u32, width: u32) {
         bits.extend((0..width).rev().map(|n| value >> n & 1 == 1));
@@ -71,7 +71,7 @@ fn bits_by_hand(frame: &Frame) -> u64 {
     stuffed + 1 + 2 + 7 + 3
 }
 
-/// The same cases in every run.
+/// Property tests run the same cases each time.
 fn fixed() -> ProptestConfig {
     ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
 }
@@ -125,7 +125,7 @@ proptest! {
     }
 }
 
-/// The arbitration field as a string of bits, for a sort that owes nothing to the bus.
+/// The arbitration field as a string of bits, so that the expected order does not depend on the bus model.
 fn wire_order(frame: &Frame) -> Vec<bool> {
     let bits = |value: u32, width: u32| (0..width).rev().map(move |n| value >> n & 1 == 1);
     match frame.id() {

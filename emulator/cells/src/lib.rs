@@ -1,10 +1,10 @@
-//! The cells of a NOR flash, by the word, for the mock flashes of tests: they panic when a rule of the real flash is
-//! broken, count operations, and lose power in the middle of the one they are told to.
+//! The cells of a NOR flash, word by word, for the mock flashes of tests. The cells panic when a rule of the real flash
+//! is broken, count operations, and lose power in the middle of a chosen operation.
 //!
-//! What a cut leaves behind is modelled on the pessimistic side: the bits that were being changed are *weak*, they may
-//! read as either value, and as another one after the next power-up, until the word is erased or programmed with zeros.
-//! A word that was cut without a visible trace is therefore still known to the model, and programming it with anything
-//! but zeros is a broken rule.
+//! The model of a power cut is pessimistic. The bits that were being changed are *weak*: they may read as either value,
+//! and as another value after the next power-up, until the word is erased or programmed with zeros. The model therefore
+//! remembers a cut word even if the cut left no visible trace: programming the word with anything but zeros breaks a
+//! rule.
 
 mod word;
 
@@ -44,16 +44,16 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// An erased flash of `size` bytes in words of four. `seed` decides how weak bits read that do so by chance.
+    /// An erased flash of `size` bytes in words of four. `seed` decides the values of weak bits that read at random.
     #[must_use]
     pub fn new(size: usize, seed: u64) -> Cells {
         Cells::with_words(size, WORD, seed)
     }
 
-    /// The same in words of `word` bytes, 4 or 8: what is programmed as one.
+    /// An erased flash of `size` bytes in words of `word` bytes, 4 or 8. A word is the unit of programming.
     ///
     /// # Panics
-    /// When `word` is another number.
+    /// When `word` is neither 4 nor 8.
     #[must_use]
     pub fn with_words(size: usize, word: usize, seed: u64) -> Cells {
         assert!(word == 4 || word == 8, "words of {word} bytes");
@@ -69,13 +69,13 @@ impl Cells {
         }
     }
 
-    /// Bytes in all.
+    /// Size in bytes.
     #[must_use]
     pub fn size(&self) -> usize {
         self.words.len() * self.word
     }
 
-    /// Programs (one word each) and erases so far.
+    /// Operations so far: programmed words and erases.
     #[must_use]
     pub fn operations(&self) -> u32 {
         self.operations
@@ -87,7 +87,7 @@ impl Cells {
         self.programmed
     }
 
-    /// Cuts the power in the middle of the operation that comes after `operations` more.
+    /// Cuts the power in the middle of an operation: the one that follows `operations` complete ones.
     pub fn cut_after(&mut self, operations: u32, weak: Weak) {
         self.cut_at = Some(self.operations + operations);
         self.weak = weak;
@@ -99,7 +99,7 @@ impl Cells {
         !self.powered
     }
 
-    /// What every call begins with.
+    /// Checks the power; every access calls this first.
     ///
     /// # Errors
     /// [`PowerCut`] when the power is off.
@@ -107,7 +107,7 @@ impl Cells {
         if self.powered { Ok(()) } else { Err(PowerCut) }
     }
 
-    /// Power again, and no cut to come. Weak bits read as the last cut says.
+    /// Switches the power on and cancels a scheduled cut. Weak bits read as the last cut specified.
     pub fn power_up(&mut self) {
         (self.powered, self.cut_at) = (true, None);
         for word in &mut self.words {
@@ -121,7 +121,7 @@ impl Cells {
         self.words.iter().flat_map(|word| word.value().to_le_bytes().into_iter().take(self.word)).collect()
     }
 
-    /// Changes a byte behind the driver's back, as radiation, wear or a foreign program would.
+    /// Changes a byte without an operation, as radiation, wear or a foreign program would.
     pub fn disturb(&mut self, offset: usize, change: impl FnOnce(u8) -> u8) {
         self.words[offset / self.word].disturb(offset % self.word, change);
     }
@@ -173,7 +173,7 @@ impl Cells {
         self.check_power()
     }
 
-    /// Counts an operation; tells whether it is the one that is cut.
+    /// Counts an operation; `true` when the power is cut in it.
     fn begin(&mut self) -> Result<bool, PowerCut> {
         self.check_power()?;
         let is_cut = self.cut_at == Some(self.operations);

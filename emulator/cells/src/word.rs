@@ -1,41 +1,41 @@
-//! One word.
+//! One word of the flash.
 
 /// How the weak bits read at power-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weak {
-    /// As before the operation that was cut.
+    /// As before the cut operation.
     Before,
-    /// As that operation would have left them.
+    /// As after the completed operation.
     After,
-    /// Each by chance, drawn again at every power-up.
+    /// Each bit at random, drawn again at every power-up.
     Random,
-    /// All of a word by chance as before or as after, drawn again at every power-up: what makes a word that was cut once
-    /// look whole and once not.
+    /// All bits of a word at random as before or as after, drawn again at every power-up: the word looks whole after
+    /// one power-up and incomplete after another.
     Either,
 }
 
 impl Weak {
-    /// All of them.
+    /// All ways.
     pub const ALL: [Weak; 4] = [Weak::Before, Weak::After, Weak::Random, Weak::Either];
 }
 
-/// What may be programmed until the next erase.
+/// The values that may be programmed until the next erase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Use {
-    /// Anything.
+    /// Any value.
     Erased,
-    /// Zeros.
+    /// Only zeros.
     Programmed,
-    /// Zeros, and then it is still no erased word: its erase was cut.
+    /// Only zeros, and the word still counts as not erased afterwards, because its erase was cut.
     HalfErased,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Word {
-    /// What an erased word reads: all ones, as many as the word has.
+    /// The value of an erased word: all ones, as many as the word has bits.
     erased: u64,
     value: u64,
-    /// Bits of which nobody knows how they read, what they were and what they would have become.
+    /// Bits with an uncertain value; `before` and `after` are the values before and after the cut operation.
     weak: u64,
     before: u64,
     after: u64,
@@ -43,7 +43,7 @@ pub(crate) struct Word {
 }
 
 impl Word {
-    /// An erased word of so many bytes, 8 at most.
+    /// An erased word of `bytes` bytes, 8 at most.
     pub(crate) fn erased(bytes: usize) -> Word {
         let erased = u64::MAX >> (64 - 8 * bytes);
         Word { erased, value: erased, weak: 0, before: erased, after: erased, used: Use::Erased }

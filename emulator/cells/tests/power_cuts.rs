@@ -1,4 +1,4 @@
-//! What a cut leaves behind, and the rules that the model holds its user to.
+//! The state of the cells after a power cut, and the rules that the model enforces.
 
 use cells::{Cells, PowerCut, Weak};
 

@@ -1,4 +1,4 @@
-//! Loads and stores by address: from the bus to the registers of the peripherals.
+//! Loads and stores by address: the way of an access to the registers of a peripheral.
 
 use canbus::Time;
 
@@ -12,9 +12,9 @@ use crate::signature;
 use crate::stm32f4::Stm32f4;
 use crate::unmodelled::{Direction, Reason};
 
-/// Why a write is not carried out.
+/// The reason why a write is not carried out.
 enum Refusal {
-    /// The register, or a setting of it, is not modelled.
+    /// The model lacks the register, or the setting.
     NotModelled,
     /// The backup domain is write-protected.
     Protected,
@@ -33,14 +33,14 @@ impl Stm32f4 {
         let unit = map::find(self.variant, address).ok_or(BusFault)?.unit;
         self.refresh(unit, now);
         let value = self.load(address, size, now)?;
-        // To read these can change flags.
+        // A read of these peripherals can change flags.
         if matches!(unit, Unit::Adc | Unit::AdcCommon | Unit::Dma(_) | Unit::Spi(_)) {
             self.settle(now);
         }
         Ok(value)
     }
 
-    /// A store by the core; whether more may have changed than what was stored.
+    /// A store by the core; `true` when the store may have had an effect beyond the stored value.
     pub(crate) fn core_store(
         &mut self,
         address: u32,
@@ -54,7 +54,7 @@ impl Stm32f4 {
         Ok(!block.unit.is_passive((address - block.base) & !3))
     }
 
-    /// A load from a peripheral that is up to date.
+    /// A load from a peripheral that has been brought up to `now`.
     pub(crate) fn load(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault> {
         let lane = Lane::of(address, size)?;
         let block = map::find(self.variant, address).ok_or(BusFault)?;
@@ -62,7 +62,7 @@ impl Stm32f4 {
         Ok(lane.extract(self.load_word(block, offset, now)))
     }
 
-    /// A store to a peripheral that is up to date.
+    /// A store to a peripheral that has been brought up to `now`.
     pub(crate) fn store(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault> {
         let lane = Lane::of(address, size)?;
         let block = map::find(self.variant, address).ok_or(BusFault)?;
@@ -87,10 +87,10 @@ impl Stm32f4 {
         Ok(())
     }
 
-    /// After a store that rules may be about.
+    /// Checks the rules that a store may break.
     fn check_rules(&mut self, unit: Unit, offset: u32, value: u32) {
         match unit {
-            // CAN_MCR: neither INRQ nor SLEEP.
+            // CAN_MCR: INRQ and SLEEP are cleared.
             Unit::Can(0) if offset == 0 && value & 0b11 == 0 => self.check_can(),
             Unit::Rcc | Unit::Pwr | Unit::Flash => {
                 self.rules.conversions_checked = false;
@@ -178,7 +178,7 @@ impl Stm32f4 {
         done.ok_or(Refusal::NotModelled)
     }
 
-    /// Brings what an access can see up to `now`.
+    /// Brings the state that an access can see up to `now`.
     fn refresh(&mut self, unit: Unit, now: Time) {
         match unit {
             Unit::Timer(index) => {
@@ -195,7 +195,7 @@ impl Stm32f4 {
     fn write_timer(&mut self, index: usize, offset: u32, value: u32, now: Time) -> Option<()> {
         let done = self.timers[index].write(offset, value, now);
         self.pass_trigger(index, now);
-        // DMA at an update is modelled where the ADC is started by it too.
+        // DMA at an update is modelled only for the timer that also starts the ADC.
         let served = !self.timers[index].requests_on_update() || self.trigger_timer() == Some(index);
         done.filter(|()| served)
     }
@@ -224,7 +224,7 @@ impl Stm32f4 {
         self.catch_up(now);
         let done = self.rcc.write(offset, value, now);
         if self.iwdg.is_running() {
-            // The watchdog keeps the LSI on whatever LSION says.
+            // The watchdog keeps the LSI on, whatever the value of LSION.
             self.rcc.start_lsi(now);
         }
         self.rcc.advance(now);

@@ -1,10 +1,10 @@
-//! Backup SRAM: 4 KiB in the backup domain (RM0390 section 5.1.2, RM0090 section 5.1.2). PWR decides who may write and
-//! whether it outlives a loss of the main supply.
+//! Backup SRAM: 4 KiB in the backup domain (RM0390 section 5.1.2, RM0090 section 5.1.2). PWR decides whether a program
+//! may write and whether the content survives a loss of the main supply.
 
-/// Bytes.
+/// Size in bytes.
 pub(crate) const SIZE: u32 = 4096;
 
-/// What every byte is once its supply was gone: like RAM it then holds nothing that a program may count on.
+/// Every byte after a loss of the supply: an arbitrary value, because a program must not count on the content of RAM.
 const LOST: u8 = 0xA5;
 
 #[derive(Clone)]
@@ -32,7 +32,7 @@ impl BackupRam {
         self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }
 
-    /// Takes over what was there, from the start; what is too much is left out.
+    /// Restores a kept content from the first byte on; bytes beyond the size are ignored.
     pub(crate) fn set_bytes(&mut self, bytes: &[u8]) {
         let (words, _) = bytes.as_chunks();
         self.words.iter_mut().zip(words).for_each(|(to, from)| *to = u32::from_le_bytes(*from));

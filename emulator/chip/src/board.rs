@@ -1,17 +1,17 @@
-//! What the board around the chip is made of.
+//! The properties of the board around the chip.
 
 pub use crate::spi::SsiFormat;
 
-/// The board, and what was done to the chip in the factory.
+/// The board, and the values that the factory has set in the chip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Board {
     /// Frequency of the clock on OSC_IN in hertz; `None` without one.
     pub hse: Option<u64>,
-    /// Lines of the incremental encoder: a quarter of the counts in a revolution.
+    /// Lines of the incremental encoder: a revolution has four counts for each line.
     pub encoder_lines: u32,
-    /// The word of the absolute encoder, which answers on MISO of every SPI.
+    /// The format of the absolute encoder's word; the encoder answers on MISO of every SPI.
     pub ssi: SsiFormat,
-    /// The 96 bits at 1FFF 7A10h.
+    /// The 96 bits of the unique identifier at 1FFF 7A10h.
     pub unique_id: [u32; 3],
     /// Flash sectors that the option bytes protect against writing, bit 0 for sector 0.
     pub write_protected: u32,

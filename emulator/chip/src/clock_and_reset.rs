@@ -1,4 +1,4 @@
-//! Clocks and resets on their way from RCC to the peripherals.
+//! Clocks and resets from RCC to the peripherals.
 
 use canbus::Time;
 
@@ -18,8 +18,9 @@ use crate::syscfg::Syscfg;
 use crate::timer::Timer;
 
 impl Stm32f4 {
-    /// A reset of the whole chip, by the supply or for the cause that is known. Whether the backup domain has outlived a
-    /// loss of the supply is decided when that comes back.
+    /// A reset of the whole chip: by the supply (`power`) or for the cause that a peripheral has set. A loss of the
+    /// supply takes effect here, when the supply returns: only now is it known whether the battery has kept the backup
+    /// domain.
     pub(crate) fn reset_all(&mut self, power: bool, now: Time) {
         if power && !self.backup_is_kept(now) {
             self.backup_ram = BackupRam::default();
@@ -34,7 +35,7 @@ impl Stm32f4 {
         self.apply_clocks(now);
     }
 
-    /// Brings every clocked unit to a clock tree that may have changed; all of them are up to `now`.
+    /// Tells every clocked unit the current clock tree; all units have been brought up to `now`.
     pub(crate) fn update_clocks(&mut self, now: Time) {
         let clocks = self.rcc.clocks();
         if clocks == self.clocks {
@@ -64,7 +65,7 @@ impl Stm32f4 {
         self.effects.push_back(Effect::CoreClock(self.clocks.hclk));
     }
 
-    /// Puts one peripheral into its state after reset. FLASH and RCC have resets of their own.
+    /// Puts one peripheral into its reset state. FLASH and RCC have resets of their own.
     pub(crate) fn reset_unit(&mut self, unit: Unit) {
         match unit {
             Unit::Timer(index) => {

@@ -1,4 +1,4 @@
-//! The lengths of the cycles that the clock tree delivers.
+//! The lengths of the clock cycles in the clock tree.
 
 use canbus::Time;
 
@@ -8,11 +8,11 @@ use canbus::Time;
 pub struct Clocks {
     /// Core and AHB clock in hertz.
     pub hclk: u64,
-    /// HCLK divided by this is PCLK1: 1, 2, 4, 8 or 16.
+    /// The divider from HCLK to PCLK1: 1, 2, 4, 8 or 16.
     pub apb1_divider: u32,
-    /// HCLK divided by this is PCLK2: 1, 2, 4, 8 or 16.
+    /// The divider from HCLK to PCLK2: 1, 2, 4, 8 or 16.
     pub apb2_divider: u32,
-    /// `TIMPRE`: timers run at up to four times PCLK instead of two.
+    /// `TIMPRE`: the limit of the timer clock is four times PCLK instead of two.
     pub fast_timers: bool,
 }
 
@@ -24,7 +24,7 @@ pub(crate) enum Apb {
 }
 
 impl Clocks {
-    /// After a reset: the 16 MHz HSI, nothing divided.
+    /// The clocks after a reset: the 16 MHz HSI, nothing divided.
     pub const RESET: Clocks =
         Clocks { hclk: 16_000_000, apb1_divider: 1, apb2_divider: 1, fast_timers: false };
 
@@ -53,7 +53,7 @@ impl Clocks {
         times(self.hclk_cycle(), self.divider(bus))
     }
 
-    /// HCLK divided by this is the clock of a bus.
+    /// The divider from HCLK to the clock of a bus.
     pub(crate) fn divider(&self, bus: Apb) -> u32 {
         match bus {
             Apb::One => self.apb1_divider,

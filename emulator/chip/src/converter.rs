@@ -1,8 +1,8 @@
-//! From the trigger to memory: timer, ADC and DMA at work together.
+//! From the trigger to memory: the cooperation of timer, ADC and DMA.
 //!
-//! Conversions are made up when somebody looks: at an access to one of the three, at an interrupt and at each half and
-//! full transfer, when what was transferred reaches memory. Each conversion still has the voltage of its own instant. So
-//! do the copies of the encoder's count that DMA makes at the same triggers.
+//! Conversions are computed only when their results are needed: at an access to timer, ADC or DMA, at an interrupt, and
+//! at each half and full transfer, when the data reaches memory. Each conversion still uses the voltage of its own
+//! instant. The copies of the encoder's count that DMA makes at the same triggers work in the same way.
 
 use canbus::Time;
 
@@ -23,15 +23,15 @@ const TIM3: usize = 1;
 const TIM4: usize = 2;
 /// The requests of ADC1 (RM0390 table 29).
 const ADC1: [Line; 2] = [line(0, 0), line(4, 0)];
-/// ADC input of the reference.
+/// ADC1 channel of the internal reference.
 const REFERENCE: u32 = 17;
 
-/// What DMA can reach besides peripherals: SRAM1 and SRAM2, and flash to read from. The CCM of the F405 is not on
-/// its bus (RM0090 section 2.1).
+/// Memory that DMA can reach: SRAM1 and SRAM2, and flash for reads. The CCM of the F405 is not on the bus of the DMA
+/// controllers (RM0090 section 2.1).
 const RAM: std::ops::Range<u32> = 0x2000_0000..0x2002_0000;
 
 impl Stm32f4 {
-    /// Makes every conversion that ended up to `now`.
+    /// Computes every conversion that ended up to `now`.
     pub(crate) fn convert(&mut self, now: Time) {
         loop {
             let end = self.adc.conversion_end();
@@ -47,7 +47,7 @@ impl Stm32f4 {
         }
     }
 
-    /// When the timer that the ADC listens to next sends TRGO, and how soon after that again at the earliest.
+    /// The instant of the next TRGO of the timer that triggers the ADC, and the shortest span to the following TRGO.
     fn next_trigger(&self) -> (Time, Time) {
         let never = (Time::NEVER, Time::ZERO);
         self.trigger_timer().map_or(never, |timer| self.timers[timer].trigger_output())
@@ -70,14 +70,14 @@ impl Stm32f4 {
         }
     }
 
-    /// A timer sent TRGO because software made an update event.
+    /// Passes on a TRGO that a software update event has caused.
     pub(crate) fn pass_trigger(&mut self, timer: usize, now: Time) {
         if self.timers[timer].take_trigger() && self.trigger_timer() == Some(timer) {
             self.adc.on_trigger(now);
         }
     }
 
-    /// Brings the timer that the ADC has just begun to listen to up to `now`: what it sent before does not count.
+    /// Brings the timer that has just been selected as trigger up to `now`: its earlier triggers do not count.
     pub(crate) fn attach_trigger(&mut self, now: Time) {
         if let Some(timer) = self.trigger_timer() {
             self.run_timer(timer, now);
@@ -93,7 +93,7 @@ impl Stm32f4 {
         }
     }
 
-    /// The voltage on an input of ADC1 as a ratio of VDDA; what is not connected is at ground.
+    /// The voltage on an input of ADC1 as a ratio of VDDA; an unconnected input is at ground.
     fn analogue(&self, Sample { channel, at }: Sample) -> f64 {
         let sensors = self.adc_common.sensors_on();
         match channel {
@@ -112,8 +112,8 @@ impl Stm32f4 {
         }
     }
 
-    /// Serves a request towards memory: `Some(true)` when that ended a round of the stream, `None` when no stream
-    /// serves it.
+    /// Serves a request towards memory. `Some(true)` for the last transfer of a round of the stream; `None` when no
+    /// stream serves the request.
     pub(crate) fn transfer_to_memory(
         &mut self,
         controller: usize,
@@ -128,7 +128,7 @@ impl Stm32f4 {
         Some(self.account(controller, request, moved))
     }
 
-    /// Whether a test wants the request lost.
+    /// Whether a test suppresses the request.
     fn is_lost(&mut self, controller: usize, request: &[Line]) -> bool {
         if self.losses.is_empty() {
             return false;
@@ -146,7 +146,7 @@ impl Stm32f4 {
         Ok(())
     }
 
-    /// Serves a request of TIM3 that may be for the count of the encoder.
+    /// Serves a request of TIM3 whose stream may copy the count of the encoder.
     pub(crate) fn copy_count(&mut self, request: &[Line], at: Time) {
         self.run_timer(TIM4, at);
         self.transfer_to_memory(DMA1, request, at);
@@ -182,7 +182,8 @@ impl Stm32f4 {
         }
     }
 
-    /// Stores to memory. What follows one of the last two stores becomes one with it: two streams may take turns.
+    /// Stores to memory. A store that continues one of the last two is joined with it; two because two streams may
+    /// alternate.
     fn keep(&mut self, address: u32, new: &[u8]) {
         let recent = self.effects.iter_mut().rev().take(2).map_while(|effect| match effect {
             Effect::Store { address, bytes } => Some((*address, bytes)),
@@ -195,7 +196,7 @@ impl Stm32f4 {
         }
     }
 
-    /// When conversions next do something that can be seen from outside.
+    /// The next instant at which conversions have a visible effect: an interrupt or a completed transfer.
     pub(crate) fn conversion_deadline(&self) -> Time {
         let trigger = self.next_trigger();
         let seen = |count| self.adc.end_after(count, trigger);

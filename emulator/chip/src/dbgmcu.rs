@@ -1,4 +1,5 @@
-//! DBGMCU: the device code and what a debugger freezes (RM0390 section 33.16). Without a debugger nothing is frozen.
+//! DBGMCU: the device code and the freeze bits for a debugger (RM0390 section 33.16). Without a debugger nothing is
+//! frozen.
 
 use crate::register::{Plain, RegisterFile};
 use crate::variant::Variant;

@@ -1,4 +1,4 @@
-//! EXTI: edges on pins and other lines to interrupts (RM0390 section 10.3, RM0090 section 12.3).
+//! EXTI: interrupts at edges on pins and other lines (RM0390 section 10.3, RM0090 section 12.3).
 
 const IMR: u32 = 0x00;
 const EMR: u32 = 0x04;
@@ -9,7 +9,7 @@ const PR: u32 = 0x14;
 
 const LINES: u32 = 0x007F_FFFF;
 
-/// The interrupt lines: EXTI lines as a mask, and the IRQ that they share.
+/// The interrupts: a mask of EXTI lines, and their common IRQ.
 const IRQS: [(u32, u8); 13] = [
     (1 << 0, 6),
     (1 << 1, 7),
@@ -49,7 +49,7 @@ impl Exti {
         }
     }
 
-    /// `None` when the register is not there or for events, which would only wake a core that sleeps in WFE.
+    /// `None` for an unknown register and for EMR: an event would only wake a core that sleeps in WFE.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         let value = value & LINES;
         match offset {
@@ -73,7 +73,7 @@ impl Exti {
         Some(())
     }
 
-    /// An edge came in on a line.
+    /// An edge on a line.
     pub(crate) fn edge(&mut self, line: u32, rising: bool) {
         let selected = if rising { self.rising } else { self.falling };
         self.pending |= 1 << line & selected & self.interrupt;

@@ -33,7 +33,7 @@ const PORT_A: &[Plain] = port!(0xA800_0000, 0x0C00_0000, 0x6400_0000);
 const PORT_B: &[Plain] = port!(0x0000_0280, 0x0000_00C0, 0x0000_0100);
 const OTHER: &[Plain] = port!(0, 0, 0);
 
-/// The levels that something outside of the chip puts on the pins of a port.
+/// The levels that the outside world drives on the pins of a port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Outside {
     driven: u16,
@@ -41,7 +41,7 @@ pub(crate) struct Outside {
 }
 
 impl Outside {
-    /// Drives one pin, or lets go of it.
+    /// Drives one pin, or releases it.
     pub(crate) fn set(&mut self, pin: u32, level: Option<bool>) {
         self.driven = self.driven & !(1 << pin) | u16::from(level.is_some()) << pin;
         self.levels = self.levels & !(1 << pin) | u16::from(level == Some(true)) << pin;
@@ -52,7 +52,7 @@ impl Outside {
     }
 }
 
-/// What MODER selects for a pin.
+/// The function of a pin that MODER selects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Input,
@@ -90,7 +90,7 @@ impl Gpio {
         match offset {
             IDR => Some(()),
             BSRR => {
-                // A set bit wins over a reset bit.
+                // For a pin with a set and a reset bit, the set bit wins.
                 let output = self.plain.get(ODR) & !(value >> 16) | value & 0xFFFF;
                 self.plain.write(ODR, output)
             }
@@ -98,14 +98,14 @@ impl Gpio {
         }
     }
 
-    /// The level that the chip drives on a pin as a general purpose output; `None` when it drives none.
+    /// The level that the chip drives on a pin as a general purpose output; `None` when the pin is no output.
     pub(crate) fn output(&self, pin: u32) -> Option<bool> {
         let high = field(self.plain.get(ODR), pin, 1) != 0;
         let open_drain = field(self.plain.get(OTYPER), pin, 1) != 0;
         (self.mode(pin) == Mode::Output && !(open_drain && high)).then_some(high)
     }
 
-    /// Whether a pin is switched to this alternate function.
+    /// Whether the pin is switched to the alternate function `function`.
     pub(crate) fn alternate(&self, pin: u32, function: u32) -> bool {
         let register = if pin < 8 { AFRL } else { AFRH };
         self.mode(pin) == Mode::Alternate && field(self.plain.get(register), pin % 8 * 4, 4) == function
@@ -116,7 +116,7 @@ impl Gpio {
         self.mode(pin) == Mode::Analog
     }
 
-    /// The level that the input stage sees.
+    /// The level at the input stage.
     pub(crate) fn level(&self, pin: u32, outside: Outside) -> bool {
         if self.mode(pin) == Mode::Analog {
             return false;

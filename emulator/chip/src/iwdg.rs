@@ -25,7 +25,7 @@ pub(crate) struct Iwdg {
     reload: u32,
     prescaler_ready: Time,
     reload_ready: Time,
-    /// When running: the count, and since when.
+    /// While the watchdog runs: the count, and the instant of that count.
     count: Option<(u32, Time)>,
 }
 
@@ -63,7 +63,7 @@ impl Iwdg {
                 self.reload = value & 0xFFF;
                 self.reload_ready = now + UPDATE;
             }
-            // Locked, or an update is under way: the write is lost.
+            // The registers are locked, or an update is under way: the write is lost.
             PR | RLR | SR => {}
             _ => return None,
         }
@@ -79,7 +79,7 @@ impl Iwdg {
         }
     }
 
-    /// Whether it was started; only a reset stops it.
+    /// Whether the watchdog was started; only a reset stops it.
     pub(crate) fn is_running(&self) -> bool {
         self.count.is_some()
     }
@@ -93,7 +93,8 @@ impl Iwdg {
         count.saturating_sub((now.since(since).0 / self.tick()) as u32)
     }
 
-    /// When it resets the chip: a count of 0 lasts one tick too (RM0390 section 20, table of time-outs).
+    /// The instant at which the watchdog resets the chip. A count of 0 also lasts one tick (RM0390 section 20, table of
+    /// time-outs).
     pub(crate) fn deadline(&self) -> Time {
         self.count.map_or(Time::NEVER, |(count, since)| since + Time((u64::from(count) + 1) * self.tick()))
     }

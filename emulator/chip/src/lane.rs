@@ -2,7 +2,7 @@
 
 use crate::peripherals::BusFault;
 
-/// The bytes of a word that an access touches.
+/// The bytes of a word that an access covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lane {
     shift: u32,
@@ -10,7 +10,7 @@ pub(crate) struct Lane {
 }
 
 impl Lane {
-    /// The lane of an access of `size` bytes; one that crosses its natural boundary is an error.
+    /// The lane of an access of `size` bytes; an access across its natural boundary is an error.
     pub(crate) fn of(address: u32, size: u8) -> Result<Self, BusFault> {
         let mask = match size {
             1 => 0xFF,
@@ -22,7 +22,7 @@ impl Lane {
         aligned.then_some(Self { shift: address % 4 * 8, mask }).ok_or(BusFault)
     }
 
-    /// What a read of the lane gives.
+    /// The value of the lane in a word.
     pub(crate) fn extract(self, word: u32) -> u32 {
         word >> self.shift & self.mask
     }

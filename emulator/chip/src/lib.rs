@@ -1,24 +1,24 @@
 //! Register-level models of the STM32F4 peripherals that the node uses, and of the world around them.
 //!
-//! [`Stm32f4`] is the chip without its core. A core drives it through [`Peripherals`]; the world reaches its
-//! [`can`] controllers, changes what its sensors see ([`plant`]) and breaks things.
+//! [`Stm32f4`] is the chip without its core. A core drives the chip through [`Peripherals`]. A test or simulator
+//! connects the [`can`] controllers, changes the quantities that the sensors measure ([`plant`]) and injects faults.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `map`, `access`, `lane` | addresses: which peripheral answers, whether it is clocked, narrow accesses |
 //! | `stm32f4`, `schedule`, `clock_and_reset` | the peripherals together: time, interrupt lines, clocks, resets |
-//! | `converter`, `pins` | what crosses peripherals: timer to ADC to DMA to memory; encoders and buttons to their pins |
-//! | one file or folder each | the peripherals, which know nothing of each other |
-//! | `rules` | what silicon does not forgive: clocks, wait states, pins, sampling times |
-//! | `loss` | events that a test has the chip lose |
+//! | `converter`, `pins` | links of peripherals: timer to ADC to DMA to memory; encoders and buttons to their pins |
+//! | one file or folder each | the peripherals, which do not depend on each other |
+//! | `rules` | limits that silicon enforces: clocks, wait states, pins, sampling times |
+//! | `loss` | events that a test makes the chip lose |
 //! | `plant` | pressure, temperature, shaft, buttons, faults and the board's analogue front end |
 //!
-//! Nothing is stepped: a peripheral computes its state at the instant of an access from its state at the last one, and
-//! `deadline` tells when something can be seen without an access. An access that the models cannot answer as silicon
-//! would is on record: [`Stm32f4::unmodelled`].
+//! No model is stepped: a peripheral computes its state at the instant of an access from its state at the last access,
+//! and `deadline` returns the next instant at which a change is visible without an access. An access that a model
+//! cannot answer as silicon would is recorded: [`Stm32f4::unmodelled`].
 //!
-//! Of the chip's peripherals the images do not use RTC, WWDG, TIM1 and TIM8, ADC2 and ADC3, DAC, USARTs, I2C, SAI, SDIO,
-//! USB, DCMI, CEC, FMC, QUADSPI and the power-down modes: these have a name in the map and no model.
+//! The images do not use these peripherals of the chip: RTC, WWDG, TIM1 and TIM8, ADC2 and ADC3, DAC, USARTs, I2C, SAI,
+//! SDIO, USB, DCMI, CEC, FMC, QUADSPI and the power-down modes. They have a name in the map, but no model.
 
 mod access;
 mod adc;

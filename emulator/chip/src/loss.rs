@@ -1,32 +1,32 @@
-//! Events that a test has the chip lose: what the program waits for then never comes.
+//! Events that a test makes the chip lose: the program then waits in vain for the event.
 
-/// One event.
+/// An event to lose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
-    /// A request for DMA: nothing is moved. The controller is 1 or 2.
+    /// A DMA request: nothing is moved.
     DmaRequest {
-        /// 1 or 2.
+        /// The controller: 1 or 2.
         controller: usize,
-        /// 0 to 7.
+        /// The stream: 0 to 7.
         stream: usize,
     },
-    /// A byte that SPI2 has received: it is gone before DMA can fetch it.
+    /// A byte received by SPI2, lost before DMA reads it.
     SpiByte,
-    /// A compare match of TIM2, on channel 1 to 4: its flag stays down.
+    /// A compare match of TIM2: the flag is not set.
     Compare {
-        /// 1 to 4.
+        /// The channel: 1 to 4.
         channel: u32,
     },
-    /// The end of a transmission of CAN1: the frame was sent, its flag stays down.
+    /// The end of a transmission of CAN1: the frame is sent, but the flag is not set.
     TransmitComplete,
-    /// The moment at which CAN1 could have given up a frame: the transmission of the frame begins just before the abort request, so the
-    /// end of the transmission decides.
+    /// An abort by CAN1 comes too late: the transmission of the frame begins just before the abort request, so the
+    /// request is over only at the end of the transmission.
     Abort,
     /// A store into the backup SRAM.
     BackupStore,
 }
 
-/// What is still to be lost.
+/// The events still to be lost.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Losses(Vec<Loss>);
 
@@ -35,12 +35,12 @@ impl Losses {
         self.0.extend(std::iter::repeat_n(loss, times));
     }
 
-    /// Nothing is to be lost: the usual case, which is asked for at each event.
+    /// Whether no event is to be lost. This is the usual case and is checked at each event.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Whether this event, which happens now, is lost.
+    /// Whether this event, which happens now, is to be lost.
     pub(crate) fn take(&mut self, loss: Loss) -> bool {
         let place = self.0.iter().position(|next| *next == loss);
         place.map(|place| self.0.swap_remove(place)).is_some()

@@ -1,4 +1,4 @@
-//! Which peripheral is at which address (RM0390 table 1, RM0090 table 1) and what gates its clock.
+//! The address map (RM0390 table 1, RM0090 table 1): the peripheral at each address, and the gate of its clock.
 
 use std::sync::LazyLock;
 
@@ -10,12 +10,12 @@ use crate::signature;
 use crate::timer::Kind;
 use crate::variant::Variant;
 
-/// The model that answers for a block of addresses.
+/// The model behind a block of addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unit {
     /// The index into `TIMERS`.
     Timer(usize),
-    /// Port 0 is GPIOA.
+    /// The port: 0 is GPIOA.
     Gpio(usize),
     Rcc,
     Pwr,
@@ -26,16 +26,16 @@ pub(crate) enum Unit {
     Iwdg,
     Adc,
     AdcCommon,
-    /// 0 is DMA1.
+    /// The controller: 0 is DMA1.
     Dma(usize),
-    /// 0 is CAN1.
+    /// The controller: 0 is CAN1.
     Can(usize),
     /// The index into `SPIS`.
     Spi(usize),
     Crc,
     BackupRam,
     Signature,
-    /// The chip has it, the emulator has not.
+    /// The chip has the peripheral, but the emulator has no model of it.
     Absent,
 }
 
@@ -66,7 +66,7 @@ pub(crate) struct Block {
     size: u32,
     pub(crate) name: &'static str,
     pub(crate) unit: Unit,
-    /// `None`: always clocked.
+    /// The clock gate; `None` for a peripheral that is always clocked.
     pub(crate) gate: Option<Gate>,
     on: On,
 }
@@ -82,7 +82,7 @@ const fn absent(base: u32, name: &'static str, gate: Option<Gate>) -> Block {
 }
 
 impl Unit {
-    /// Whether a store at this offset changes nothing that happens by itself, no interrupt line and nothing outside.
+    /// Whether a store at this offset affects no later event, no interrupt line and nothing outside the chip.
     pub(crate) fn is_passive(self, offset: u32) -> bool {
         match self {
             Unit::Crc | Unit::BackupRam | Unit::Signature => true,
@@ -102,8 +102,8 @@ impl Block {
         Self { size, ..self }
     }
 
-    /// On the AHB byte lanes are written alone; an APB bridge repeats a byte or half-word over the whole word
-    /// (RM0390 section 2.2.1).
+    /// Whether a narrow store changes only its own bytes, as on the AHB. An APB bridge repeats a byte or half-word over
+    /// the whole word (RM0390 section 2.2.1).
     pub(crate) fn has_byte_lanes(&self) -> bool {
         self.base >= 0x4002_0000
     }
@@ -189,14 +189,14 @@ const BLOCKS: &[Block] = &[
     block(0xE004_2000, "DBGMCU", Unit::Dbgmcu, None),
 ];
 
-/// Where the peripherals of APB and AHB1 are, and the least length of a block there.
+/// The addresses of the peripherals on APB and AHB1, and the smallest size of a block there.
 const TABLE: std::ops::Range<u32> = 0x4000_0000..0x4004_0000;
 const STEP: u32 = 0x100;
 
-/// The blocks of a chip in these addresses, for a look-up in one step.
+/// The block at each step of these addresses, for a look-up in one step.
 type Table = Vec<Option<&'static Block>>;
 
-/// The block that answers at an address.
+/// The block at an address.
 pub(crate) fn find(variant: Variant, address: u32) -> Option<&'static Block> {
     static TABLES: LazyLock<[Table; 3]> =
         LazyLock::new(|| [Variant::F405, Variant::F407, Variant::F446].map(table));
@@ -218,17 +218,17 @@ fn table(variant: Variant) -> Table {
 
 fn search(variant: Variant, address: u32) -> Option<&'static Block> {
     let after = BLOCKS.partition_point(|block| block.base <= address);
-    // At most two blocks share a base: those of different chips.
+    // At most two blocks share a base; they belong to different chips.
     let candidates = BLOCKS[..after].iter().rev().take(2);
     candidates.filter(|block| block.on.has(variant)).find(|block| address - block.base < block.size)
 }
 
-/// Every block of any chip.
+/// All blocks of all chips.
 pub(crate) fn blocks() -> impl Iterator<Item = &'static Block> {
     BLOCKS.iter()
 }
 
-/// A timer: what it has, its bus and its interrupt line.
+/// A timer: its features, its bus and its interrupt line.
 pub(crate) struct TimerPlace {
     pub(crate) kind: Kind,
     pub(crate) bus: Apb,

@@ -1,4 +1,4 @@
-//! The seam between the core (CPU, NVIC, system control space) and the chip around it.
+//! The interface between the core (CPU, NVIC, system control space) and the chip around it.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::rules::Breach;
 pub struct IrqLines {
     /// Bit `n` is IRQ `n` of the vector table.
     pub irqs: u128,
-    /// The interrupt that no program can mask.
+    /// The NMI line.
     pub nmi: bool,
 }
 
@@ -21,7 +21,7 @@ impl IrqLines {
         self.irqs = self.irqs & !(1 << irq) | u128::from(level) << irq;
     }
 
-    /// Adds one line to those that are up. Most are down most of the time.
+    /// Sets one line if `level` is high. Most lines are low most of the time.
     #[inline]
     pub(crate) fn raise(&mut self, irq: u8, level: bool) {
         if level {
@@ -30,22 +30,22 @@ impl IrqLines {
     }
 }
 
-/// The bus answered an access with an error: the core raises a BusFault.
+/// The bus answered an access with an error; the core raises a BusFault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusFault;
 
-/// How the core reads the flash.
+/// The settings for reads of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashAccess {
-    /// Cycles that a read takes longer than one.
+    /// Extra cycles of a read.
     pub wait_states: u32,
-    /// The cache of code is on.
+    /// The instruction cache is on.
     pub caches_code: bool,
-    /// The cache of constants is on.
+    /// The data cache is on.
     pub caches_constants: bool,
 }
 
-/// What the chip wants done outside of itself, in order.
+/// A request of the chip to its environment; requests are carried out in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// Write bytes to RAM (a DMA transfer) or to the flash array (programming, erase).
@@ -64,13 +64,13 @@ pub enum Effect {
     },
     /// Code fetch and reads from flash wait until this instant.
     StallFlash(Time),
-    /// The core clock (HCLK) is now this, in hertz.
+    /// The core clock (HCLK) changes to this frequency in hertz.
     CoreClock(u64),
-    /// A reset that the chip itself asks for (watchdog); RCC already holds its cause.
+    /// The chip requests a reset (watchdog); RCC has already recorded the cause.
     Reset,
-    /// Power is gone: RAM is lost, flash keeps what it had.
+    /// Power is lost: RAM loses its content, flash keeps it.
     PowerCut,
-    /// The world must look at the bus before the core runs on: a transmit request, a bit-rate change.
+    /// The bus must see a change before the core continues: a transmit request or a change of the bit rate.
     Poke,
 }
 
@@ -80,7 +80,7 @@ pub trait Memory {
     fn load(&self, address: u32, bytes: &mut [u8]) -> Result<(), BusFault>;
 }
 
-/// Everything of the chip outside the core. All calls come in the order of virtual time.
+/// The chip without its core. All calls come in the order of virtual time.
 pub trait Peripherals {
     /// A read of 1, 2 or 4 bytes at an absolute address.
     fn read(&mut self, address: u32, size: u8, now: Time) -> Result<u32, BusFault>;
@@ -88,43 +88,43 @@ pub trait Peripherals {
     /// A write of 1, 2 or 4 bytes at an absolute address.
     fn write(&mut self, address: u32, size: u8, value: u32, now: Time) -> Result<(), BusFault>;
 
-    /// A store by the core into the flash array: programming, when the controller allows it. `old` is what the
-    /// array holds at `address`, as many bytes as are written.
+    /// A store by the core into the flash array: programming, if the controller allows it. `old` is the content at
+    /// `address`, as long as `new`.
     fn program(&mut self, address: u32, old: &[u8], new: &[u8], now: Time) -> Result<(), BusFault>;
 
-    /// HCLK divided by the clock of the APB bus on which this address lies; `None` for one on an AHB bus.
+    /// The divider from HCLK to the APB bus of this address; `None` for an address on an AHB bus.
     fn apb_divider(&self, _address: u32) -> Option<u32> {
         None
     }
 
-    /// How the core reads the flash now.
+    /// The current settings for reads of the flash.
     fn flash_access(&self) -> FlashAccess {
         FlashAccess { wait_states: 0, caches_code: true, caches_constants: true }
     }
 
-    /// The next instant at which something happens without the core.
+    /// The next instant at which the state changes without an access by the core.
     fn deadline(&self) -> Time;
 
-    /// Lets everything due up to `now` happen.
+    /// Processes everything that is due up to `now`.
     fn advance(&mut self, now: Time, memory: &dyn Memory);
 
-    /// The interrupt lines now.
+    /// The current levels of the interrupt lines.
     fn lines(&self) -> IrqLines;
 
-    /// Whether there may be another deadline, level of a line, broken rule or effect than when this was last asked. What the
-    /// bus does to the CAN controllers meanwhile does not count.
+    /// Whether the deadline, a line, a broken rule or an effect may have changed since the last call. Changes that the
+    /// bus makes in the CAN controllers do not count.
     fn take_change(&mut self) -> bool {
         true
     }
 
-    /// Takes the next rule that was found broken, each once.
+    /// Takes the next broken rule; each rule is reported once.
     fn breach(&mut self) -> Option<Breach> {
         None
     }
 
-    /// Takes the next effect that earlier calls asked for.
+    /// Takes the next effect that earlier calls have requested.
     fn effect(&mut self) -> Option<Effect>;
 
-    /// A system reset by the core (SYSRESETREQ) or, with `power`, by the supply.
+    /// A system reset: by the core (SYSRESETREQ) or, with `power`, by the supply.
     fn reset(&mut self, power: bool, now: Time);
 }

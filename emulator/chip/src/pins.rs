@@ -1,10 +1,10 @@
-//! Pins and what the board wires to them, besides levels that a test drives:
+//! Connections of the pins on the board, apart from levels that a test drives:
 //!
-//! | pins | what |
+//! | pins | connection |
 //! |---|---|
 //! | PB5, PB6, PB7 | index, A and B of the incremental encoder: TIM3 channel 2, TIM4 channels 1 and 2 |
 //! | PB13, PB14 | clock and data of the absolute encoder: SPI2 |
-//! | PC13, PC10 | buttons to ground; the first one, that of the NUCLEO, has a pull-up resistor |
+//! | PC13, PC10 | buttons to ground; the button at PC13, that of the NUCLEO, has a pull-up resistor |
 
 use canbus::Time;
 
@@ -20,7 +20,7 @@ const PHASE_A: u32 = 6;
 const PHASE_B: u32 = 7;
 const SSI_CLOCK: u32 = 13;
 const SSI_DATA: u32 = 14;
-/// The pins of the buttons, and the level of one that is not pressed.
+/// The pins of the buttons, and the level of a released button.
 const BUTTON_PINS: [(u32, Option<bool>); BUTTONS] = [(13, Some(true)), (10, None)];
 /// AF2 is TIM3 on PB5 and TIM4 on PB6 and PB7 (DS10693 table 11).
 const TIMER_FUNCTION: u32 = 2;
@@ -29,11 +29,11 @@ const SPI_FUNCTION: u32 = 5;
 const SPI2: usize = 1;
 const TIM3: usize = 1;
 const TIM4: usize = 2;
-/// How far ahead edges are looked for.
+/// How far the search for edges looks ahead.
 const HORIZON: Time = Time::from_millis(1);
 
 impl Stm32f4 {
-    /// What the outside puts on the pins of a port.
+    /// The levels that the outside world drives on the pins of a port.
     pub(crate) fn outside(&self, port: usize, now: Time) -> Outside {
         let mut outside = self.outside[port];
         if port == PORT_B {
@@ -48,7 +48,7 @@ impl Stm32f4 {
         outside
     }
 
-    /// A level that a test drives comes first.
+    /// Applies the pressed buttons. A level that a test drives has priority.
     fn press(&self, outside: &mut Outside, now: Time) {
         for ((pin, released), closed) in BUTTON_PINS.into_iter().zip(self.plant.closed(now)) {
             if outside.level(pin).is_none() {
@@ -57,28 +57,29 @@ impl Stm32f4 {
         }
     }
 
-    /// Whether the absolute encoder is on an SPI: on SPI2 only, while both of its pins are switched to it and in the mode that SSI
-    /// wants.
+    /// Whether the absolute encoder is connected to this SPI: only to SPI2, while both of its pins are switched to SPI2
+    /// and the SPI is in the mode that SSI needs.
     pub(crate) fn ssi_is_wired(&self, spi: usize) -> bool {
         spi == SPI2
             && self.spis[spi].fits_ssi()
             && [SSI_CLOCK, SSI_DATA].iter().all(|&pin| self.ports[PORT_B].alternate(pin, SPI_FUNCTION))
     }
 
-    /// What an SPI reads from a line that nobody drives.
+    /// The level that an SPI reads from an undriven line.
     pub(crate) fn open_input(&self, spi: usize) -> bool {
         spi == SPI2 && self.ports[PORT_B].level(SSI_DATA, self.outside[PORT_B])
     }
 
-    /// The encoder's position as a timer sees it, in quarter periods; `None` when it sees no encoder. Only TIM4 is
-    /// wired, and only while both of its pins are switched to it.
+    /// The encoder's position as a timer sees it, in quarter periods; `None` when no encoder is connected to the timer.
+    /// Only TIM4 is wired, and only while both of its pins are switched to TIM4.
     pub(crate) fn encoder_position(&self, timer: usize, now: Time) -> Option<i64> {
         let wired = timer == TIM4
             && [PHASE_A, PHASE_B].iter().all(|&pin| self.ports[PORT_B].alternate(pin, TIMER_FUNCTION));
         wired.then(|| self.plant.quarter(now))
     }
 
-    /// Drives a pin from outside, or lets go of it (port `'A'` to `'I'`, pin 0 to 15). Pins of the encoder stay with it.
+    /// Drives a pin from outside, or releases it (port `'A'` to `'I'`, pin 0 to 15). The pins of the encoder cannot be
+    /// driven.
     pub fn drive(&mut self, port: char, pin: u32, level: Option<bool>, now: Time) {
         let Some(index) =
             (port as usize).checked_sub('A' as usize).filter(|&index| index < self.outside.len())
@@ -94,7 +95,7 @@ impl Stm32f4 {
         self.settle(now);
     }
 
-    /// Whether somebody waits for edges of the index.
+    /// Whether EXTI or TIM3 waits for edges of the index.
     fn index_is_watched(&self) -> bool {
         let by_exti = self.exti.listens(INDEX) && self.syscfg.port_of_line(INDEX) == PORT_B;
         by_exti || self.index_is_captured()
@@ -104,7 +105,7 @@ impl Stm32f4 {
         self.ports[PORT_B].alternate(INDEX, TIMER_FUNCTION) && self.timers[TIM3].listens(1)
     }
 
-    /// Hands on an edge of the index that is due. The edges come one by one, as each is a deadline.
+    /// Passes on an edge of the index that is due. Each edge is a deadline, so edges come one at a time.
     pub(crate) fn watch_index(&mut self, now: Time) {
         let level = self.plant.index(now);
         let changed = level != self.index_level;
@@ -123,7 +124,7 @@ impl Stm32f4 {
         }
     }
 
-    /// When the encoder next does something that can be seen from outside, or should be looked at again.
+    /// The next instant at which the encoder has a visible effect, or at which the search for one must go on.
     pub(crate) fn encoder_deadline(&self, now: Time) -> Time {
         let horizon = now + HORIZON;
         let index =

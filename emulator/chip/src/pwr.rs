@@ -6,7 +6,7 @@ use crate::variant::Variant;
 
 const CR: u32 = 0x00;
 const CSR: u32 = 0x04;
-/// CR: the backup domain can be written.
+/// CR: writes to the backup domain are enabled.
 const DBP: u32 = 8;
 /// CSR: the backup regulator is on. The bit is in the backup domain itself: no reset clears it.
 const BRE: u32 = 9;
@@ -26,21 +26,21 @@ impl Pwr {
         Self { plain: RegisterFile::new(if over_drive { F446 } else { F405 }), over_drive }
     }
 
-    /// After a reset, which the backup regulator does not see.
+    /// A reset, which does not affect the backup regulator.
     pub(crate) fn reset(&mut self) {
         let keeps = self.keeps_backup();
         self.plain.reset();
         self.keep_backup(keeps);
     }
 
-    /// The scale of the voltage of the core, 1 to 3 (RM0390 and RM0090 section 5.4.1, VOS).
+    /// The voltage scale of the core, 1 to 3 (RM0390 and RM0090 section 5.4.1, VOS).
     pub(crate) fn scale(&self) -> u32 {
         let control = self.plain.get(CR);
         match control >> 14 & 0b11 {
             0b11 => 1,
             0b10 => 2,
             0b01 if self.over_drive => 3,
-            // The F405 has one bit.
+            // The F405 has only one VOS bit.
             0b01 => 1,
             _ if self.over_drive => 3,
             _ => 2,
@@ -57,7 +57,7 @@ impl Pwr {
         bit(self.plain.get(CR), DBP)
     }
 
-    /// Whether the backup SRAM is supplied from VBAT when the main supply is gone.
+    /// Whether VBAT supplies the backup SRAM when the main supply fails.
     pub(crate) fn keeps_backup(&self) -> bool {
         bit(self.plain.get(CSR), BRE)
     }

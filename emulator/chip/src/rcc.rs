@@ -14,7 +14,7 @@ const CIR: u32 = 0x0C;
 const BDCR: u32 = 0x70;
 const CSR: u32 = 0x74;
 const DCKCFGR: u32 = 0x8C;
-/// The reset registers start here; the enable registers follow 20h later with the same bits.
+/// The reset registers start here; the enable registers follow 20h later and have the same bits.
 const AHB1RSTR: u32 = 0x10;
 const TO_ENABLE: u32 = 0x20;
 
@@ -73,11 +73,11 @@ impl Gate {
 /// An oscillator or PLL.
 #[derive(Clone, Copy)]
 struct Source {
-    /// Its ON bit in RCC_CR; the RDY bit is the next.
+    /// The source's ON bit in RCC_CR; the RDY bit is the next higher bit.
     on_bit: u32,
     startup: Time,
     on: bool,
-    /// When it is stable; a dead one never is.
+    /// The instant from which on the source is stable; a failed source never is.
     ready: Time,
 }
 
@@ -98,7 +98,7 @@ impl Source {
     }
 }
 
-/// Why the last reset happened: a bit of RCC_CSR.
+/// The cause of the last reset: a bit of RCC_CSR.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cause {
     Software = 28,
@@ -129,7 +129,7 @@ pub(crate) struct Rcc {
     sources: [Source; 5],
     /// HSITRIM, HSEBYP and CSSON.
     settings: u32,
-    /// The clock security system has seen HSE fail.
+    /// The clock security system has detected a failure of HSE.
     has_failed: bool,
     lsi_ready: Time,
     reset_flags: u32,
@@ -164,15 +164,15 @@ impl Rcc {
     pub(crate) fn reset(&mut self, cause: Option<Cause>) {
         let flags = match cause {
             None => POWER_ON_FLAGS,
-            // Every internal reset also pulls NRST low.
+            // Every internal reset also drives NRST low.
             Some(cause) => self.reset_flags | 1 << cause as u32 | PINRSTF,
         };
         *self = Self::new(self.variant, self.hse_hertz);
         self.reset_flags = flags;
     }
 
-    /// Takes the clock on OSC_IN away (`None`) or gives one, from now on. Without it HSE never gets ready; a system clock
-    /// that comes from it goes on, as if from HSI, unless the clock security system is on.
+    /// Sets the clock on OSC_IN from now on; `None` removes it. Without a clock HSE never becomes ready. A system clock
+    /// derived from HSE goes on as if from HSI, unless the clock security system is on.
     pub(crate) fn set_hse(&mut self, hertz: Option<u64>, now: Time) {
         if hertz == self.hse_hertz {
             return;
@@ -186,7 +186,7 @@ impl Rcc {
         }
     }
 
-    /// What the clock security system does where HSE fails (RM0390, 6.2.7).
+    /// The action of the clock security system at a failure of HSE (RM0390, 6.2.7).
     fn fail(&mut self) {
         self.has_failed = true;
         if self.uses(HSE) {
@@ -199,7 +199,7 @@ impl Rcc {
         self.sources[HSE].switch(false, Time::NEVER);
     }
 
-    /// Whether NMI is raised: until the program has taken note of the failure.
+    /// Whether NMI is raised: until the program clears the flag of the failure.
     pub(crate) fn clock_has_failed(&self) -> bool {
         self.has_failed
     }
@@ -219,7 +219,7 @@ impl Rcc {
         offset >= AHB1RSTR && offset < AHB1RSTR + TO_ENABLE
     }
 
-    /// The independent watchdog turns the LSI on by itself.
+    /// Turns the LSI on for the independent watchdog, without software.
     pub(crate) fn start_lsi(&mut self, now: Time) {
         if self.lsi_ready == Time::NEVER {
             // tsu(LSI) of DS10693: 15 us typical, 40 us at most.
@@ -232,7 +232,7 @@ impl Rcc {
             CR => Some(self.sources.iter().fold(self.settings, |word, source| word | source.bits(now))),
             CFGR => Some(self.plain.get(CFGR) | self.in_use << 2),
             CIR => Some(flag(self.has_failed, CSSF)),
-            // No LSE crystal is modelled: it never gets ready.
+            // No LSE crystal is modelled: LSE never becomes ready.
             BDCR => Some(0),
             CSR => Some(
                 self.reset_flags | flag(self.lsi_ready != Time::NEVER, 0) | flag(now >= self.lsi_ready, 1),
@@ -242,7 +242,7 @@ impl Rcc {
         }
     }
 
-    /// Writes a register. `None` when it, or a bit that is set in it, is not modelled.
+    /// Writes a register. `None` when the register, or a bit set in it, is not modelled.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         match offset {
             CR => {
@@ -269,14 +269,14 @@ impl Rcc {
     fn write_control(&mut self, value: u32, now: Time) {
         self.settings = value & 0x000C_00F8;
         for index in 0..self.sources.len() {
-            // A source in use cannot be stopped by software.
+            // Software cannot stop a source in use.
             let on = bit(value, self.sources[index].on_bit) || self.uses(index);
             let ready = self.ready_at(index, now);
             self.sources[index].switch(on, ready);
         }
     }
 
-    /// When a source that is switched on now gets ready.
+    /// The instant at which a source becomes ready if it is switched on now.
     fn ready_at(&self, index: usize, now: Time) -> Time {
         let from_hse = bit(self.plain.get(PLLCFGR), 22);
         let dead = self.hse_hertz.is_none() && (index == HSE || index >= PLL && from_hse);
@@ -305,14 +305,14 @@ impl Rcc {
         }
     }
 
-    /// Lets a switch of the system clock that waits for its source happen.
+    /// Carries out a pending switch of the system clock when its source is ready.
     pub(crate) fn advance(&mut self, now: Time) {
         if now >= self.deadline() {
             self.in_use = self.wanted();
         }
     }
 
-    /// When the system clock switches by itself.
+    /// The instant of a pending switch of the system clock.
     pub(crate) fn deadline(&self) -> Time {
         if self.wanted() == self.in_use {
             Time::NEVER
@@ -330,7 +330,7 @@ impl Rcc {
         let cfgr = self.plain.get(CFGR);
         let timpre = self.variant == Variant::F446 && bit(self.plain.get(DCKCFGR), 24);
         Clocks {
-            // A PLL that is set to nothing stands still; one hertz is as good.
+            // A PLL with an output of 0 Hz stands still; one hertz is as good.
             hclk: (self.system_clock() / u64::from(ahb_divider(field(cfgr, 4, 4)))).max(1),
             apb1_divider: apb_divider(field(cfgr, 10, 3)),
             apb2_divider: apb_divider(field(cfgr, 13, 3)),

@@ -1,4 +1,4 @@
-//! Registers that only hold what is written to them.
+//! Registers without side effects, which only hold their value.
 
 /// One plain register of a peripheral.
 #[derive(Clone)]
@@ -21,7 +21,7 @@ impl Plain {
 #[derive(Clone)]
 pub(crate) struct RegisterFile {
     layout: &'static [Plain],
-    /// By word: registers are looked at more often than anything else here.
+    /// Indexed by word: register look-ups are the most frequent operation of the models.
     registers: Vec<Option<Register>>,
 }
 
@@ -58,10 +58,10 @@ impl RegisterFile {
         Some(())
     }
 
-    /// The value at `offset` as the hardware itself sees it.
+    /// The register's value at `offset`, as seen by the model.
     ///
     /// # Panics
-    /// When the layout has no such register, which is a mistake of the model.
+    /// When the layout has no such register: a bug in the model.
     pub(crate) fn get(&self, offset: u32) -> u32 {
         self.read(offset).expect("the layout has the register")
     }

@@ -1,5 +1,5 @@
-//! Rules that silicon does not forgive: limits of the data sheet, and wiring that a program must switch on. A breach does not
-//! change what the models do: it is reported, and whoever runs the chip decides that the run has failed.
+//! Rules that silicon enforces: limits of the data sheet, and pin functions that a program must select. A breach does
+//! not change the behaviour of the models: it is reported, and the user of the chip decides whether the run has failed.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::ops::RangeInclusive;
@@ -14,88 +14,88 @@ use crate::variant::Variant;
 /// A rule that a program has broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Error)]
 pub enum Breach {
-    /// The flash is read faster than it can be (RM0390 table 5, RM0090 table 10, for 2.7 to 3.6 V).
+    /// The flash is read with too few wait states (RM0390 table 5, RM0090 table 10, for 2.7 to 3.6 V).
     #[error("{states} wait states of the flash at {hertz} Hz; it needs {least}")]
     WaitStates {
-        /// HCLK.
+        /// HCLK in hertz.
         hertz: u64,
         /// FLASH_ACR.LATENCY.
         states: u32,
-        /// What it must be.
+        /// The least number of wait states.
         least: u32,
     },
     /// A clock outside its limits (DS10693 and DS8626, general operating conditions and PLL characteristics).
     #[error("{name} at {hertz} Hz; the data sheet allows {least} to {most} Hz")]
     Clock {
-        /// Which one.
+        /// The name of the clock.
         name: &'static str,
-        /// Its frequency.
+        /// The frequency of the clock.
         hertz: u64,
-        /// The lowest one allowed.
+        /// The lowest allowed frequency.
         least: u64,
-        /// The highest one allowed.
+        /// The highest allowed frequency.
         most: u64,
     },
-    /// A peripheral is used whose pin is not switched to it.
+    /// A peripheral is used, but the pin is not switched to the peripheral.
     #[error("P{port}{pin} is not switched to {function}")]
     Pin {
-        /// `'A'` to `'I'`.
+        /// The port: `'A'` to `'I'`.
         port: char,
-        /// 0 to 15.
+        /// The pin: 0 to 15.
         pin: u32,
-        /// What the board wires it to.
+        /// The function that the board needs at the pin.
         function: &'static str,
     },
-    /// A source is sampled for too short a time (DS10693, temperature sensor and internal reference characteristics).
+    /// The sampling time of a source is too short (DS10693, temperature sensor and internal reference characteristics).
     #[error("ADC channel {channel} is sampled for {nanoseconds} ns; it takes {least} ns")]
     SamplingTime {
         /// The channel.
         channel: u32,
-        /// How long.
+        /// The sampling time.
         nanoseconds: u64,
-        /// How long it must be.
+        /// The least sampling time.
         least: u64,
     },
     /// CAN samples outside the range that CiA 301 gives, 85 to 90 % of the bit.
     #[error("CAN samples at {permille} permille of a bit; CiA 301 allows 850 to 900")]
     SamplePoint {
-        /// The sample point.
+        /// The sample point, as a share of the bit in permille.
         permille: u32,
     },
     /// A DMA stream is enabled before the flags of its last transfer were cleared (RM0390 section 9.5.5, EN).
     #[error("stream {stream} of DMA{controller} begins with flags of its last transfer")]
     DmaFlags {
-        /// 1 or 2.
+        /// The controller: 1 or 2.
         controller: usize,
-        /// 0 to 7.
+        /// The stream: 0 to 7.
         stream: usize,
     },
-    /// A peripheral is accessed whose clock is off or whose reset is held.
+    /// An access to a peripheral whose clock is off or whose reset is held.
     #[error("{name} is accessed without its clock")]
     ClockOff {
-        /// The peripheral.
+        /// The name of the peripheral.
         name: &'static str,
     },
-    /// The backup domain is written while it is protected.
+    /// A write to the backup domain while it is protected.
     #[error("{name} is written while the backup domain is protected")]
     Protected {
-        /// The peripheral.
+        /// The name of the peripheral.
         name: &'static str,
     },
-    /// Something is asked for that the emulator has not.
+    /// A function that the emulator does not model.
     #[error("{what} is not modelled")]
     NotModelled {
-        /// What.
+        /// The name of the function.
         what: &'static str,
     },
 }
 
-/// What was broken, each breach once.
+/// The broken rules, each breach once.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rules {
     known: BTreeSet<Breach>,
     fresh: VecDeque<Breach>,
-    /// Nothing that conversions depend on has changed since they were looked at.
+    /// The conversions were checked, and no setting that affects them has changed since.
     pub(crate) conversions_checked: bool,
 }
 
@@ -106,28 +106,28 @@ impl Rules {
         }
     }
 
-    /// Whether there is one that nobody has been told of.
+    /// Whether a breach has not been reported yet.
     pub(crate) fn any_broken(&self) -> bool {
         !self.fresh.is_empty()
     }
 
-    /// The next breach that nobody has been told of.
+    /// The next breach that has not been reported yet.
     pub(crate) fn take(&mut self) -> Option<Breach> {
         self.fresh.pop_front()
     }
 }
 
 const MEGA: u64 = 1_000_000;
-/// HCLK that a wait state is good for at 2.7 to 3.6 V.
+/// The HCLK that one wait state allows at 2.7 to 3.6 V.
 const PER_WAIT_STATE: u64 = 30 * MEGA;
-/// Input and VCO of the PLL.
+/// The limits of the input and the VCO of the PLL.
 const PLL_INPUT: RangeInclusive<u64> = 950_000..=2_100_000;
 const PLL_VCO: RangeInclusive<u64> = 100 * MEGA..=432 * MEGA;
-/// The ADC clock at 2.4 to 3.6 V.
+/// The limits of the ADC clock at 2.4 to 3.6 V.
 const ADC_CLOCK: RangeInclusive<u64> = 600_000..=36 * MEGA;
-/// Clock frequencies that absolute encoders with SSI take, in hertz.
+/// The clock frequencies of absolute encoders with SSI, in hertz.
 const SSI_CLOCK: RangeInclusive<u64> = 0..=MEGA;
-/// What the temperature sensor and the internal reference need.
+/// The least sampling time of the temperature sensor and the internal reference.
 const INTERNAL_SOURCE: Time = Time::from_micros(10);
 /// The range of sample points in CiA 301, table 1, in permille.
 const SAMPLE_POINT: RangeInclusive<u32> = 850..=900;
@@ -140,9 +140,9 @@ const C: usize = 2;
 const CAN_FUNCTION: u32 = 9;
 const CAN_RX: u32 = 8;
 const CAN_TX: u32 = 9;
-/// The inputs of ADC1 that the board uses, with their pins.
+/// The inputs of ADC1 in use on the board, with their pins.
 const ANALOGUE: [(u32, usize, char, u32); 3] = [(0, A, 'A', 0), (1, A, 'A', 1), (12, C, 'C', 2)];
-/// The internal reference.
+/// The channel of the internal reference.
 const REFERENCE: u32 = 17;
 
 impl Stm32f4 {
@@ -151,7 +151,7 @@ impl Stm32f4 {
         self.rules.check(range.contains(&hertz), Breach::Clock { name, hertz, least, most });
     }
 
-    /// After a change of the clock tree, the regulator or the wait states.
+    /// Checks the rules after a change of the clock tree, the regulator or the wait states.
     pub(crate) fn check_clocks(&mut self) {
         let clocks = self.clocks;
         let (hclk, pclk1, pclk2) = self.highest_clocks();
@@ -167,7 +167,7 @@ impl Stm32f4 {
         self.rules.check(states >= least, Breach::WaitStates { hertz, states, least });
     }
 
-    /// HCLK, PCLK1 and PCLK2 as the voltage of the core allows them.
+    /// The highest HCLK, PCLK1 and PCLK2 at the current voltage scale of the core.
     fn highest_clocks(&self) -> (u64, u64, u64) {
         let over = self.pwr.over_drives();
         let hclk = match (self.variant, self.pwr.scale()) {
@@ -181,7 +181,7 @@ impl Stm32f4 {
         (hclk * MEGA, pclk1 * MEGA, pclk2 * MEGA)
     }
 
-    /// When CAN1 is about to go on the bus.
+    /// Checks the rules when CAN1 is about to join the bus.
     pub(crate) fn check_can(&mut self) {
         let timing = self.can.can1.timing();
         let (looped, silent) = (field(timing, 30, 1) != 0, field(timing, 31, 1) != 0);
@@ -195,21 +195,21 @@ impl Stm32f4 {
         self.rules.check(SAMPLE_POINT.contains(&permille), Breach::SamplePoint { permille });
     }
 
-    /// After a store to a DMA controller: 0 is DMA1.
+    /// Checks the rule after a store to a DMA controller: 0 is DMA1.
     pub(crate) fn check_flags(&mut self, controller: usize) {
         if let Some(stream) = self.dmas[controller].take_begun_with_flags() {
             self.rules.check(false, Breach::DmaFlags { controller: controller + 1, stream });
         }
     }
 
-    /// After a store to an SPI: the absolute encoder takes no faster clock.
+    /// Checks the rule after a store to an SPI: the clock must not be too fast for the absolute encoder.
     pub(crate) fn check_ssi(&mut self, spi: usize) {
         if let Some(clock) = self.spis[spi].clock().filter(|_| self.ssi_is_wired(spi)) {
             self.check_clock("the SSI clock", Time::PER_SECOND / clock.0, &SSI_CLOCK);
         }
     }
 
-    /// Before a conversion, once for each setting.
+    /// Checks the rules before a conversion, once for each setting.
     pub(crate) fn check_conversions(&mut self) {
         if std::mem::replace(&mut self.rules.conversions_checked, true) {
             return;

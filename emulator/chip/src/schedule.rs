@@ -1,4 +1,4 @@
-//! What happens by itself, and when: the chip in time, and its interrupt lines.
+//! Timing of the chip: the events without an access by the core, their deadlines, and the interrupt lines.
 
 use canbus::Time;
 
@@ -65,7 +65,7 @@ impl Peripherals for Stm32f4 {
     }
 
     fn lines(&self) -> IrqLines {
-        // The bus moves the CAN controllers without a call here.
+        // The bus changes the CAN controllers directly, so their lines are read here.
         let mut lines = self.lines;
         for (irqs, Lines { tx, rx0, rx1, sce }) in CAN_IRQS.iter().zip(self.can.lines()) {
             irqs.iter().zip([tx, rx0, rx1, sce]).for_each(|(&irq, level)| lines.raise(irq, level));
@@ -93,7 +93,7 @@ impl Peripherals for Stm32f4 {
 }
 
 impl Stm32f4 {
-    /// Lets everything that can be seen up to `now` happen.
+    /// Processes everything that is visible up to `now`.
     fn pass(&mut self, now: Time) {
         if now >= self.deadline() {
             self.catch_up(now);
@@ -128,7 +128,7 @@ impl Stm32f4 {
         }
     }
 
-    /// Takes back the matches of TIM2 that a test wants lost.
+    /// Clears the match flags of TIM2 that a test makes the chip lose.
     fn lose_matches(&mut self, before: u32) {
         let fresh = self.timers[TIM2].matches() & !before;
         for channel in (1..=4).filter(|channel| fresh >> channel & 1 != 0) {
@@ -138,7 +138,7 @@ impl Stm32f4 {
         }
     }
 
-    /// Ends the frames of an SPI that are due, and has DMA fetch what came.
+    /// Ends the frames of an SPI that are due, and lets DMA read the received data.
     pub(crate) fn run_spi(&mut self, index: usize, now: Time) {
         let (wired, open) = (self.ssi_is_wired(index), Far::Nothing(self.open_input(index)));
         let plant = &self.plant;
@@ -152,7 +152,7 @@ impl Stm32f4 {
         {}
     }
 
-    /// Has DMA bring what the SPIs are to send.
+    /// Lets DMA write the next data to send to the SPIs.
     fn feed_spis(&mut self, now: Time, memory: &dyn Memory) {
         for (index, place) in SPIS.iter().enumerate() {
             while self.spis[index].asks_to_load()
@@ -162,7 +162,7 @@ impl Stm32f4 {
         }
     }
 
-    /// The watchdog bites when its time has come.
+    /// Resets the chip when the watchdog has expired.
     fn watch(&mut self, now: Time) {
         if now >= self.iwdg.deadline() {
             self.iwdg = Iwdg::new();
@@ -171,7 +171,7 @@ impl Stm32f4 {
         }
     }
 
-    /// After a change: what is due next, and which lines are up.
+    /// Recomputes the deadline and the interrupt lines after a change.
     pub(crate) fn settle(&mut self, now: Time) {
         self.deadline = self.next_event(now);
         self.lines = self.levels();

@@ -4,7 +4,7 @@
 use crate::plant::front_end::{TS_CAL1, TS_CAL2, VREFIN_CAL};
 use crate::variant::Variant;
 
-/// Address of the unique identifier, where this block begins.
+/// Address of the unique identifier, the begin of this block.
 pub(crate) const BASE: u32 = 0x1FFF_7A10;
 
 /// The word at `offset` from the unique identifier.

@@ -44,7 +44,7 @@ pub struct Stm32f4 {
     pub(crate) ports: [Gpio; PORTS],
     /// Levels that a test drives.
     pub(crate) outside: [Outside; PORTS],
-    /// The last level of the encoder's index that was looked at.
+    /// The level of the encoder's index at the last check.
     pub(crate) index_level: bool,
     pub(crate) syscfg: Syscfg,
     pub(crate) exti: Exti,
@@ -63,10 +63,10 @@ pub struct Stm32f4 {
     pub(crate) record: Record,
     pub(crate) rules: Rules,
     pub(crate) losses: Losses,
-    /// The reset that the chip itself has asked for.
+    /// The cause of a reset that the chip itself has requested.
     pub(crate) asked: Option<Cause>,
     pub(crate) lines: IrqLines,
-    /// Deadline and lines were made up anew since the core asked.
+    /// Whether deadline and lines were computed anew since the core's last query.
     pub(crate) has_settled: bool,
     pub(crate) deadline: Time,
 }
@@ -116,12 +116,12 @@ impl Stm32f4 {
         self.record.list()
     }
 
-    /// How many aborts of CAN1 are still to come too late.
+    /// Number of aborts of CAN1 that a test still makes come too late.
     pub fn late_aborts(&self) -> usize {
         self.can.can1.transmitter.late_aborts
     }
 
-    /// Has the next events of a kind get lost.
+    /// Makes the chip lose the next `times` events of a kind.
     pub fn lose(&mut self, loss: Loss, times: usize) {
         match loss {
             Loss::TransmitComplete => self.can.can1.transmitter.lost_ends += times,
@@ -130,26 +130,26 @@ impl Stm32f4 {
         }
     }
 
-    /// The clock tree as the program has set it.
+    /// The clock tree that the program has set.
     pub fn clocks(&self) -> Clocks {
         self.clocks
     }
 
-    /// The level that the program drives on a pin (port `'A'` to `'I'`, pin 0 to 15); `None` when it drives none.
+    /// The level that the program drives on a pin (port `'A'` to `'I'`, pin 0 to 15); `None` when the pin is no output.
     pub fn output(&self, port: char, pin: u32) -> Option<bool> {
         let index = (port as usize).checked_sub('A' as usize)?;
         self.ports.get(index)?.output(pin)
     }
 
-    /// What the sensors measure.
+    /// The physical world that the sensors measure.
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// What the sensors measure, to change it at `now`: everything before is measured as it was.
+    /// The physical world, for a change at `now`. All measurements before `now` are completed first.
     pub fn plant_mut(&mut self, now: Time) -> &mut Plant {
         self.catch_up(now);
-        // What is due next depends on the change: look again at once.
+        // The change may affect the deadline: recompute it at once.
         self.deadline = now;
         &mut self.plant
     }
@@ -174,7 +174,7 @@ impl Stm32f4 {
         &mut self.can.can2
     }
 
-    /// What the battery keeps of the backup SRAM while the main supply is gone; `None` when it keeps nothing.
+    /// The content of the backup SRAM that the battery keeps without the main supply; `None` when nothing is kept.
     pub fn kept_by_battery(&self, now: Time) -> Option<Vec<u8>> {
         self.backup_is_kept(now).then(|| self.backup_ram.bytes())
     }
@@ -189,7 +189,7 @@ impl Stm32f4 {
         self.pwr.keeps_backup() && self.plant.has_battery(now)
     }
 
-    /// The flash controller, to look at or to cut the power in one of its operations.
+    /// The flash controller, to read its state or to cut the power in one of its operations.
     pub fn flash_mut(&mut self) -> &mut Flash {
         &mut self.flash
     }

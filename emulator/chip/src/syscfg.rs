@@ -1,4 +1,4 @@
-//! SYSCFG: which port each EXTI line listens to (RM0390 section 8.2, RM0090 section 9.2).
+//! SYSCFG: selects the port for each EXTI line (RM0390 section 8.2, RM0090 section 9.2).
 
 use crate::register::{Plain, RegisterFile, bit, field, flag};
 
@@ -27,7 +27,7 @@ impl Syscfg {
 
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         let value = self.plain.read(offset)?;
-        // The compensation cell is ready as soon as it is on.
+        // The compensation cell is ready immediately.
         Some(if offset == CMPCR { value | flag(bit(value, 0), 8) } else { value })
     }
 
@@ -35,7 +35,7 @@ impl Syscfg {
         self.plain.write(offset, value)
     }
 
-    /// The port (0 is GPIOA) whose pin of the same number drives an EXTI line.
+    /// The port (0 is GPIOA) that drives an EXTI line with its pin of the same number.
     pub(crate) fn port_of_line(&self, line: u32) -> usize {
         field(self.plain.get(EXTICR1 + line / 4 * 4), line % 4 * 4, 4) as usize
     }

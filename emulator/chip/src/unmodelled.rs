@@ -1,4 +1,4 @@
-//! The record of accesses that the models do not answer as silicon would.
+//! The record of accesses that the models answer differently from silicon.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -12,10 +12,10 @@ pub enum Direction {
     Write,
 }
 
-/// Why an access is on record.
+/// The reason why an access is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Reason {
-    /// The chip has this register, or this setting of it, and the model has not.
+    /// The chip has this register or setting, but the model does not.
     NotModelled,
     /// The clock of the peripheral is off or its reset is held: silicon reads 0 and ignores writes.
     ClockOff,
@@ -32,9 +32,9 @@ pub struct Unmodelled {
     pub address: u32,
     /// Loads or stores.
     pub direction: Direction,
-    /// Why it is on record.
+    /// Why the access is recorded.
     pub reason: Reason,
-    /// How often it happened.
+    /// Number of accesses.
     pub count: u64,
 }
 

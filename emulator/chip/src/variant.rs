@@ -1,23 +1,23 @@
-//! What differs between the chips.
+//! The differences between the supported chips.
 
 use std::ops::Range;
 use std::str::FromStr;
 
-/// One of the chips that the images are built for.
+/// A chip that images are built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variant {
     /// STM32F446xE: 512 KiB of flash, RM0390.
     F446,
     /// STM32F405xG: 1 MiB of flash, RM0090.
     F405,
-    /// STM32F407xG: as the F405, with Ethernet and a camera interface.
+    /// STM32F407xG: the F405 with Ethernet and a camera interface.
     F407,
 }
 
 impl FromStr for Variant {
     type Err = String;
 
-    /// The name that the chip has in the features of the images.
+    /// The name of the chip in the features of the images.
     fn from_str(name: &str) -> Result<Variant, String> {
         match name {
             "stm32f446" => Ok(Variant::F446),

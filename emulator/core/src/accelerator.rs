@@ -1,5 +1,5 @@
-//! The caches between flash and core (RM0390, 3.4.2): 64 lines of 128 bits for code and 8 for constants, each of which makes room
-//! for a new line by the one that was not used for the longest time.
+//! The caches between flash and core (RM0390, 3.4.2): 64 lines of 128 bits for code and 8 lines for constants. A new
+//! line replaces the least recently used one.
 
 use chip::FlashAccess;
 
@@ -13,7 +13,7 @@ pub(crate) struct Accelerator {
     constants: Lines,
 }
 
-/// The numbers of the lines of a cache, the newest last.
+/// The numbers of the lines in a cache, the most recently used last.
 #[derive(Clone, Debug)]
 struct Lines {
     held: Vec<u32>,
@@ -25,13 +25,13 @@ impl Accelerator {
         Accelerator { code: Lines::new(64), constants: Lines::new(8) }
     }
 
-    /// After a reset.
+    /// Empties both caches (a reset).
     pub(crate) fn clear(&mut self) {
         *self = Accelerator::new();
     }
 
-    /// The cycles that code at these addresses is waited for, as if the core did nothing meanwhile. After a jump a line that nobody
-    /// asked for may have to be read to its end first.
+    /// The wait cycles of a code fetch, counted as if the core did nothing else during the wait. After a jump, a
+    /// prefetch of another line may have to end first.
     pub(crate) fn fetch(&mut self, address: u32, size: u32, in_a_row: bool, flash: FlashAccess) -> u32 {
         let (first, last) = (address / LINE, (address + size.max(1) - 1) / LINE);
         (first..=last)
@@ -40,19 +40,19 @@ impl Accelerator {
             .sum()
     }
 
-    /// The cycles that a constant is waited for: a line of code may be read to its end first.
+    /// The wait cycles of a constant; the read of a line of code may have to end first.
     pub(crate) fn load(&mut self, address: u32, flash: FlashAccess) -> u32 {
         let hit = self.constants.touch(address / LINE) && flash.caches_constants;
         if hit { 0 } else { after_another(flash) }
     }
 }
 
-/// The cycles of reading a line.
+/// The cycles to read a line.
 fn read(flash: FlashAccess) -> u32 {
     flash.wait_states + 1
 }
 
-/// The same after the end of a read that has begun.
+/// The cycles to read a line after the end of another read.
 fn after_another(flash: FlashAccess) -> u32 {
     flash.wait_states + read(flash)
 }
@@ -62,7 +62,7 @@ impl Lines {
         Lines { held: Vec::with_capacity(room), room }
     }
 
-    /// Whether the line was there; now it is.
+    /// Marks the line as used and cached; returns whether it was already in the cache.
     fn touch(&mut self, line: u32) -> bool {
         let place = self.held.iter().rposition(|&held| held == line);
         match place {

@@ -1,6 +1,6 @@
-//! Instructions that fault on silicon where the CPU library carries them out: multiple and double loads and stores, exclusive
-//! and floating-point ones at an unaligned address; and, while that is trapped, any access to an unaligned word or halfword, and a
-//! division by zero (ARMv7-M, A3.2.1 and B3.2.8).
+//! Faults that silicon raises and the CPU library does not. Multiple, double, exclusive and floating-point loads and
+//! stores fault at an unaligned address. With traps enabled, any access to an unaligned word or halfword faults, and so
+//! does a division by zero (ARMv7-M, A3.2.1 and B3.2.8).
 
 use crate::scb::{DIV_0_TRP, UNALIGN_TRP, cfsr};
 
@@ -13,7 +13,7 @@ pub(crate) fn fault(code: &[u8], ccr: u32, register: impl Fn(u16) -> u32) -> Opt
         return by_zero.then_some(cfsr::DIVBYZERO);
     }
     let is_unaligned = match aligned_base(first, second) {
-        // PC as a base is aligned by the architecture.
+        // The architecture aligns PC when PC is the base.
         Some((base, mask)) => base != 15 && register(base) & mask != 0,
         None if ccr & UNALIGN_TRP != 0 => {
             single(first, second, register).is_some_and(|(address, mask)| address & mask != 0)
@@ -23,7 +23,8 @@ pub(crate) fn fault(code: &[u8], ccr: u32, register: impl Fn(u16) -> u32) -> Opt
     is_unaligned.then_some(cfsr::UNALIGNED)
 }
 
-/// The address of a load or store of one word or halfword, and the bits of the address that are zero where it is aligned.
+/// The address of a load or store of one word or halfword, and the address bits that must be zero for an aligned
+/// access.
 fn single(first: u16, second: u16, register: impl Fn(u16) -> u32) -> Option<(u32, u32)> {
     const WORD: u32 = 3;
     const HALFWORD: u32 = 1;
@@ -41,7 +42,7 @@ fn single(first: u16, second: u16, register: impl Fn(u16) -> u32) -> Option<(u32
         0x6000..=0x6FFF => Some((from(base, immediate * 4), WORD)),
         0x8000..=0x8FFF => Some((from(base, immediate * 2), HALFWORD)),
         0x9000..=0x9FFF => Some((from(13, u32::from(first & 0xFF) * 4), WORD)),
-        // From PC a literal is loaded, which the assembler aligns.
+        // A load relative to PC reads a literal, which the assembler aligns.
         0xF800..=0xF9FF if first & 0xF != 15 => {
             let mask = match first >> 5 & 3 {
                 1 => HALFWORD,
@@ -68,18 +69,19 @@ fn offset(first: u16, second: u16, register: &impl Fn(u16) -> u32) -> u32 {
     }
 }
 
-/// The base register of an access that must be aligned, and the bits of it that must be zero: offsets are multiples of four.
+/// The base register of an access that must be aligned, and the register's bits that must be zero; all offsets are
+/// multiples of four.
 fn aligned_base(first: u16, second: u16) -> Option<(u16, u32)> {
     let wide = first & 0xF;
     let coprocessor = second >> 9 & 7 == 0b101;
     match first {
         // LDM and STM.
         0xC000..=0xCFFF => Some((first >> 8 & 7, 3)),
-        // LDREXB, STREXB and the table branches need none; LDREXH and STREXH do.
+        // LDREXB, STREXB and the table branches need no alignment; LDREXH and STREXH do.
         0xE8C0..=0xE8DF => (second >> 4 & 0xF == 5).then_some((wide, 1)),
         // LDM, STM, LDRD, STRD, LDREX and STREX.
         0xE800..=0xE9FF => Some((wide, 3)),
-        // Two core registers to or from the FPU: no memory.
+        // A transfer between two core registers and the FPU does not access memory.
         0xEC40..=0xEC5F => None,
         // VLDR, VSTR, VLDM and VSTM.
         0xEC00..=0xEDFF if coprocessor => Some((wide, 3)),
@@ -91,7 +93,7 @@ fn aligned_base(first: u16, second: u16) -> Option<(u16, u32)> {
 mod tests {
     use super::*;
 
-    /// What an instruction does when every register holds this.
+    /// The fault of an instruction when every register holds `value`.
     fn with_traps(ccr: u32, value: u32, op: u32) -> Option<u32> {
         let halves = if op > 0xFFFF { vec![op >> 16, op & 0xFFFF] } else { vec![op] };
         let code: Vec<u8> = halves.iter().flat_map(|&half| (half as u16).to_le_bytes()).collect();

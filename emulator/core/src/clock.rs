@@ -1,7 +1,8 @@
-//! The clock of virtual time: code is charged before it runs, or stopped before when something is due.
+//! The clock of virtual time. Before a block of code runs, its cycles are added to the time; if an event is due, the
+//! block is stopped instead.
 //!
-//! This is what the emulator does most: the CPU library calls it directly, without the look at reference counts that its Rust
-//! binding has in every call.
+//! This is the most frequent operation of the emulator. The CPU library therefore calls the hook directly, without the
+//! reference counting that the Rust binding does in every call.
 
 use std::ffi::c_void;
 
@@ -17,7 +18,7 @@ use crate::mechanism::Mechanism;
 use crate::nvic::Masks;
 use crate::scb::cfsr;
 
-/// The CPU library, for what its hooks may do with it.
+/// A handle of the CPU library with the operations that a hook may use.
 #[derive(Clone, Copy)]
 pub(crate) struct Library(*mut uc_engine);
 
@@ -26,16 +27,16 @@ impl Library {
         Library(cpu.get_handle())
     }
 
-    /// Has the code stop here.
+    /// Stops the CPU before the current code.
     pub(crate) fn stop(self) {
-        // SAFETY: the handle is that of the CPU whose hook runs.
+        // SAFETY: the handle belongs to the CPU whose hook is running.
         unsafe { uc_emu_stop(self.0) };
     }
 
-    /// A register; 0 where the library refuses.
+    /// The value of a register; 0 if the library refuses to read it.
     fn register(self, register: RegisterARM) -> u64 {
         let mut value = 0_u64;
-        // SAFETY: as in `stop`; no register of the core is longer than the value.
+        // SAFETY: as in `stop`; no register of the core is larger than the value.
         unsafe { uc_reg_read(self.0, register as i32, (&raw mut value).cast()) };
         value
     }
@@ -46,23 +47,23 @@ impl Library {
     }
 }
 
-/// The priority bits that the chip has.
+/// The implemented bits of a priority.
 const PRIORITY: u64 = 0xF0;
 
-/// Takes what the program has written out of BASEPRI where the chip has no bits for it; the library keeps all eight.
+/// Clears the bits of BASEPRI that the chip does not implement; the library keeps all eight bits.
 #[cold]
 fn trim_basepri<P: Peripherals>(library: Library, core: &mut Core<P>) {
     library.set_register(RegisterARM::BASEPRI, library.register(RegisterARM::BASEPRI) & PRIORITY);
     core.wrote_basepri = false;
 }
 
-/// Has every block of code charged.
+/// Installs the hook that counts the cycles of every block.
 pub(crate) fn charge_blocks<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), uc_error> {
     let core: *mut Core<P> = cpu.get_data_mut();
     let mut hook = 0;
     let (first, last) = (1_u64, 0_u64);
-    // SAFETY: the core lives in the CPU, at a place that does not change, as long as the hook does; the signature is that of a
-    // hook for blocks. From the first address after the last one is everywhere.
+    // SAFETY: the core lives in the CPU, at an address that does not change, as long as the hook does; the signature is
+    // that of a hook for blocks. A first address above the last one means all addresses.
     unsafe {
         let on_block: unsafe extern "C" fn(*mut uc_engine, u64, u32, *mut Core<P>) = on_block::<P>;
         uc_hook_add(
@@ -79,7 +80,8 @@ pub(crate) fn charge_blocks<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Resul
 }
 
 /// # Safety
-/// The library calls this as `charge_blocks` has asked for it, and nobody else in Rust uses the core meanwhile.
+/// Only the library calls this function, as `charge_blocks` has requested, and no other Rust code uses the core during
+/// the call.
 unsafe extern "C" fn on_block<P: Peripherals>(
     uc: *mut uc_engine,
     address: u64,
@@ -95,7 +97,7 @@ unsafe extern "C" fn on_block<P: Peripherals>(
     }
 }
 
-/// The page of our own is not there for the program.
+/// Faults when the program jumps into the emulator's own page, which the chip does not have.
 fn guard_hidden<P: Peripherals>(library: Library, core: &mut Core<P>) {
     if !core.clearing_monitor {
         core.stop_for(Halt::Undefined);
@@ -103,7 +105,7 @@ fn guard_hidden<P: Peripherals>(library: Library, core: &mut Core<P>) {
     }
 }
 
-/// Charges code that is about to run, or stops before it when something is due.
+/// Counts the cycles of code that is about to run, or stops before the code when an event is due.
 #[inline]
 pub(crate) fn pass<P: Peripherals>(library: Library, core: &mut Core<P>, address: u32, size: u32) -> bool {
     if core.wrote_basepri {
@@ -128,14 +130,14 @@ pub(crate) fn pass<P: Peripherals>(library: Library, core: &mut Core<P>, address
     true
 }
 
-/// Whether the program may run a block with these uses. That an exclusive access begins is kept.
+/// Whether the program may run a block with these uses. Records uses that later steps need to know of.
 fn allows<P>(core: &mut Core<P>, uses: u16) -> bool {
     core.exclusive |= uses & EXCLUSIVE != 0;
     core.wrote_basepri |= uses & BASEPRI != 0;
     uses & FLOATS == 0 || core.scb.allows_floats()
 }
 
-/// The exact question.
+/// Whether the block must not run: the exact but slow check.
 #[cold]
 fn is_stopped<P: Peripherals>(library: Library, core: &Core<P>, address: u32) -> bool {
     let waits = core.flash_closed && address < RAM;
@@ -143,7 +145,7 @@ fn is_stopped<P: Peripherals>(library: Library, core: &Core<P>, address: u32) ->
     waits || core.halt.is_some() || core.needs_attention() || preempts()
 }
 
-/// Stops before code that faults.
+/// Stops before code that causes a usage fault.
 pub(crate) fn refuse<P: Peripherals>(library: Library, core: &mut Core<P>, status: u32) -> bool {
     core.stop_for(Halt::Usage(status));
     library.stop();
@@ -153,12 +155,12 @@ pub(crate) fn refuse<P: Peripherals>(library: Library, core: &mut Core<P>, statu
 #[cold]
 fn learn<P>(core: &mut Core<P>, address: u32, size: u32) -> Cost {
     let mut code = vec![0; size as usize];
-    // The block is about to run, so it can be read.
+    // The block is about to run, so its code is readable.
     let _ = core.memory.read(address, &mut code);
     core.costs.learn(address, &code)
 }
 
-/// The masking registers, less what a test has switched off.
+/// The masking registers, without those that a test has switched off.
 pub(crate) fn masks<P: Peripherals>(cpu: &Unicorn<Core<P>>) -> Masks {
     masks_of(Library::of(cpu), cpu.get_data())
 }

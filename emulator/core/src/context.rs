@@ -11,11 +11,11 @@ use crate::fault::Fault;
 use crate::machine::Machine;
 use crate::mechanism::Mechanism;
 
-/// The integer registers of a frame, in its order.
+/// The integer registers of a frame, in the order of the frame.
 const INTEGER: [RegisterARM; 6] =
     [RegisterARM::R0, RegisterARM::R1, RegisterARM::R2, RegisterARM::R3, RegisterARM::R12, RegisterARM::LR];
 
-/// The integer registers that a frame leaves out.
+/// The integer registers that are not part of a frame.
 const CALLEE_SAVED: [RegisterARM; 8] = [
     RegisterARM::R4,
     RegisterARM::R5,
@@ -50,7 +50,7 @@ const TO_THREAD: u32 = 1 << 3;
 const TO_PROCESS: u32 = 1 << 2;
 
 impl<P: Peripherals + 'static> Machine<P> {
-    /// Registers as after a reset.
+    /// Sets the registers to their values after a reset.
     pub(crate) fn reset_registers(&mut self, stack: u32, entry: u32) {
         for register in
             [RegisterARM::PRIMASK, RegisterARM::FAULTMASK, RegisterARM::BASEPRI, RegisterARM::CONTROL]
@@ -92,12 +92,12 @@ impl<P: Peripherals + 'static> Machine<P> {
         let vector = base + 4 * u32::from(exception.0);
         self.cpu.get_data_mut().wait_for_vector(vector);
         let handler = self.word(vector);
-        // Handler mode knows the main stack only.
+        // Handler mode always uses the main stack.
         let before = self.register(RegisterARM::CONTROL);
         let control = before & !(FPCA | SPSEL);
         let handler_mode = u32::from(exception.0) | THUMB;
         if before & SPSEL != 0 {
-            // SPSEL can be changed by privileged Thread mode only, and privileges in Handler mode.
+            // Only privileged Thread mode can change SPSEL, and Handler mode is privileged.
             self.set_xpsr(handler_mode);
             self.set(RegisterARM::CONTROL, control & !NPRIV);
             self.set_xpsr(THUMB);
@@ -149,7 +149,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.cpu.get_data_mut().memory.write(top, &bytes).ok_or(())
     }
 
-    /// Ends the active exception: the core has branched to an EXC_RETURN value.
+    /// Ends the active exception, after the core has branched to an EXC_RETURN value.
     pub(crate) fn leave(&mut self) {
         let exc_return = self.register(RegisterARM::PC) | 1;
         let ending = Exception((self.register(RegisterARM::XPSR) & 0x7F) as u8);
@@ -173,8 +173,8 @@ impl<P: Peripherals + 'static> Machine<P> {
         core.spend(0, core.estimate().exit(exc_return & NO_FLOATS == 0));
     }
 
-    /// The checks of an exception return (ARMv7-M, B1.5.8): the exception is active, the value is one of six, and it leads to
-    /// Thread mode if and only if nothing else is active.
+    /// The checks of an exception return (ARMv7-M, B1.5.8): the exception is active, the value is one of six, and the
+    /// return goes to Thread mode if and only if no other exception is active.
     fn may_return(&self, ending: Exception, exc_return: u32) -> bool {
         let core = self.cpu.get_data();
         let is_valid = matches!(exc_return | NO_FLOATS, 0xFFFF_FFF1 | 0xFFFF_FFF9 | 0xFFFF_FFFD);
@@ -184,7 +184,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         is_valid && fits && core.nvic.is_active(ending)
     }
 
-    /// The exception that follows without unstacking.
+    /// The exception to tail-chain, without unstacking.
     fn follower(&self) -> Option<Exception> {
         let core = self.cpu.get_data();
         let next = core.to_take(clock::masks(&self.cpu))?;
@@ -214,7 +214,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         let xpsr = words[7];
         let padding = if xpsr & ALIGNED != 0 { 4 } else { 0 };
         self.set(bank, top.wrapping_add(4 * count) + padding);
-        // Thread mode without privileges cannot write CONTROL.
+        // Unprivileged Thread mode cannot write CONTROL.
         let control = self.register(RegisterARM::CONTROL);
         self.set(RegisterARM::CONTROL, control & !NPRIV);
         self.set_xpsr(xpsr & !ALIGNED);
@@ -238,20 +238,21 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.rebuild_flags(flags);
     }
 
-    /// Runs code of the emulator's own, so no IT block may be open: it would skip it.
+    /// Clears the exclusive monitor with code of the emulator. No IT block may be open, because the block would skip
+    /// that code.
     fn clear_monitor(&mut self) {
-        // It can only fail where the library has lost its memory, and then nothing else runs either.
+        // The call fails only when the library has lost its memory, and then no other code runs either.
         let _ = engine::clear_monitor(&mut self.cpu);
     }
 
-    /// Writes all of xPSR. It holds the exception number, so this is also the switch between the modes.
+    /// Writes all of xPSR. The register holds the exception number, so the write also switches the mode.
     fn set_xpsr(&mut self, value: u32) {
         let value = if self.cpu.get_data().lacks(Mechanism::ItState) { value & !IT } else { value };
         self.set(RegisterARM::XPSR_NZCVQG, value);
         self.rebuild_flags(value);
     }
 
-    /// A write of the condition flags makes the library look at the mode again.
+    /// Writes the condition flags, which makes the library update its mode.
     fn rebuild_flags(&mut self, xpsr: u32) {
         self.set(RegisterARM::APSR_NZCV, xpsr & 0xF000_0000);
     }

@@ -23,28 +23,28 @@ use crate::stepping::Stepping;
 use crate::systick::SysTick;
 use crate::watch::Watch;
 
-/// Why the CPU library was stopped.
+/// The reason why the CPU library was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Halt {
-    /// Something is due: time, an effect, an interrupt.
+    /// The run loop is needed: time, an effect, or an interrupt.
     Attention,
-    /// A point that is watched for.
+    /// A watched point is reached.
     Watched,
     /// The core branched to an EXC_RETURN value.
     ExceptionReturn,
-    /// SVC; the address after it.
+    /// SVC was executed.
     SupervisorCall,
     /// BKPT.
     Breakpoint,
-    /// An exception of the CPU library's own, such as an access that it forbids.
+    /// An exception raised by the CPU library, for example for a forbidden access.
     Undefined,
-    /// A usage fault with this status, seen before the instruction runs.
+    /// A usage fault with these status bits, detected before the instruction runs.
     Usage(u32),
-    /// A data access that nothing answers, seen by the chip or by the system space.
+    /// A data access to an address without a register or memory, detected by the chip or the system space.
     DataFault(u32),
 }
 
-/// An access to memory that is not mapped, as the hook saw it.
+/// An access to unmapped memory, as seen by the hook.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Unmapped {
     pub(crate) address: u32,
@@ -52,18 +52,19 @@ pub(crate) struct Unmapped {
     pub(crate) store: bool,
 }
 
-/// Everything but the registers and the memory.
+/// The state of the machine except the CPU's registers.
 pub(crate) struct Core<P> {
     pub(crate) chip: P,
     pub(crate) memory: Bytes,
     pub(crate) now: Time,
     /// Length of a core cycle.
     pub(crate) cycle: Time,
-    /// The run loop wants control back here.
+    /// The instant at which the run loop must regain control.
     pub(crate) until: Time,
-    /// When the chip or SysTick wants to be advanced; kept, because it is asked for before every block.
+    /// The next deadline of the chip or SysTick; cached, because every block checks it.
     due: Time,
-    /// Only time can stop the program before its next block, at the earliest at `bound`; kept for the same reason.
+    /// Whether only time can stop the program before the next block, at `bound` at the earliest; cached for the same
+    /// reason.
     calm: bool,
     bound: Time,
     pub(crate) nvic: Nvic,
@@ -71,44 +72,44 @@ pub(crate) struct Core<P> {
     pub(crate) systick: SysTick,
     pub(crate) stats: Stats,
     pub(crate) profile: Profile,
-    /// Interrupts come between any two instructions.
+    /// The mode in which interrupts come between any two instructions.
     pub(crate) stepping: Option<Stepping>,
-    /// What the program does wrong for a test.
+    /// Bugs that a test has seeded into the program.
     pub(crate) bugs: Bugs,
     /// Points before which the program stops.
     pub(crate) watch: Option<Watch>,
     pub(crate) halt: Option<Halt>,
     pub(crate) unmapped: Option<Unmapped>,
-    /// A store that was not waited for has found nothing, at this address: the fault is taken before the next block.
+    /// The address of a buffered store that failed: the fault is taken before the next block.
     pub(crate) lost_store: Option<u32>,
-    /// Rules that were found broken: when, and where the program was.
+    /// Broken rules, each with its instant and the address of the code.
     pub(crate) breaches: VecDeque<(Time, u32, Breach)>,
-    /// The code that was charged last.
+    /// The address of the last counted code.
     pub(crate) place: u32,
     pub(crate) effects: VecDeque<Effect>,
-    /// When an exception became pending, for its latency.
+    /// The instant at which each exception became pending, for its latency.
     pub(crate) pended: [Time; Exception::COUNT],
     pub(crate) costs: Costs,
-    /// The caches of the flash, where their misses are counted.
+    /// The caches of the flash, if their misses are counted.
     pub(crate) accelerator: Option<Accelerator>,
-    /// Where the program goes on if it does not jump.
+    /// The address of the next code if the program does not jump.
     pub(crate) ahead: u32,
     pub(crate) reset_requested: bool,
-    /// The program has written BASEPRI.
+    /// The program has written BASEPRI, and the unimplemented bits are still to be cleared.
     pub(crate) wrote_basepri: bool,
-    /// The program has begun an exclusive access since the monitor was cleared.
+    /// An exclusive access has begun since the monitor was last cleared.
     pub(crate) exclusive: bool,
-    /// The emulator itself runs code, not the program.
+    /// The emulator's own code is running, not the program.
     pub(crate) clearing_monitor: bool,
     pub(crate) without: Option<Mechanism>,
-    /// Flash is busy, and what runs does not come from it: loads from there are to be noticed.
+    /// Flash is busy while code in RAM runs: loads from flash must be detected.
     pub(crate) flash_closed: bool,
-    /// How often the flash array was written.
+    /// Number of writes to the flash array.
     pub(crate) flash_changes: u64,
     cyccnt: Option<Cyccnt>,
 }
 
-/// The part of a [`crate::Moment`] that is here.
+/// The part of a [`crate::Moment`] that this structure holds.
 pub(crate) struct CoreMoment<P> {
     chip: P,
     times: [Time; 4],
@@ -123,7 +124,7 @@ pub(crate) struct CoreMoment<P> {
     ahead: u32,
 }
 
-/// DWT_CYCCNT: its value at some instant, and it runs from there.
+/// DWT_CYCCNT: its value at some instant, and whether it runs.
 #[derive(Clone, Copy, Debug)]
 struct Cyccnt {
     at: Time,
@@ -170,7 +171,7 @@ impl<P: Peripherals> Core<P> {
         }
     }
 
-    /// What a program can see, and the time.
+    /// The state that a program can see, and the time.
     pub(crate) fn moment(&self) -> CoreMoment<P>
     where
         P: Clone,
@@ -190,7 +191,7 @@ impl<P: Peripherals> Core<P> {
         }
     }
 
-    /// Back to that moment.
+    /// Restores the state of a moment.
     pub(crate) fn go_back(&mut self, moment: &CoreMoment<P>)
     where
         P: Clone,
@@ -211,7 +212,7 @@ impl<P: Peripherals> Core<P> {
         self.lost_store = None;
     }
 
-    /// Back to the state after a reset; the clock of virtual time and the counters go on.
+    /// Resets the core; the clock of virtual time and the counters go on.
     pub(crate) fn reset(&mut self) {
         self.nvic = Nvic::default();
         self.scb = Scb::default();
@@ -226,7 +227,7 @@ impl<P: Peripherals> Core<P> {
         self.accelerator.iter_mut().for_each(Accelerator::clear);
     }
 
-    /// Which end of the published ranges cycles are counted by, from now on.
+    /// Sets the estimate of cycles, from now on.
     pub(crate) fn set_estimate(&mut self, estimate: Estimate) {
         self.costs = Costs::new(estimate);
         self.accelerator = (estimate == Estimate::Worst).then(Accelerator::new);
@@ -236,7 +237,7 @@ impl<P: Peripherals> Core<P> {
         self.costs.estimate
     }
 
-    /// The exception to take now, if one may preempt.
+    /// The exception to take now, if one can preempt.
     pub(crate) fn to_take(&self, masks: Masks) -> Option<Exception> {
         let nested = self.nvic.any_active();
         self.nvic.to_take(masks).filter(|_| !(nested && self.lacks(Mechanism::Preemption)))
@@ -246,7 +247,7 @@ impl<P: Peripherals> Core<P> {
         self.without == Some(mechanism)
     }
 
-    /// The next instant at which something happens by itself.
+    /// The next instant at which the state changes without the program.
     pub(crate) fn deadline(&self) -> Time {
         self.chip.deadline().min(self.systick.deadline())
     }
@@ -259,13 +260,13 @@ impl<P: Peripherals> Core<P> {
             || self.lost_store.is_some()
     }
 
-    /// Whether the next block runs without a further look. Where this says no, that block may run all the same.
+    /// Whether the next block may run without further checks. `false` does not mean that the block must stop.
     #[inline]
     pub(crate) fn is_undisturbed(&self) -> bool {
         self.calm && self.now < self.bound
     }
 
-    /// After a change of what may stop the program, and before the program goes on.
+    /// Updates the cached checks after a change and before the program continues.
     pub(crate) fn look_again(&mut self) {
         self.bound = self.until.min(self.due);
         self.calm = self.halt.is_none()
@@ -276,13 +277,13 @@ impl<P: Peripherals> Core<P> {
             && !self.nvic.could_preempt();
     }
 
-    /// Has the run loop take over before the next block.
+    /// Makes the run loop take over before the next block.
     pub(crate) fn stop_for(&mut self, halt: Halt) {
         self.halt = Some(halt);
         self.calm = false;
     }
 
-    /// Lets everything due happen, and samples the interrupt lines.
+    /// Processes everything that is due, and samples the interrupt lines.
     pub(crate) fn advance(&mut self) {
         if self.chip.deadline() <= self.now {
             self.chip.advance(self.now, &self.memory);
@@ -293,7 +294,7 @@ impl<P: Peripherals> Core<P> {
         self.settle();
     }
 
-    /// Takes over what a call into the chip changed.
+    /// Takes over the changes that a call into the chip has made.
     pub(crate) fn settle(&mut self) {
         while let Some(effect) = self.chip.effect() {
             self.effects.push_back(effect);
@@ -308,7 +309,7 @@ impl<P: Peripherals> Core<P> {
         self.look_again();
     }
 
-    /// A rule is broken, here and now.
+    /// Records a broken rule with the current time and address.
     pub(crate) fn report(&mut self, breach: Breach) {
         self.breaches.push_back((self.now, self.place, breach));
     }
@@ -321,7 +322,7 @@ impl<P: Peripherals> Core<P> {
         self.calm = false;
     }
 
-    /// Remembers when these exceptions became pending.
+    /// Records the instant at which these exceptions became pending.
     pub(crate) fn stamp(&mut self, mut fresh: u128) {
         while fresh != 0 {
             self.pended[fresh.trailing_zeros() as usize] = self.now;
@@ -334,7 +335,7 @@ impl<P: Peripherals> Core<P> {
         self.stats.ran(instructions, cycles);
     }
 
-    /// Code at these addresses is about to run: what fills the pipeline if the program has jumped there, and waits for the flash.
+    /// Extra cycles of code that is about to run: to refill the pipeline after a jump, and to wait for the flash.
     #[inline]
     pub(crate) fn fetch_cycles(&mut self, address: u32, size: u32) -> u32 {
         let in_a_row = std::mem::replace(&mut self.ahead, address + size) == address;
@@ -342,7 +343,7 @@ impl<P: Peripherals> Core<P> {
         refill + self.flash_cycles(address, size, in_a_row)
     }
 
-    /// What the flash lets the core wait for code.
+    /// The cycles that code waits for the flash.
     #[inline]
     fn flash_cycles(&mut self, address: u32, size: u32, in_a_row: bool) -> u32 {
         match &mut self.accelerator {
@@ -353,7 +354,7 @@ impl<P: Peripherals> Core<P> {
         }
     }
 
-    /// A constant is read from flash.
+    /// Adds the wait cycles for a constant in flash.
     pub(crate) fn wait_for_constant(&mut self, address: u32) {
         if let Some(accelerator) = &mut self.accelerator {
             let cycles = accelerator.load(address, self.chip.flash_access());
@@ -361,19 +362,19 @@ impl<P: Peripherals> Core<P> {
         }
     }
 
-    /// An entry of the vector table is read, as code is.
+    /// Adds the wait cycles for an entry of the vector table, which is fetched like code.
     pub(crate) fn wait_for_vector(&mut self, address: u32) {
         let cycles = self.flash_cycles(address, 4, false);
         self.spend(0, cycles);
     }
 
-    /// A register of the chip is accessed.
+    /// Adds the wait cycles for an access to a register of the chip.
     pub(crate) fn wait_for_bus(&mut self, address: u32, load: bool) {
         let cycles = self.estimate().peripheral(self.chip.apb_divider(address), load);
         self.spend(0, cycles);
     }
 
-    /// HCLK is now `hertz`; the cycle counter goes on from where it is.
+    /// Sets HCLK; the cycle counter keeps its value.
     pub(crate) fn set_clock(&mut self, hertz: u64) {
         let count = self.cyccnt();
         self.cycle = Time::of_cycle(hertz.max(1));

@@ -1,16 +1,16 @@
-//! What a block of code costs in cycles of a Cortex-M4, when nothing but the core itself is waited for (technical reference
-//! manual, table 3-1). A jump costs what fills the pipeline, too: that is seen where the next block begins.
+//! The cost of a block of code in cycles of a Cortex-M4, without waits for buses and flash (technical reference manual,
+//! table 3-1). The refill of the pipeline after a jump is counted at the begin of the next block.
 
 use crate::engine::RAM;
 use crate::estimate::Estimate;
 use crate::floats;
 
-/// Instructions and cycles of a block, when it runs to its end.
+/// Instructions and cycles of a block that runs to its end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Cost {
     pub(crate) instructions: u16,
     pub(crate) cycles: u16,
-    /// What else the block does, from [`EXCLUSIVE`], [`FLOATS`] and [`BASEPRI`]: most do nothing of the kind.
+    /// Special features of the block, from [`EXCLUSIVE`], [`FLOATS`] and [`BASEPRI`]: most blocks have none.
     pub(crate) uses: u16,
 }
 
@@ -21,18 +21,18 @@ pub(crate) const FLOATS: u16 = 2;
 /// The block writes BASEPRI.
 pub(crate) const BASEPRI: u16 = 4;
 
-/// The costs of blocks that ran before.
+/// The costs of blocks that have already run.
 #[derive(Clone, Debug)]
 pub(crate) struct Costs {
     pub(crate) estimate: Estimate,
-    /// One place for each address modulo the size of the table.
+    /// One entry for each address modulo the size of the table.
     known: Box<[Known; PLACES]>,
-    /// Pages in which a block begins that is known.
+    /// Pages with the begin of a known block.
     pages: Vec<u32>,
 }
 
 const PLACES: usize = 1 << 14;
-/// In bytes. No block goes on beyond its page, but for its last instruction.
+/// Size in bytes. A block ends at the end of its page; only its last instruction may cross that border.
 const PAGE: u32 = 1 << 12;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,14 +47,14 @@ impl Costs {
         Costs { estimate, known: Box::new([Known::default(); PLACES]), pages: Vec::new() }
     }
 
-    /// The cost of a block, when it is known.
+    /// The cost of a block, if known.
     #[inline]
     pub(crate) fn get(&self, address: u32, size: u32) -> Option<&Cost> {
         let known = &self.known[place(address)];
         (known.address == address && u32::from(known.size) == size).then_some(&known.cost)
     }
 
-    /// Computes the cost of a block and remembers it.
+    /// Computes the cost of a block and stores it.
     pub(crate) fn learn(&mut self, address: u32, code: &[u8]) -> Cost {
         let cost = of_block(code, self.estimate, address >= RAM);
         self.known[place(address)] = Known { address, size: code.len() as u16, cost };
@@ -65,7 +65,7 @@ impl Costs {
         cost
     }
 
-    /// Code has changed, up to `end`. Flash is written much more often than code that ran is.
+    /// Forgets the costs of changed code. Most writes to flash do not change code that has run.
     pub(crate) fn forget(&mut self, start: u32, end: u32) {
         const LONGEST_INSTRUCTION: u32 = 4;
         let changed = start.saturating_sub(LONGEST_INSTRUCTION) / PAGE..end.div_ceil(PAGE);
@@ -86,7 +86,8 @@ fn place(address: u32) -> usize {
     (address >> 1) as usize % PLACES
 }
 
-/// Adds up the Thumb instructions in `code`. Code in RAM comes over the same bus as its data: at most, each word of it is waited for.
+/// Adds up the Thumb instructions in `code`. Code in RAM shares a bus with the data in RAM: in the worst case, each
+/// word waits.
 fn of_block(code: &[u8], estimate: Estimate, in_ram: bool) -> Cost {
     let mut halves = code.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
     let mut cost = Cost::default();
@@ -118,17 +119,17 @@ fn of_block(code: &[u8], estimate: Estimate, in_ram: bool) -> Cost {
     Cost { cycles: cycles as u16, ..cost }
 }
 
-/// LDREX, LDREXB or LDREXH (ARMv7-M, A5.3.6).
+/// Whether the instruction is LDREX, LDREXB or LDREXH (ARMv7-M, A5.3.6).
 fn begins_exclusive(first: u16, second: u16) -> bool {
     first & 0xFFF0 == 0xE850 || first & 0xFFF0 == 0xE8D0 && matches!(second >> 4 & 0xF, 0b0100 | 0b0101)
 }
 
-/// MSR to BASEPRI or BASEPRI_MAX (ARMv7-M, B5.2.3).
+/// Whether the instruction is MSR to BASEPRI or BASEPRI_MAX (ARMv7-M, B5.2.3).
 fn writes_basepri(first: u16, second: u16) -> bool {
     first & 0xFFE0 == 0xF380 && matches!(second & 0xFF, 0x11 | 0x12)
 }
 
-/// One load can follow another without a pause between them; a store waits for the one before where that is still in the buffer.
+/// A load can directly follow another load; a store waits if the previous store is still in the buffer.
 fn memory(load: bool, estimate: Estimate) -> u32 {
     if load { estimate.of(1, 2, 2) } else { estimate.of(1, 1, 2) }
 }
@@ -154,7 +155,7 @@ fn miscellaneous(op: u16, estimate: Estimate) -> u32 {
         0b0100 | 0b0101 | 0b1100 | 0b1101 => 1 + (op & 0x1FF).count_ones(),
         // CPS.
         0b0110 => special(estimate),
-        // IT can be carried out together with the instruction before.
+        // IT can execute together with the previous instruction.
         0b1111 if op & 0xF != 0 => estimate.of(0, 1, 1),
         _ => 1,
     }
@@ -165,7 +166,7 @@ fn special(estimate: Estimate) -> u32 {
     estimate.of(1, 1, 2)
 }
 
-/// Cycles of a 32-bit instruction that is not the floating-point unit's.
+/// Cycles of a 32-bit instruction outside the floating-point unit.
 fn wide(first: u16, second: u16, estimate: Estimate) -> u32 {
     let load = first & 1 << 4 != 0;
     match (first >> 11 & 3, first >> 9 & 3) {
@@ -192,7 +193,7 @@ fn wide(first: u16, second: u16, estimate: Estimate) -> u32 {
 mod tests {
     use super::*;
 
-    /// The cycles of some instructions in flash, at best, as modelled and at worst.
+    /// The cycles of some instructions in flash, for each estimate: best, modelled and worst.
     fn cycles(ops: &[u32]) -> [u16; 3] {
         let halves =
             ops.iter().flat_map(|&op| if op > 0xFFFF { vec![op >> 16, op & 0xFFFF] } else { vec![op] });

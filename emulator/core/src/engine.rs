@@ -1,4 +1,4 @@
-//! The CPU library: memory map, hooks and registers. What it stops for is told in `Core::halt`.
+//! The CPU library: memory map, hooks and registers. `Core::halt` holds the reason of a stop.
 
 use chip::{Effect, Peripherals};
 use unicorn_engine::{
@@ -14,19 +14,19 @@ use crate::{alignment, ppb, stepping};
 
 pub(crate) type Cpu<P> = Unicorn<'static, Core<P>>;
 
-/// A page of our own, outside everything the chip has, for code that the emulator itself runs.
+/// A page for the emulator's own code, outside everything that the chip has.
 pub(crate) const HIDDEN: u64 = 0x1F00_0000;
-/// Where the library ends a run by itself: no program gets there.
+/// The end address of every run; no program reaches it.
 pub(crate) const NOWHERE: u64 = 1 << 32;
 /// `clrex; wfi`
 const CLREX: [u8; 6] = [0xBF, 0xF3, 0x2F, 0x8F, 0x30, 0xBF];
 
-/// Whatever lies below is flash.
+/// The first address above flash.
 pub(crate) const RAM: u32 = 0x2000_0000;
 
 /// YIELD and WFE.
 const HINTS: [u16; 2] = [0xBF10, 0xBF20];
-/// The upper byte of UDF.
+/// The upper byte of the instruction UDF.
 const UDF: u16 = 0xDE;
 
 /// Makes a CPU with the memory of `model`.
@@ -35,12 +35,12 @@ pub(crate) fn new<P: Peripherals + 'static>(model: &Model, core: Core<P>) -> Res
     cpu.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
     let length = |range: &std::ops::Range<u32>| u64::from(range.end - range.start);
     let (flash, ram) = (cpu.get_data().memory.flash.pointer(), cpu.get_data().memory.ram.pointer());
-    // SAFETY: both blocks have the length of their range and live in the core, which the library's handle does not outlive.
+    // SAFETY: both blocks have the length of their range and live in the core, which outlives the library's handle.
     unsafe {
         cpu.mem_map_ptr(model.flash.start.into(), length(&model.flash), Prot::READ | Prot::EXEC, flash)?;
         cpu.mem_map_ptr(model.ram.start.into(), length(&model.ram), Prot::ALL, ram)?;
     }
-    // Only this makes the library drop stores: to map memory so does not.
+    // This call is needed: the mapping alone does not make the library drop stores.
     cpu.mem_protect(model.flash.start.into(), length(&model.flash), Prot::READ | Prot::EXEC)?;
     cpu.mem_map(HIDDEN, 0x1000, Prot::READ | Prot::EXEC)?;
     cpu.mem_write(HIDDEN, &CLREX)?;
@@ -59,7 +59,7 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
     cpu.add_insn_invalid_hook(on_invalid)?;
     cpu.ctl_set_tlb_type(TlbType::VIRTUAL)?;
     cpu.add_tlb_hook(1, 0, on_page)?;
-    // Not for RAM: where such a hook is, the library looks at every store.
+    // RAM gets no hook: with one, the library would check every store.
     let (below, above) = (u64::from(model.ram.start) - 1, u64::from(model.ram.end));
     for (first, last) in [(0, below), (above, u64::from(u32::MAX))] {
         cpu.add_mem_hook(HookType::MEM_UNMAPPED, first, last, on_unmapped)?;
@@ -69,13 +69,13 @@ fn add_hooks<P: Peripherals + 'static>(cpu: &mut Cpu<P>, model: &Model) -> Resul
     Ok(())
 }
 
-/// Has every instruction charged by itself from now on.
+/// From now on, counts the cycles of every instruction by itself.
 pub(crate) fn step_instructions<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
     cpu.add_code_hook(1, 0, on_instruction)?;
     Ok(cpu.ctl_flush_tb()?)
 }
 
-/// The clock of the mode in which interrupts come between any two instructions.
+/// The hook of the mode in which interrupts come between any two instructions.
 fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
     let place = address as u32;
     let Some(stepping) = &mut cpu.get_data_mut().stepping else { return };
@@ -101,7 +101,7 @@ fn on_instruction<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size
     }
 }
 
-/// Has constants that are read from flash waited for.
+/// Counts wait cycles for constants in flash.
 pub(crate) fn watch_constants<P: Peripherals + 'static>(
     cpu: &mut Cpu<P>,
     model: &Model,
@@ -115,14 +115,15 @@ pub(crate) fn watch_constants<P: Peripherals + 'static>(
     Ok(cpu.ctl_flush_tb()?)
 }
 
-/// Has every instruction looked at by the [`crate::watch::Watch`].
+/// Calls the [`crate::watch::Watch`] before every instruction.
 pub(crate) fn watch<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<UcHookId, Error> {
     let hook = cpu.add_code_hook(1, 0, on_watched)?;
     cpu.ctl_flush_tb()?;
     Ok(hook)
 }
 
-/// What stops for something else comes by again.
+/// The hook for watched points. When the program has stopped for another reason, the instruction comes here again
+/// later.
 fn on_watched<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u32) {
     let core = cpu.get_data_mut();
     if address & !0xFFF == HIDDEN || core.halt.is_some() {
@@ -136,7 +137,7 @@ fn on_watched<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, address: u64, size: u3
     }
 }
 
-/// R0 to R14 by number.
+/// The value of R0 to R14 by number.
 pub(crate) fn core_register<P>(cpu: &Unicorn<Core<P>>, number: u16) -> u32 {
     let register = match number {
         0..=12 => RegisterARM::R0 as i32 + i32::from(number),
@@ -146,19 +147,19 @@ pub(crate) fn core_register<P>(cpu: &Unicorn<Core<P>>, number: u16) -> u32 {
     cpu.reg_read(register).unwrap_or(0) as u32
 }
 
-/// Lets loads from flash fail while it is busy, or lets them through again.
+/// Makes loads from a busy flash fail, or allows them again.
 pub(crate) fn close_flash<P: Peripherals>(cpu: &mut Cpu<P>, model: &Model, closed: bool) {
     if cpu.get_data().flash_closed != closed {
         let protection = if closed { Prot::EXEC } else { Prot::READ | Prot::EXEC };
         let _ = cpu.mem_protect(model.flash.start.into(), model.flash.len() as u64, protection);
-        // The library goes by what it has cached of the pages.
+        // The library has cached the rights of the pages.
         let _ = cpu.ctl_flush_tlb();
         cpu.get_data_mut().flash_closed = closed;
     }
 }
 
 fn on_interrupt<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, number: u32) {
-    // QEMU's numbers of exceptions, target/arm/cpu.h.
+    // The numbers are QEMU's, from target/arm/cpu.h.
     cpu.get_data_mut().stop_for(match number {
         2 => Halt::SupervisorCall,
         7 => Halt::Breakpoint,
@@ -168,8 +169,8 @@ fn on_interrupt<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, number: u32) {
     let _ = cpu.emu_stop();
 }
 
-/// WFE and YIELD reach us as invalid instructions, with the program counter already behind them. They are hints:
-/// going on is always allowed.
+/// The library reports WFE and YIELD as invalid instructions, with the program counter already behind them. Both are
+/// hints, so the program may always continue.
 fn on_invalid<P>(cpu: &mut Unicorn<Core<P>>) -> bool {
     let pc = cpu.pc_read().unwrap_or(0) & !1;
     let op = |address: u64| {
@@ -187,7 +188,7 @@ fn on_unmapped<P>(cpu: &mut Unicorn<Core<P>>, kind: MemType, address: u64, _: us
     false
 }
 
-/// A store into flash: the flash controller decides what becomes of it; the raw store is dropped.
+/// A store into flash: the flash controller decides the effect, and the raw store is dropped.
 fn on_flash_write<P: Peripherals>(
     cpu: &mut Unicorn<Core<P>>,
     _: MemType,
@@ -205,7 +206,8 @@ fn on_flash_write<P: Peripherals>(
     true
 }
 
-/// After a store into the chip or the system space: effects and interrupts, or a fault when nothing answered.
+/// Ends a store into the chip or the system space: handles effects and interrupts, or a fault when no register
+/// answered.
 fn finish<P: Peripherals>(core: &mut Core<P>, address: u32, answer: Option<()>) {
     match answer {
         None if core.scb.buffers(address) => core.lost_store = Some(address),
@@ -215,7 +217,7 @@ fn finish<P: Peripherals>(core: &mut Core<P>, address: u32, answer: Option<()>) 
     core.settle();
 }
 
-/// After a load from the chip, which seldom changes anything.
+/// Ends a load from the chip. A load seldom changes anything.
 fn finish_load<P: Peripherals>(core: &mut Core<P>, address: u32, answered: bool) {
     if !answered {
         core.stop_for(Halt::DataFault(address));
@@ -298,7 +300,7 @@ fn map_system<P: Peripherals + 'static>(cpu: &mut Cpu<P>) -> Result<(), Error> {
         let result = word.and_then(|word| core.ppb_write(address & !3, word));
         finish(core, address, result);
         if (ppb::MPU..=ppb::MPU_END).contains(&(address & !3)) {
-            // Pages are asked for anew, and what was translated is forgotten before the next block.
+            // The rights of pages must be queried again, and translated code is dropped before the next block.
             core.memory.protection_is_new = true;
             core.stop_for(Halt::Attention);
             let _ = cpu.ctl_flush_tlb();
@@ -312,20 +314,21 @@ fn ipsr<P>(cpu: &Unicorn<Core<P>>) -> u32 {
     cpu.reg_read(RegisterARM::IPSR).unwrap_or(0) as u32 & 0x1FF
 }
 
-/// Thread mode without privileges reaches nothing of the system space (ARMv7-M, B3.1.1).
+/// Whether the access is unprivileged: it then reaches no register of the system space (ARMv7-M, B3.1.1).
 fn is_unprivileged<P>(cpu: &Unicorn<Core<P>>, ipsr: u32) -> bool {
     ipsr == 0 && cpu.reg_read(RegisterARM::CONTROL).unwrap_or(0) & 1 != 0
 }
 
-/// A byte or halfword put into its word; the priority registers are written so.
+/// A byte or halfword merged into its word; the priority registers are written in this way.
 fn merged<P: Peripherals>(core: &mut Core<P>, address: u32, size: usize, value: u32) -> Option<u32> {
     let shift = 8 * (address & 3);
     let mask = ((1_u32 << (8 * size)) - 1) << shift;
     Some(core.ppb_read(address & !3, 0)? & !mask | value << shift & mask)
 }
 
-/// What may be done with a page, when the library asks. Stores into a page from which code may run are several times dearer,
-/// because the library looks whether they change code: so a page of RAM has code only once code was fetched from it.
+/// The rights of a page, when the library asks for them. The library checks whether stores into a page with code change
+/// the code, which makes these stores several times slower. So a page of RAM counts as code only after code was fetched
+/// from it.
 fn on_page<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType) -> Option<TlbEntry> {
     if !matches!(kind, MemType::FETCH) {
         close_it_block(cpu);
@@ -345,9 +348,9 @@ fn on_page<P: Peripherals>(cpu: &mut Unicorn<Core<P>>, page: u64, kind: MemType)
     Some(TlbEntry { paddr: page, perms })
 }
 
-/// Before it asks for a page or calls a hook the library puts the IT state of the access into the CPU, where the code that is translated does
-/// not expect it: the next block would begin with it and skip instructions. What goes on after the access, or faults at it, has
-/// its IT state elsewhere.
+/// Before the library asks for a page or calls a hook, it writes the IT state of the access into the CPU. Translated
+/// code does not expect this state: the next block would begin with it and skip instructions. The state can be cleared,
+/// because code that continues or faults after the access keeps its IT state elsewhere.
 fn close_it_block<P>(cpu: &mut Unicorn<Core<P>>) {
     const IT: u64 = 0x0600_FC00;
     let xpsr = cpu.reg_read(RegisterARM::XPSR).unwrap_or(0);
@@ -356,7 +359,7 @@ fn close_it_block<P>(cpu: &mut Unicorn<Core<P>>) {
     }
 }
 
-/// RAM is data again, once another program has begun and runs from flash.
+/// Treats RAM as data again, when a new program has begun and runs from flash.
 pub(crate) fn forget_code_in_ram<P: Peripherals>(cpu: &mut Cpu<P>, pc: u32) {
     let memory = &mut cpu.get_data_mut().memory;
     if !memory.code_is_old || pc >= RAM {
@@ -364,23 +367,24 @@ pub(crate) fn forget_code_in_ram<P: Peripherals>(cpu: &mut Cpu<P>, pc: u32) {
     }
     memory.code_is_old = false;
     if !memory.code_in_ram.is_empty() {
-        // What was translated from RAM is forgotten: from now on nobody looks whether it changes.
+        // Drop the code translated from RAM: from now on no check notices its changes.
         let ram = memory.ram.range.clone();
         let _ = cpu.ctl_remove_cache(ram.start.into(), ram.end.into());
-        // To look for it is to fetch, for the library.
+        // To the library, a search for translated code counts as a fetch.
         cpu.get_data_mut().memory.code_in_ram.clear();
         let _ = cpu.ctl_flush_tlb();
         cpu.get_data_mut().costs.forget(ram.start, ram.end);
     }
 }
 
-/// Another protection holds: what was translated from RAM may be data from now on, of which nobody looks whether it changes.
+/// Applies a changed protection: code translated from RAM may be data from now on, and no check would notice its
+/// changes.
 pub(crate) fn follow_protection<P: Peripherals>(cpu: &mut Cpu<P>) {
     let core = cpu.get_data_mut();
     if !std::mem::take(&mut core.memory.protection_is_new) {
         return;
     }
-    // To look for code is to fetch, for the library.
+    // To the library, a search for translated code counts as a fetch.
     let mpu = std::mem::take(&mut core.scb.mpu);
     let (flash, ram) = (core.memory.flash.range.clone(), core.memory.ram.range.clone());
     let is_stale = std::mem::take(&mut core.memory.code_is_stale) && !core.lacks(Mechanism::Retranslation);
@@ -394,8 +398,8 @@ pub(crate) fn follow_protection<P: Peripherals>(cpu: &mut Cpu<P>) {
     let _ = cpu.ctl_flush_tlb();
 }
 
-/// Clears the exclusive monitor, as exception entry and return do (ARMv7-M, A3.4). Where no exclusive access has begun there
-/// is nothing to clear.
+/// Clears the exclusive monitor, as exception entry and return do (ARMv7-M, A3.4). Does nothing if no exclusive access
+/// has begun.
 pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Error> {
     let begun = std::mem::take(&mut cpu.get_data_mut().exclusive);
     if begun && !cpu.get_data().lacks(Mechanism::ExclusiveMonitor) {
@@ -407,13 +411,14 @@ pub(crate) fn clear_monitor<P: Peripherals>(cpu: &mut Cpu<P>) -> Result<(), Erro
     Ok(())
 }
 
-/// Writes memory behind the back of the CPU and forgets what was translated from it.
+/// Writes memory without the CPU and drops the code translated from it.
 pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]) -> Result<(), Error> {
     let core = cpu.get_data_mut();
     core.memory.write(address, bytes).ok_or(uc_error::WRITE_UNMAPPED)?;
     core.flash_changes += u64::from(address < RAM);
     let has_code = address < RAM || !core.memory.code_in_ram.is_empty();
-    // Where no code may run the library finds none to forget: it does so when the protection changes.
+    // In memory without execute rights the library finds no translated code; the code is dropped when the protection
+    // changes.
     let is_protected = !core.scb.mpu.allows_code(address);
     core.memory.code_is_stale |= has_code && is_protected;
     if has_code && !is_protected && !core.lacks(Mechanism::Retranslation) {
@@ -426,7 +431,7 @@ pub(crate) fn store<P: Peripherals>(cpu: &mut Cpu<P>, address: u32, bytes: &[u8]
     Ok(())
 }
 
-/// Carries out an effect on memory; gives back any other.
+/// Carries out an effect on memory; returns any other effect.
 pub(crate) fn apply<P: Peripherals>(cpu: &mut Cpu<P>, effect: Effect) -> Result<Option<Effect>, Error> {
     match effect {
         Effect::Store { address, bytes } => store(cpu, address, &bytes).map(|()| None),

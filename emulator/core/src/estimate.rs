@@ -1,5 +1,5 @@
-//! Three answers to how many cycles something takes. The manuals give ranges where a cycle depends on what is not modelled: the
-//! pipeline, the edge of a slower clock, what the buffers still hold.
+//! Three estimates of cycle counts. The manuals give ranges where a count depends on details that are not modelled: the
+//! pipeline, the edge of a slower clock, the content of the buffers.
 //!
 //! Sources: Cortex-M4 technical reference manual, tables 3-1 and 7-1 and section 3.9; AMBA 3 APB, 2.1; RM0390, 3.4.
 
@@ -8,20 +8,20 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// Which end of a range is counted.
+/// The end of the published range that is counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimate {
     /// The fewest cycles of each instruction, and a flash that never lets the core wait.
     Best,
-    /// What is most likely of each instruction, and a flash that never lets the core wait.
+    /// The most likely cycles of each instruction, and a flash that never lets the core wait.
     #[default]
     Modelled,
-    /// The most cycles of each instruction, and a flash that is waited for whenever its caches do not have what is asked for.
+    /// The most cycles of each instruction, and waits for the flash at each miss of its caches.
     Worst,
 }
 
 impl Estimate {
-    /// The one of three figures.
+    /// The figure for this estimate.
     #[inline]
     pub(crate) fn of(self, best: u32, modelled: u32, worst: u32) -> u32 {
         match self {
@@ -31,13 +31,14 @@ impl Estimate {
         }
     }
 
-    /// To fill the pipeline after a jump.
+    /// Cycles to refill the pipeline after a jump.
     pub(crate) fn refill(self) -> u32 {
         self.of(1, 2, 3)
     }
 
-    /// What an access to a peripheral takes longer than one to RAM: two cycles of the bus for the transfer, up to two for the one
-    /// before that was buffered, and up to one for the edge. `divider` is HCLK by the clock of the APB bus; AHB has none.
+    /// Extra cycles of an access to a peripheral, compared to RAM: two cycles of the bus for the transfer, up to two
+    /// for the previous buffered transfer, and up to one for the edge. `divider` is HCLK divided by the clock of the
+    /// APB bus; AHB has none.
     pub(crate) fn peripheral(self, divider: Option<u32>, load: bool) -> u32 {
         match divider {
             Some(divider) if load => self.of(2 * divider - 1, 3 * divider, 5 * divider),
@@ -46,24 +47,25 @@ impl Estimate {
         }
     }
 
-    /// The entry of an exception. At most, its handler saves the floating-point registers that the frame leaves room for.
+    /// Cycles of an exception entry. In the worst case, the handler also saves the floating-point registers for which
+    /// the frame has space.
     pub(crate) fn entry(self, floats: bool) -> u32 {
         12 + self.of(0, 0, if floats { FLOATS_OF_FRAME } else { 0 })
     }
 
-    /// The return of an exception to the program.
+    /// Cycles of an exception return to the program.
     pub(crate) fn exit(self, floats: bool) -> u32 {
         self.of(10, 12, 12 + if floats { FLOATS_OF_FRAME } else { 0 })
     }
 }
 
-/// Cycles of the change from one handler to the next.
+/// Cycles from one handler to the next.
 pub(crate) const TAIL_CHAIN: u32 = 6;
 
-/// S0 to S15 and FPSCR, a cycle each.
+/// Cycles to save S0 to S15 and FPSCR: one each.
 const FLOATS_OF_FRAME: u32 = 17;
 
-/// A word that is none of the three.
+/// The text names none of the three estimates.
 #[derive(Debug, Error)]
 #[error("cycles are best, modelled or worst")]
 pub struct NoEstimate;

@@ -11,7 +11,7 @@ impl Exception {
     pub const THREAD: Exception = Exception(0);
     /// Non-maskable interrupt.
     pub const NMI: Exception = Exception(2);
-    /// The fault of last resort.
+    /// HardFault.
     pub const HARD_FAULT: Exception = Exception(3);
     /// Memory management fault.
     pub const MEM_MANAGE: Exception = Exception(4);
@@ -25,7 +25,7 @@ impl Exception {
     pub const PEND_SV: Exception = Exception(14);
     /// The core's own timer.
     pub const SYS_TICK: Exception = Exception(15);
-    /// How many numbers there are: 16 of the system and 112 interrupts.
+    /// Number of exception numbers: 16 of the system and 112 interrupts.
     pub const COUNT: usize = 128;
 
     /// The exception of an interrupt line.
@@ -33,7 +33,7 @@ impl Exception {
         Exception(16 + line)
     }
 
-    /// The interrupt line, for an interrupt.
+    /// The interrupt line; `None` for a system exception.
     pub const fn line(self) -> Option<u8> {
         self.0.checked_sub(16)
     }

@@ -1,4 +1,4 @@
-//! Faults: which exception they raise, and what the status registers say.
+//! Faults: the exceptions that they raise, and the bits of the status registers.
 
 use chip::Peripherals;
 use unicorn_engine::RegisterARM;
@@ -10,18 +10,18 @@ use crate::machine::Machine;
 use crate::mechanism::Mechanism;
 use crate::scb::{Scb, cfsr};
 
-/// A fault as it was seen.
+/// A fault as it was detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The instruction; for a load from a peripheral and for a store the beginning of the next block.
+    /// The address of the instruction; for a load from a peripheral and for a store, the start of the next block.
     pub pc: u32,
     /// The link register.
     pub lr: u32,
-    /// The address of a data access; the program does not learn that of a store.
+    /// The address of a data access. For a store, the program does not see this address.
     pub address: Option<u32>,
-    /// Its bits in CFSR.
+    /// The bits of the fault in CFSR.
     pub status: u32,
-    /// It is an exception that became a HardFault because it could not be taken.
+    /// Whether the fault became a HardFault because its own exception could not be taken.
     pub escalated: bool,
 }
 
@@ -34,7 +34,7 @@ impl Fault {
         Fault { address: Some(address), ..Fault::new(pc, cfsr::PRECISERR) }
     }
 
-    /// A store that nothing has answered, seen some instructions later.
+    /// A store to an address without memory or register, detected some instructions later.
     pub(crate) fn lost_store(pc: u32, address: u32) -> Fault {
         Fault { address: Some(address), ..Fault::new(pc, cfsr::IMPRECISERR) }
     }
@@ -43,17 +43,17 @@ impl Fault {
         Fault::new(pc, cfsr::IBUSERR)
     }
 
-    /// The memory protection unit lets no code run from there.
+    /// The memory protection unit forbids code at this address.
     pub(crate) fn execution(pc: u32) -> Fault {
         Fault::new(pc, cfsr::IACCVIOL)
     }
 
-    /// A usage fault with this status.
+    /// A usage fault with these status bits.
     pub(crate) fn usage(pc: u32, status: u32) -> Fault {
         Fault::new(pc, status)
     }
 
-    /// SVC where its exception cannot be taken: it has no status but that of the escalation.
+    /// SVC whose exception cannot be taken: no status bit but that of the escalation.
     pub(crate) fn refused_call(pc: u32) -> Fault {
         Fault { escalated: true, ..Fault::new(pc, 0) }
     }
@@ -80,7 +80,7 @@ impl Fault {
 }
 
 impl<P: Peripherals + 'static> Machine<P> {
-    /// A fault of the instruction at hand: its exception is taken at once, or the core locks up.
+    /// A fault of the current instruction: its exception is taken at once, or the core locks up.
     pub(crate) fn take_fault(&mut self, fault: Fault) {
         let fault = Fault { lr: self.register(RegisterARM::LR), ..fault };
         self.record(&fault);
@@ -92,7 +92,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// A fault while the context was saved for `exception`: whichever has the higher priority is taken, the other
+    /// A fault while the context was saved for `exception`: the exception with the higher priority is taken, the other
     /// stays pending (ARMv7-M, B1.5.10).
     pub(crate) fn derived(&mut self, fault: Fault, exception: Exception) -> Exception {
         self.record(&fault);
@@ -116,7 +116,8 @@ impl<P: Peripherals + 'static> Machine<P> {
         if fault.status == 0 { Exception::HARD_FAULT } else { Scb::fault_of(fault.status) }
     }
 
-    /// The fault's own exception when it is enabled and may preempt, else HardFault, else nothing is left.
+    /// The fault's own exception if it is enabled and can preempt, otherwise HardFault; `None` if HardFault cannot
+    /// preempt either.
     fn escalated(&mut self, wanted: Exception, masks: crate::nvic::Masks) -> Option<Exception> {
         let core = self.cpu.get_data_mut();
         if wanted != Exception::HARD_FAULT && core.scb.enables(wanted) && core.nvic.may_preempt(wanted, masks)

@@ -1,20 +1,21 @@
-//! The floating-point unit: cycles of its instructions (Cortex-M4 technical reference manual, table 7-1), and which of them wait for
-//! the result of the one before.
+//! The floating-point unit: cycles of its instructions (Cortex-M4 technical reference manual, table 7-1), and
+//! instructions that wait for the result of the previous one.
 
-/// An instruction of coprocessors 10 and 11.
+/// Whether the instruction belongs to coprocessors 10 and 11.
 pub(crate) fn is_floating(first: u16, second: u16) -> bool {
     first & 0xEC00 == 0xEC00 && second >> 9 & 7 == 0b101
 }
 
-/// Cycles. Of an access to one register the low byte is an offset, of one to several it is their number.
+/// Cycles of the instruction. The low byte of a load or store is an offset for one register, and the number of
+/// registers for several.
 pub(crate) fn cycles(first: u16, second: u16) -> u32 {
     let (up, down) = (first & 1 << 7 != 0, first & 1 << 5 != 0);
     match first >> 8 & 0xF {
         0b1101 if up => 2,
         0b1100 | 0b1101 if up || down => 1 + u32::from(second & 0xFF),
-        // Two core registers at once.
+        // A transfer of two core registers.
         0b1100 => 2,
-        // Between a core register and one of the FPU.
+        // A transfer between a core register and one of the FPU.
         0b1110 if is_transfer(second) => 1,
         // VDIV, VSQRT, VMLA.
         0b1110 if first & 0x00B0 == 0x0080 => 14,
@@ -25,12 +26,12 @@ pub(crate) fn cycles(first: u16, second: u16) -> u32 {
     }
 }
 
-/// The register that an arithmetic instruction leaves its result in. The next instruction waits a cycle for it.
+/// The result register of an arithmetic instruction. The next instruction waits one cycle for this register.
 pub(crate) fn result(first: u16, second: u16) -> Option<u16> {
     let is_arithmetic = match (first >> 8 & 0xF, has_one_operand(first)) {
         (0b1110, _) if is_transfer(second) => false,
         (0b1110, false) => true,
-        // VSQRT and conversions, but no move, sign or comparison.
+        // VSQRT and conversions, but not moves, sign changes or comparisons.
         (0b1110, true) => is_square_root(first, second) || matches!(first & 0xF, 2 | 3 | 7..),
         _ => false,
     };
@@ -46,7 +47,7 @@ pub(crate) fn reads(first: u16, second: u16, register: u16) -> bool {
         // VMOV to a core register.
         0b1110 if is_transfer(second) => first & 1 << 4 != 0 && register == n,
         0b1110 if has_one_operand(first) => register == m || matches!(first & 0xF, 4 | 5) && register == d,
-        // VADD, VSUB, VMUL, VDIV; those that add to their destination read that, too.
+        // VADD, VSUB, VMUL, VDIV; an instruction that accumulates into its destination also reads the destination.
         0b1110 => register == n || register == m || cycles(first, second) == 3 && register == d,
         // VSTR of one register.
         0b1101 if first & 1 << 4 == 0 => register == d,

@@ -1,23 +1,23 @@
-//! What happened to a machine that its user should know.
+//! Incidents of a machine: faults, resets, and broken rules.
 
 use chip::Breach;
 
 use crate::fault::Fault;
 
-/// A reset or a fault.
+/// An incident.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Incident {
     /// A fault was taken.
     Fault(Fault),
-    /// The program asked for a reset.
+    /// The program requested a reset.
     SoftwareReset,
     /// The program broke a rule of the chip.
     Breach {
         /// The rule.
         rule: Breach,
-        /// The code that did it: its block, or after [`crate::Machine::interleave`] the instruction.
+        /// The code that broke the rule: the block or, after [`crate::Machine::interleave`], the instruction.
         pc: u32,
     },
-    /// The chip reset itself: a watchdog.
+    /// The chip reset itself through a watchdog.
     ChipReset,
 }

@@ -1,21 +1,21 @@
 //! An emulated Cortex-M4 with its NVIC that runs ELF files in virtual time.
 //!
-//! The CPU library carries out instructions; everything of the architecture around them is here: exceptions, the
-//! interrupt controller, the system control space, and time. Time passes block by block, at the cost that `cost`
-//! models, and stands still for nobody: a sleeping core jumps to the next event. The same input gives the same run,
-//! bit for bit; [`Stats::trace`] tells two runs apart.
+//! The CPU library executes instructions. This crate adds the rest of the architecture: exceptions, the interrupt
+//! controller, the system control space, and time. Time advances block by block, by the cost that `cost` computes; a
+//! sleeping core jumps to the next event. The same input gives the same run, bit for bit; [`Stats::trace`] shows
+//! whether two runs are equal.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
-//! | `machine`, `model`, `incident` | the machine as its user sees it, and its run loop |
+//! | `machine`, `model`, `incident` | the machine with its public interface, and its run loop |
 //! | `engine`, `memory` | the CPU library: memory map, hooks, registers; flash and RAM |
-//! | `core` | what hooks and run loop share |
+//! | `core` | the state that hooks and run loop share |
 //! | `context`, `fault`, `exception` | entry, return and tail-chaining; faults and their escalation |
 //! | `nvic`, `systick`, `scb`, `mpu`, `ppb` | the registers of the core |
-//! | `stepping`, `alignment` | the mode in which interrupts come between any two instructions; what only that mode notices |
+//! | `stepping`, `alignment` | the mode in which interrupts come between any two instructions; faults found only there |
 //! | `watch` | stopping before an instruction, skipping it, flipping a bit of a register, going back |
 //! | `cost`, `floats`, `estimate`, `accelerator` | cycles: of a block, of the floating-point unit, their range, of the flash |
-//! | `stats`, `profile` | what was counted, and where |
+//! | `stats`, `profile` | the counters, and the counts of each block |
 //! | `loader` | ELF files |
 //!
 //! # Simplifications
@@ -25,14 +25,18 @@
 //! * Floating-point registers are stacked at exception entry, never lazily; a higher interrupt that arrives within the
 //!   twelve cycles of an entry nests instead of going first.
 //! * A refused load from a peripheral is a precise bus fault with the right address, but with the program counter of
-//!   the next block. Loads from unmapped memory have the exact one. A refused store is an imprecise fault at the next block.
-//! * Flash becomes busy with the end of the block that has stored to it. A load from busy flash in an IT block is done once more from the start of the block.
-//! * The MPU says from where code runs, page by page of a kilobyte, in handlers of faults too; a region that protects data is refused.
+//!   the next block. A load from unmapped memory has the exact program counter. A refused store is an imprecise fault
+//!   at the next block.
+//! * Flash becomes busy at the end of the block that has stored to it. A load from busy flash in an IT block is
+//!   repeated from the start of the block.
+//! * The MPU only controls where code runs, page by page of a kilobyte, in fault handlers too; a region that protects
+//!   data is refused.
 //! * WFE is a hint that never sleeps; there is no bit-band alias of RAM and no alias of flash at address 0.
 //! * Where CPACR does not allow the floating-point unit, the fault comes at the start of the block that uses it.
-//! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and what CCR traps, a division by zero and unaligned accesses, fault after
-//!   [`Machine::interleave`] only, and not in an IT block; without it a program that sets the traps is reported ([`chip::Breach`]).
-//! * Cycles have a range ([`Estimate`]): the pipeline and the contention for the buses are not followed.
+//! * Unaligned LDM, LDRD, VLDR, LDREX and the like, and the accesses and divisions that CCR traps, fault only after
+//!   [`Machine::interleave`], and not in an IT block. Without that mode a program that sets the traps is reported
+//!   ([`chip::Breach`]).
+//! * Cycle counts have a range ([`Estimate`]): the pipeline and the contention for the buses are not modelled.
 
 mod accelerator;
 mod alignment;

@@ -1,4 +1,4 @@
-//! ELF files.
+//! Reading of ELF files.
 
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionKind, elf};
@@ -8,18 +8,18 @@ use crate::model::{Error, Model};
 /// A program, ready to be written into flash.
 #[derive(Clone, Debug)]
 pub struct Image {
-    /// What goes into flash.
+    /// The segments to write into flash.
     pub segments: Vec<Segment>,
-    /// The address of `_SEGGER_RTT`, where the log is.
+    /// The address of `_SEGGER_RTT`, the control block of the log.
     pub rtt: Option<u32>,
-    /// Bytes of flash it takes.
+    /// Bytes of flash that the program takes.
     pub flash_size: u32,
-    /// Bytes of RAM that its variables take, stack not counted.
+    /// Bytes of RAM that the program's variables take, without the stack.
     pub ram_size: u32,
 }
 
 impl Image {
-    /// Whether a flash array has this program in it.
+    /// Whether a flash array contains this program.
     pub fn is_in(&self, model: &Model, flash: &[u8]) -> bool {
         self.segments.iter().all(|Segment { address, bytes }| {
             let start = (address - model.flash.start) as usize;
@@ -31,9 +31,9 @@ impl Image {
 /// Bytes at an address.
 #[derive(Clone, Debug)]
 pub struct Segment {
-    /// Where.
+    /// The address of the first byte.
     pub address: u32,
-    /// What.
+    /// The bytes.
     pub bytes: Vec<u8>,
 }
 

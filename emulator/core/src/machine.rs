@@ -21,21 +21,21 @@ use crate::scb::cfsr;
 use crate::stats::Stats;
 use crate::stepping::{self, Stepping};
 
-/// Why [`Machine::run_until`] came back.
+/// The reason why [`Machine::run_until`] returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The time is reached.
     Reached,
-    /// The chip wants the world to look at the bus.
+    /// The chip has a change that the bus must see.
     Poked,
-    /// A fault inside of a fault: the core stands still until a reset.
+    /// A fault inside of a fault: the core stops until a reset.
     Lockup {
-        /// Where it happened.
+        /// The program counter.
         pc: u32,
     },
-    /// The supply is gone, as a test asked for.
+    /// The supply failed, as a test requested.
     PowerCut,
-    /// A point is reached that [`Machine::watch`] was given.
+    /// A watched point of [`Machine::watch`] is reached.
     Watched,
 }
 
@@ -48,22 +48,22 @@ pub struct Machine<P: Peripherals + 'static> {
     sleeping: bool,
     locked: Option<u32>,
     stall: Time,
-    /// A load waits for flash: until then nothing else happens in the core.
+    /// A load waits for flash; the core does nothing else until the load ends.
     loading: bool,
     incidents: Vec<(Time, Incident)>,
     /// The hook of [`Machine::watch`].
     pub(crate) watching: Option<UcHookId>,
     /// The program has stopped at a watched point.
     at_point: bool,
-    /// What the program has printed by semihosting; `None` without a debugger.
+    /// Output of the program by semihosting; `None` without a debugger.
     pub(crate) printed: Option<Vec<u8>>,
 }
 
 impl<P: Peripherals + 'static> Machine<P> {
-    /// A machine without power, its flash erased.
+    /// A machine without power and with erased flash.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn new(model: Model, peripherals: P) -> Result<Machine<P>, Error> {
         let mut cpu = engine::new(&model, Core::new(peripherals, &model))?;
         engine::store(&mut cpu, model.flash.start, &vec![0xFF; model.flash.len()])?;
@@ -86,7 +86,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     /// Writes the segments of an ELF file into flash, as a debug probe does.
     ///
     /// # Errors
-    /// [`Error::Elf`] for anything but a program for this chip; nothing is written then.
+    /// [`Error::Elf`] for any file but a program for this chip; nothing is written then.
     pub fn load_elf(&mut self, file: &[u8]) -> Result<Image, Error> {
         let image = loader::parse(file, &self.model)?;
         for segment in &image.segments {
@@ -95,15 +95,15 @@ impl<P: Peripherals + 'static> Machine<P> {
         Ok(image)
     }
 
-    /// Reads an ELF file for this chip without writing it: what [`Machine::load_elf`] would write.
+    /// Reads an ELF file for this chip without writing it to flash, unlike [`Machine::load_elf`].
     ///
     /// # Errors
-    /// [`Error::Elf`] for anything but a program for this chip.
+    /// [`Error::Elf`] for any file but a program for this chip.
     pub fn parse_elf(&self, file: &[u8]) -> Result<Image, Error> {
         loader::parse(file, &self.model)
     }
 
-    /// How often the flash array has changed: a program's stores, erasures, and what was loaded.
+    /// Number of changes of the flash array: by stores and erases of the program, and by loading.
     pub fn flash_changes(&self) -> u64 {
         self.cpu.get_data().flash_changes
     }
@@ -115,7 +115,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         bytes
     }
 
-    /// Replaces the flash array, from its start.
+    /// Writes `contents` to the start of the flash array.
     ///
     /// # Errors
     /// When `contents` is longer than the array.
@@ -123,7 +123,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         engine::store(&mut self.cpu, self.model.flash.start, contents)
     }
 
-    /// Reads memory, not registers.
+    /// Reads memory; registers of the chip are not accessible.
     ///
     /// # Errors
     /// [`BusFault`] where there is no memory.
@@ -131,7 +131,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.cpu.get_data().memory.read(address, bytes).ok_or(BusFault)
     }
 
-    /// Writes memory, not registers.
+    /// Writes memory; registers of the chip are not accessible.
     ///
     /// # Errors
     /// [`BusFault`] where there is no memory.
@@ -140,7 +140,7 @@ impl<P: Peripherals + 'static> Machine<P> {
     }
 
     /// Sets a core register, as a debugger does: 0 to 12, 13 the stack pointer, 14 the link register, 15 the program
-    /// counter. Others are ignored.
+    /// counter. Other numbers are ignored.
     pub fn set_register(&mut self, number: u8, value: u32) {
         let special = [RegisterARM::SP, RegisterARM::LR, RegisterARM::PC];
         match number {
@@ -150,12 +150,13 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// Has RAM come up otherwise than that of machines with another number. To be called before the power comes.
+    /// Sets the seed of the RAM content at power-on: machines with different seeds differ. Must be called before
+    /// power-on.
     pub fn set_power_up(&mut self, seed: u64) {
         self.power_up = PowerUp::new(seed);
     }
 
-    /// What RAM held when the power came: a byte that differs was written since.
+    /// The content of RAM at the last power-on. A byte with another value has been written since.
     pub fn ram_at_power_on(&self) -> &[u8] {
         self.power_up.content()
     }
@@ -171,7 +172,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.restart();
     }
 
-    /// Switches the supply off: RAM is lost, flash stays.
+    /// Switches the supply off: RAM loses its content, flash keeps it.
     pub fn power_off(&mut self) {
         self.powered = false;
     }
@@ -191,32 +192,32 @@ impl<P: Peripherals + 'static> Machine<P> {
         &mut self.cpu.get_data_mut().chip
     }
 
-    /// What was counted.
+    /// The counters.
     pub fn stats(&self) -> &Stats {
         &self.cpu.get_data().stats
     }
 
-    /// Forgets the worst activation and latency of every exception: what comes now is judged by itself.
+    /// Resets the worst activation and latency of every exception, to measure a later part of the run alone.
     pub fn forget_worst(&mut self) {
         self.cpu.get_data_mut().stats.forget_worst();
     }
 
-    /// Lets interrupts come between any two instructions, and time advance with each of them, from now on and over resets.
-    /// With a seed some instructions take a few cycles longer, so that each seed gives another course. It is several times
-    /// slower than to look between blocks of code only.
+    /// Lets interrupts come between any two instructions and advances time with each instruction, from now on, also
+    /// after resets. With a seed some instructions take a few cycles longer, so that each seed gives another
+    /// interleaving. The mode is several times slower than the usual mode, which checks between blocks of code only.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn interleave(&mut self, seed: Option<u64>) -> Result<(), Error> {
         let fresh = self.cpu.get_data_mut().stepping.replace(Stepping::new(seed)).is_none();
         if fresh { engine::step_instructions(&mut self.cpu) } else { Ok(()) }
     }
 
-    /// Counts cycles by one end of what is published from now on. [`Estimate::Worst`] also follows the caches of the flash, and is some
-    /// times slower.
+    /// Sets the end of the published cycle ranges to count, from now on. [`Estimate::Worst`] also models the caches of
+    /// the flash, and is several times slower.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn set_estimate(&mut self, estimate: Estimate) -> Result<(), Error> {
         let core = self.cpu.get_data_mut();
         let watches = core.accelerator.is_some();
@@ -225,7 +226,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         if begins { engine::watch_constants(&mut self.cpu, &self.model) } else { Ok(()) }
     }
 
-    /// Pends an exception before the next time that the instruction at this address runs. Does nothing unless
+    /// Pends an exception before the next execution of the instruction at this address. Has no effect unless
     /// [`Machine::interleave`] was called.
     pub fn interrupt_before(&mut self, address: u32, exception: Exception) {
         if let Some(stepping) = &mut self.cpu.get_data_mut().stepping {
@@ -233,17 +234,17 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// Counts how often each block of code runs, from now on or no longer.
+    /// Starts or stops counting how often each block of code runs.
     pub fn set_profiling(&mut self, on: bool) {
         self.cpu.get_data_mut().profile.is_on = on;
     }
 
-    /// How often each block has run while that was counted, by address; from here on they count from zero.
+    /// The counts of each block, by address; resets the counts.
     pub fn take_profile(&mut self) -> Vec<Visits> {
         self.cpu.get_data_mut().profile.take()
     }
 
-    /// Faults and resets since power-on of the machine, with their instants.
+    /// Faults, resets and broken rules since power-on of the machine, with their instants.
     pub fn incidents(&self) -> &[(Time, Incident)] {
         &self.incidents
     }
@@ -258,7 +259,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.cpu.get_data_mut().without = Some(mechanism);
     }
 
-    /// The next instant at which something happens here when the outside does nothing: now, unless the core sleeps.
+    /// The next instant at which the state changes without an outside event: now, unless the core sleeps.
     pub fn next_event(&self) -> Time {
         let core = self.cpu.get_data();
         match (self.powered, self.sleeping || self.locked.is_some()) {
@@ -268,7 +269,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// Runs to `until`, or to what stops it earlier.
+    /// Runs to `until`, or until an earlier reason to stop.
     pub fn run_until(&mut self, until: Time) -> Stop {
         self.cpu.get_data_mut().until = until;
         loop {
@@ -290,7 +291,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// What a [`crate::Moment`] keeps of the machine itself.
+    /// The machine's own part of a [`crate::Moment`].
     pub(crate) fn state(&self) -> (bool, Option<u32>, Time, bool) {
         (self.sleeping, self.locked, self.stall, self.loading)
     }
@@ -300,7 +301,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.powered = true;
     }
 
-    /// Everything that is due before the next block: events, effects, resets.
+    /// Processes everything that is due before the next block: events, effects, resets.
     fn attend(&mut self) -> Option<Stop> {
         self.advance_chip();
         while let Some((at, pc, rule)) = self.cpu.get_data_mut().breaches.pop_front() {
@@ -331,14 +332,14 @@ impl<P: Peripherals + 'static> Machine<P> {
                 self.power_off();
                 return Some(Stop::PowerCut);
             }
-            // The address of an effect was checked when the chip made it: outside of memory it is lost, as on a
+            // The chip checked the address when it requested the effect. An effect outside of memory is lost, as on a
             // real bus.
             Ok(_) | Err(_) => {}
         }
         None
     }
 
-    /// One step of the core: an exception, sleep, or code.
+    /// One step of the core: an exception, a sleep, or code.
     fn step(&mut self, until: Time) {
         let masks = clock::masks(&self.cpu);
         if self.loading && self.now() < self.stall {
@@ -372,13 +373,13 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.now() < self.stall && self.model.flash.contains(&self.pc())
     }
 
-    /// The core waits for the flash, and only the core: what the chip does meanwhile it does at its own instants.
+    /// Lets the core wait for the flash, at most until the next event of the chip.
     fn wait_for_flash(&mut self, until: Time) {
         let next = self.cpu.get_data().deadline().min(until);
         self.pass_to(self.stall.min(next));
     }
 
-    /// Nothing runs until the next event.
+    /// Lets the core sleep until the next event.
     fn idle(&mut self, until: Time) {
         let before = self.now();
         let next = self.cpu.get_data().deadline().min(until);
@@ -422,7 +423,8 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// The library has stopped at an instruction. A store that is buffered is over for the program, which goes on.
+    /// The library has refused an access. A buffered store is complete for the program, which continues; any other
+    /// access is a fault.
     fn refused(&mut self, error: uc_error) {
         let core = self.cpu.get_data();
         let store = core.unmapped.filter(|access| access.store && core.scb.buffers(access.address));
@@ -445,7 +447,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         }
     }
 
-    /// A call that cannot be taken at once becomes a HardFault (ARMv7-M, B1.5.2).
+    /// Takes an SVC. An SVC that cannot be taken at once becomes a HardFault (ARMv7-M, B1.5.2).
     fn supervisor_call(&mut self) {
         let masks = clock::masks(&self.cpu);
         let core = self.cpu.get_data_mut();
@@ -472,7 +474,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.restart();
     }
 
-    /// The core after any reset: stack pointer and program counter from the start of flash.
+    /// Starts the core after any reset: stack pointer and program counter from the start of flash.
     fn restart(&mut self) {
         self.cpu.get_data_mut().reset();
         self.cpu.get_data_mut().memory.protection_is_new = true;

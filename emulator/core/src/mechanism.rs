@@ -1,4 +1,4 @@
-//! Parts of the core that a test may switch off, to see that another test notices.
+//! Mechanisms of the core that a test may switch off, to check that another test notices.
 
 /// One mechanism.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum Mechanism {
     ItState,
     /// Exception entry and return clear the exclusive monitor.
     ExclusiveMonitor,
-    /// Code written to flash takes the place of what was translated before.
+    /// Code written to flash replaces the translated code.
     Retranslation,
     /// A pending exception follows the ending one without unstacking.
     TailChain,
@@ -23,6 +23,6 @@ pub enum Mechanism {
     ExecuteNever,
     /// Loads from a busy flash wait.
     FlashLoads,
-    /// WFI sleeps until something is pending.
+    /// WFI sleeps until an interrupt is pending.
     Sleep,
 }

@@ -1,4 +1,4 @@
-//! Flash and RAM: bytes that the CPU library and the emulator both work on.
+//! Flash and RAM: bytes that the CPU library and the emulator both access.
 
 use std::ffi::c_void;
 use std::ops::Range;
@@ -12,13 +12,13 @@ use crate::model::Model;
 pub(crate) struct Memory {
     pub(crate) flash: Block,
     pub(crate) ram: Block,
-    /// Pages of RAM that code was fetched from, by their addresses.
+    /// Addresses of pages of RAM from which code was fetched.
     pub(crate) code_in_ram: Vec<u32>,
-    /// Another program has begun: what ran from RAM has probably ended.
+    /// A new program has begun: code of the old program in RAM is probably no longer used.
     pub(crate) code_is_old: bool,
-    /// The memory protection unit says something else since code was translated.
+    /// The settings of the memory protection unit have changed since code was translated.
     pub(crate) protection_is_new: bool,
-    /// Memory was written from which no code may run at present: what was translated from there is old.
+    /// Memory without execute rights was written: the code translated from there is outdated.
     pub(crate) code_is_stale: bool,
 }
 
@@ -39,7 +39,7 @@ impl Memory {
     pub(crate) fn read(&self, address: u32, bytes: &mut [u8]) -> Option<()> {
         let block = if address < self.ram.range.start { &self.flash } else { &self.ram };
         let from = block.place(address, bytes.len())?;
-        // SAFETY: `place` has checked that all of the bytes lie in the block, which nothing else in Rust refers to.
+        // SAFETY: `place` has checked that all bytes lie in the block, and no other Rust reference to the block exists.
         unsafe { from.copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len()) };
         Some(())
     }
@@ -60,7 +60,7 @@ impl chip::Memory for Memory {
     }
 }
 
-/// One block of memory at a place that does not change, which the CPU library knows.
+/// One block of memory at a fixed address, which the CPU library uses.
 pub(crate) struct Block {
     pub(crate) range: Range<u32>,
     bytes: NonNull<[u8]>,
@@ -72,7 +72,7 @@ impl Block {
         Block { range, bytes: NonNull::from(Box::leak(bytes)) }
     }
 
-    /// For the CPU library, which must not use it for longer than the block lives.
+    /// The address for the CPU library, which must not use it for longer than the block lives.
     pub(crate) fn pointer(&self) -> *mut c_void {
         self.bytes.as_ptr().cast()
     }
@@ -87,7 +87,7 @@ impl Block {
 
 impl Drop for Block {
     fn drop(&mut self) {
-        // SAFETY: it was leaked in `new` and is given up here only.
+        // SAFETY: the box was leaked in `new` and is freed here only.
         drop(unsafe { Box::from_raw(self.bytes.as_ptr()) });
     }
 }

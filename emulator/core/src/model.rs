@@ -1,4 +1,4 @@
-//! The chip that a machine is made for, and what can go wrong with it.
+//! The memory map of the chip, and the errors of a machine.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ pub struct Model {
     pub flash: Range<u32>,
     /// The RAM.
     pub ram: Range<u32>,
-    /// Where the chip answers instead of memory.
+    /// The addresses that belong to the chip's registers instead of memory.
     pub peripherals: Vec<Range<u32>>,
 }
 
@@ -22,16 +22,16 @@ impl Model {
         Model {
             flash: 0x0800_0000..0x0800_0000 + flash,
             ram: 0x2000_0000..0x2002_0000,
-            // The peripherals of both buses, and the system memory with identification and calibration.
+            // The peripherals of all buses, and the system memory with identification and calibration.
             peripherals: vec![0x1FFF_0000..0x1FFF_8000, 0x4000_0000..0x4008_0000, 0x5000_0000..0x5006_1000],
         }
     }
 }
 
-/// What cannot be done.
+/// An error of a machine.
 #[derive(Debug, ThisError)]
 pub enum Error {
-    /// The ELF file is not one for this chip.
+    /// The ELF file is not a program for this chip.
     #[error("{0}")]
     Elf(String),
     /// The CPU library refused.

@@ -1,19 +1,19 @@
-//! The memory protection unit (ARMv7-M, B3.5), as far as it says from where code may run. Data may go everywhere: a region that wants
-//! anything else is refused, so that no program counts on a protection that is not there.
+//! The memory protection unit (ARMv7-M, B3.5). Only the protection against execution is modelled. A region that
+//! restricts data accesses is refused, so that no program relies on a missing protection.
 
-/// Regions that the unit has.
+/// Number of regions.
 const REGIONS: usize = 8;
 
-/// RBAR: the write is for the region of its lowest bits.
+/// RBAR: the lowest bits select the region to write.
 const VALID: u32 = 1 << 4;
-/// MPU_CTRL.
+/// Bits of MPU_CTRL.
 const ENABLE: u32 = 1;
 const PRIVDEFENA: u32 = 1 << 2;
-/// RASR.
+/// Fields of RASR.
 const XN: u32 = 1 << 28;
 const ACCESS: u32 = 0b111 << 24;
 const FULL_ACCESS: u32 = 0b011 << 24;
-/// The smallest region that has sub-regions, 256 bytes, by the exponent.
+/// The size of the smallest region with sub-regions, 256 bytes, as an exponent of 2.
 const LEAST_DIVIDED: u32 = 8;
 
 /// The registers.
@@ -31,7 +31,7 @@ struct Region {
 }
 
 impl Region {
-    /// Whether it says something about an address.
+    /// Whether the region applies to an address.
     fn covers(self, address: u32) -> bool {
         let exponent = (self.attributes >> 1 & 0x1F) + 1;
         let mask = 1_u64.checked_shl(exponent).map_or(u64::MAX, |size| size - 1);
@@ -43,7 +43,7 @@ impl Region {
 }
 
 impl Mpu {
-    /// A register, by its distance from MPU_TYPE; `None` where there is none.
+    /// A register, by its distance from MPU_TYPE; `None` for an unknown register.
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         let region = self.regions[self.number as usize];
         Some(match offset {
@@ -56,11 +56,11 @@ impl Mpu {
         })
     }
 
-    /// `None` for what is not modelled.
+    /// `None` for settings that are not modelled.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             0x00 => {}
-            // HFNMIENA makes a difference to data and to handlers that lie in a region without code.
+            // HFNMIENA matters only to data, and to handlers in a region without execute rights.
             0x04 => self.control = value & (ENABLE | PRIVDEFENA),
             0x08 => self.number = value & 7,
             0x0C | 0x14 | 0x1C | 0x24 => {
@@ -80,8 +80,9 @@ impl Mpu {
         Some(())
     }
 
-    /// Whether an instruction may be fetched from there: the region with the highest number that covers the address decides, else
-    /// the default map, in which flash and RAM have code, where the program keeps that map (B3.5.1).
+    /// Whether an instruction may be fetched from an address. The region with the highest number that covers the
+    /// address decides. Without such a region the default map decides, if the program keeps it enabled: flash and RAM
+    /// may hold code (B3.5.1).
     pub(crate) fn allows_code(&self, address: u32) -> bool {
         if self.control & ENABLE == 0 {
             return true;
@@ -95,7 +96,7 @@ impl Mpu {
 mod tests {
     use super::*;
 
-    /// No code in a gigabyte but in the middle of 64 KiB of RAM.
+    /// A setting that forbids code in a gigabyte except in the middle of 64 KiB of RAM.
     fn confined() -> Mpu {
         let mut mpu = Mpu::default();
         mpu.write(0x0C, VALID).unwrap();

@@ -26,7 +26,7 @@ pub(crate) struct Nvic {
     active: u128,
     lines: u128,
     priority: [u8; Exception::COUNT],
-    /// AIRCR.PRIGROUP: how many low bits of a priority do not preempt, less one.
+    /// AIRCR.PRIGROUP: the number of low priority bits that do not decide about preemption, less one.
     group: u32,
 }
 
@@ -76,7 +76,7 @@ impl Nvic {
         self.active != 0
     }
 
-    /// Exceptions that are active.
+    /// Number of active exceptions.
     pub(crate) fn active_count(&self) -> u32 {
         self.active.count_ones()
     }
@@ -112,7 +112,7 @@ impl Nvic {
         self.pending >> 16 != 0
     }
 
-    /// Everything pending, as a set of exception numbers.
+    /// The numbers of all pending exceptions, as a set.
     pub(crate) fn pending_set(&self) -> u128 {
         self.pending
     }
@@ -149,29 +149,29 @@ impl Nvic {
         priority
     }
 
-    /// Whether an exception may preempt if no register masks it: the cheap question before the exact one.
+    /// Whether an exception could preempt if no register masked it: a fast check before the exact one.
     #[inline]
     pub(crate) fn could_preempt(&self) -> bool {
         self.pending & self.enabled != 0 && self.to_take(Masks::default()).is_some()
     }
 
-    /// The exception to take now, if one may preempt.
+    /// The exception to take now, if one can preempt.
     pub(crate) fn to_take(&self, masks: Masks) -> Option<Exception> {
         let candidate = self.first()?;
         (self.group_priority(candidate) < self.execution_priority(masks)).then_some(candidate)
     }
 
-    /// Whether WFI ends: the same question with PRIMASK left out.
+    /// Whether WFI ends: whether an exception could preempt with PRIMASK clear.
     pub(crate) fn wakes(&self, masks: Masks) -> bool {
         self.to_take(Masks { primask: false, ..masks }).is_some()
     }
 
-    /// Whether a fault of this exception could be taken now instead of escalating.
+    /// Whether a fault with this exception could be taken now instead of escalating.
     pub(crate) fn may_preempt(&self, exception: Exception, masks: Masks) -> bool {
         self.group_priority(exception) < self.execution_priority(masks)
     }
 
-    /// Highest priority first, then the lowest number.
+    /// The pending exception with the highest priority; of equal ones, the one with the lowest number.
     fn first(&self) -> Option<Exception> {
         bits(self.pending & self.enabled).min_by_key(|exception| (self.full_priority(*exception), *exception))
     }
@@ -251,7 +251,7 @@ fn bits(mut set: u128) -> impl Iterator<Item = Exception> {
     })
 }
 
-/// A word of 32 interrupts in a set of exceptions.
+/// The 32 interrupts of a register, from a set of exceptions.
 fn irq_word(set: u128, word: u32) -> u32 {
     (set >> 16).checked_shr(word * 32).unwrap_or(0) as u32
 }

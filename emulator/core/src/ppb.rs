@@ -6,9 +6,9 @@ use crate::core::Core;
 use crate::exception::Exception;
 use crate::scb::{DIV_0_TRP, UNALIGN_TRP};
 
-/// Where the system space begins.
+/// Start of the system space.
 pub(crate) const BASE: u32 = 0xE000_0000;
-/// How long it is.
+/// Size of the system space.
 pub(crate) const SIZE: u32 = 0x0010_0000;
 
 /// The debug unit of the chip lies among the registers of the core (RM0390, section 33.16).
@@ -23,7 +23,7 @@ const CPUID: u32 = 0x410F_C241;
 const AIRCR_KEY: u32 = 0x05FA;
 const SYSRESETREQ: u32 = 1 << 2;
 
-/// ICSR.
+/// Bits of ICSR.
 const PENDSVSET: u32 = 1 << 28;
 const PENDSVCLR: u32 = 1 << 27;
 const PENDSTSET: u32 = 1 << 26;
@@ -32,14 +32,14 @@ const ISRPENDING: u32 = 1 << 22;
 const VECTPENDING: u32 = 12;
 const RETTOBASE: u32 = 1 << 11;
 
-/// DEMCR: the trace units, the DWT among them, are on.
+/// DEMCR: enables the trace units, among them the DWT.
 const TRCENA: u32 = 1 << 24;
 
 impl<P: Peripherals> Core<P> {
-    /// A word of the system space; `None` where there is no register.
+    /// Reads a word of the system space; `None` for an unknown register.
     pub(crate) fn ppb_read(&mut self, address: u32, ipsr: u32) -> Option<u32> {
         Some(match address {
-            // Without TRCENA the DWT stands still and cannot be written (ARMv7-M, C1.8.1 and C1.6.5).
+            // Without TRCENA the DWT is stopped and not writable (ARMv7-M, C1.8.1 and C1.6.5).
             0xE000_1000..=0xE000_1004 if !self.traces() => 0,
             0xE000_1000 => u32::from(self.cyccnt_runs()) | 0x4000_0000,
             0xE000_1004 => self.cyccnt(),
@@ -75,13 +75,13 @@ impl<P: Peripherals> Core<P> {
         })
     }
 
-    /// Writes a word of the system space; `None` where there is no register.
+    /// Writes a word of the system space; `None` for an unknown register.
     pub(crate) fn ppb_write(&mut self, address: u32, value: u32) -> Option<()> {
         match address {
             0xE000_1000..=0xE000_1004 if !self.traces() => {}
             0xE000_1000 => self.set_cyccnt(value & 1 != 0, self.cyccnt()),
             0xE000_1004 => self.set_cyccnt(self.cyccnt_runs(), value),
-            // The lock access register of the DWT: unlocked as a debugger would see it.
+            // The lock access register of the DWT. The DWT is always unlocked, as for a debugger.
             0xE000_1FB0 => {}
             0xE000_E008 => self.scb.actlr = value,
             0xE000_E010..=0xE000_E01C => {

@@ -1,22 +1,22 @@
-//! How often each block of code ran, for whoever asks where the instructions go.
+//! Counts of how often each block of code ran, to show where the instructions are spent.
 
 use std::collections::BTreeMap;
 
-/// Instructions by block, while it is switched on.
+/// The counts of each block, while profiling is on.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Profile {
     pub(crate) is_on: bool,
     visits: BTreeMap<(u32, u32), u64>,
 }
 
-/// A block of code that ran: a block may begin in the middle of another.
+/// A block of code and its count. A block may begin in the middle of another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Visits {
-    /// Where it begins.
+    /// The address of the block.
     pub address: u32,
-    /// Its length in bytes.
+    /// The length of the block in bytes.
     pub size: u32,
-    /// How often it ran.
+    /// The number of runs.
     pub count: u64,
 }
 

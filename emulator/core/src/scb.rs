@@ -64,7 +64,8 @@ impl Default for Scb {
     }
 }
 
-/// ACTLR: stores wait for their answer (Cortex-M4 technical reference manual, 4.3.1).
+/// ACTLR: disables the write buffer, so that stores wait for their answer (Cortex-M4 technical reference manual,
+/// 4.3.1).
 const DISDEFWBUF: u32 = 1 << 1;
 
 /// CCR: traps of unaligned accesses and of divisions by zero.
@@ -72,28 +73,28 @@ pub(crate) const UNALIGN_TRP: u32 = 1 << 3;
 pub(crate) const DIV_0_TRP: u32 = 1 << 4;
 
 impl Scb {
-    /// Whether CPACR lets the program use the floating-point unit: privileged access to CP10 and CP11.
+    /// Whether CPACR allows the floating-point unit: privileged access to CP10 and CP11.
     pub(crate) fn allows_floats(&self) -> bool {
         self.cpacr >> 20 & 0b0101 == 0b0101
     }
 
-    /// Whether a store goes on before it is answered, so that the fault of one that nothing answers comes later, and without
-    /// its address. Stores into the system space wait.
+    /// Whether a store is buffered. The fault of a failed buffered store comes later, and without its address. Stores
+    /// into the system space are not buffered.
     pub(crate) fn buffers(&self, address: u32) -> bool {
         self.actlr & DISDEFWBUF == 0 && !(ppb::BASE..ppb::BASE + ppb::SIZE).contains(&address)
     }
 
-    /// Notes a fault that was taken as HardFault instead.
+    /// Records a fault that was taken as HardFault instead.
     pub(crate) fn note_escalation(&mut self) {
         self.hfsr |= FORCED;
     }
 
-    /// Notes a breakpoint that nobody handles.
+    /// Records a breakpoint without a debugger.
     pub(crate) fn note_breakpoint(&mut self) {
         self.hfsr |= DEBUGEVT;
     }
 
-    /// Notes a precise data access to an address where nothing answers.
+    /// Records a precise fault of a data access to this address.
     pub(crate) fn note_data_fault(&mut self, address: u32) {
         self.cfsr |= cfsr::PRECISERR | cfsr::BFARVALID;
         self.bfar = address;
@@ -110,7 +111,7 @@ impl Scb {
         self.shcsr & 1 << bit != 0
     }
 
-    /// Which configurable fault a set of CFSR bits belongs to.
+    /// The configurable fault that a set of CFSR bits belongs to.
     pub(crate) fn fault_of(status: u32) -> Exception {
         match status {
             0..=0xFF => Exception::MEM_MANAGE,

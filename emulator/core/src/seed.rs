@@ -1,40 +1,41 @@
-//! Bugs that a test seeds into a program: what the program stores into a register, or sees of one, is not what its source says. For the
-//! rest of the program and for the chip that is the same as a wrong constant, or a line that is missing.
+//! Bugs that a test seeds into a program: a store of the program into a register, or a read of one, is changed. For the
+//! rest of the program and for the chip, this has the same effect as a wrong constant or a missing line.
 
 use chip::Peripherals;
 
 use crate::machine::Machine;
 
-/// A register that is used wrongly.
+/// A seeded bug: a wrong access to a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bug {
     /// The address of the register, a multiple of 4.
     pub register: u32,
-    /// What becomes of an access.
+    /// The change of the access.
     pub access: Access,
 }
 
-/// What becomes of an access.
+/// The change of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Nothing is stored: the line is missing.
+    /// The store is missing.
     Missing,
-    /// These bits of a word that is stored are others.
+    /// These bits of a stored word have a wrong value.
     Wrong {
-        /// Which.
+        /// The changed bits.
         bits: u32,
-        /// What they are, in their places.
+        /// The wrong value, in the positions of the bits.
         value: u32,
     },
-    /// The program does not look at these bits: they read as zero.
+    /// The program ignores these bits: they read as zero.
     Unseen {
-        /// Which.
+        /// The ignored bits.
         bits: u32,
     },
 }
 
 impl Access {
-    /// What is stored in place of a value of `size` bytes from byte `lane` of the word on.
+    /// The value stored instead of `value`, which has `size` bytes from byte `lane` of the word on; `None` if the store
+    /// is missing.
     fn instead_of(self, value: u32, lane: u32, size: usize) -> Option<u32> {
         let (bits, wrong) = match self {
             Access::Missing => return None,
@@ -46,24 +47,24 @@ impl Access {
         Some(value & !bits | wrong & bits)
     }
 
-    /// What is seen in place of a value from byte `lane` of the word on.
+    /// The value read instead of `value`, which begins at byte `lane` of the word.
     fn seen_of(self, value: u32, lane: u32) -> u32 {
         let Access::Unseen { bits } = self else { return value };
         value & !(bits >> (8 * lane))
     }
 }
 
-/// The bugs of a program.
+/// The seeded bugs of a program.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Bugs(Vec<Bug>);
 
 impl Bugs {
-    /// What a program stores that has these bugs; `None` where it stores nothing.
+    /// The value that the program stores with its bugs; `None` if the store is missing.
     pub(crate) fn stored(&self, address: u32, size: usize, value: u32) -> Option<u32> {
         self.of(address).try_fold(value, |value, access| access.instead_of(value, address & 3, size))
     }
 
-    /// What a program sees that has these bugs.
+    /// The value that the program reads with its bugs.
     pub(crate) fn seen(&self, address: u32, value: u32) -> u32 {
         self.of(address).fold(value, |value, access| access.seen_of(value, address & 3))
     }
@@ -74,7 +75,7 @@ impl Bugs {
 }
 
 impl<P: Peripherals + 'static> Machine<P> {
-    /// Has the program do this from now on.
+    /// Seeds a bug into the program, from now on.
     pub fn seed(&mut self, bug: Bug) {
         self.cpu.get_data_mut().bugs.0.push(bug);
     }

@@ -1,4 +1,4 @@
-//! A debugger that the program can print with: semihosting of Arm, the part of it that prints.
+//! The output operations of Arm semihosting: a debugger that the program can print with.
 //!
 //! Source: Arm, "Semihosting for AArch32 and AArch64", operations SYS_OPEN, SYS_WRITEC, SYS_WRITE0 and SYS_WRITE.
 
@@ -7,7 +7,7 @@ use unicorn_engine::RegisterARM;
 
 use crate::machine::Machine;
 
-/// BKPT AB: the program asks the debugger.
+/// BKPT AB: a request of the program to the debugger.
 const CALL: u16 = 0xBEAB;
 
 const SYS_OPEN: u32 = 0x01;
@@ -15,27 +15,28 @@ const SYS_WRITEC: u32 = 0x03;
 const SYS_WRITE0: u32 = 0x04;
 const SYS_WRITE: u32 = 0x05;
 
-/// The one file that there is: what the program prints.
+/// The only file: the output of the program.
 const TERMINAL: u32 = 1;
 const DONE: u32 = 0;
 const REFUSED: u32 = u32::MAX;
 
-/// No line that a program prints is longer, in bytes.
+/// Longest line that a program may print, in bytes.
 const LONGEST: u32 = 4096;
 
 impl<P: Peripherals + 'static> Machine<P> {
-    /// Connects a debugger for programs that print by semihosting. Without one their first line is a fault.
+    /// Connects a debugger for programs that print by semihosting. Without a debugger, their first line is a fault.
     pub fn attach_debugger(&mut self) {
         self.printed.get_or_insert_default();
     }
 
-    /// What the program has printed since this was asked last.
+    /// The output of the program since the last call.
     pub fn take_printed(&mut self) -> String {
         let printed = self.printed.as_mut().map(std::mem::take).unwrap_or_default();
         String::from_utf8_lossy(&printed).into_owned()
     }
 
-    /// Does what the program asks at this breakpoint; `false` where it asks nothing, or nobody.
+    /// Carries out the request at this breakpoint; `false` if the breakpoint is no request, or if no debugger is
+    /// connected.
     pub(crate) fn answer_call(&mut self) -> bool {
         let pc = self.pc();
         let mut code = [0; 2];

@@ -1,17 +1,17 @@
-//! What the core counted.
+//! Counters of the core.
 
 use canbus::Time;
 
 use crate::exception::Exception;
 
-/// What ran at one exception, without what preempted it.
+/// The counters of one exception, without the exceptions that preempted it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Activity {
-    /// How often it was entered.
+    /// Number of entries.
     pub entries: u64,
-    /// Instructions in all.
+    /// Total instructions.
     pub instructions: u64,
-    /// Modelled cycles in all.
+    /// Total modelled cycles.
     pub cycles: u64,
     /// Most instructions in one activation.
     pub worst_instructions: u64,
@@ -55,14 +55,14 @@ pub struct Stats {
     pub cycles: u64,
     /// Time spent in WFI.
     pub asleep: Time,
-    /// By exception number. Thread mode has no entry and no end, and so nothing here.
+    /// Counters by exception number. Thread mode has no entry and no end, so its counters stay zero.
     pub exceptions: [Activity; Exception::COUNT],
     /// Exceptions that followed another without unstacking.
     pub tail_chained: u64,
     /// A hash over every exception entry with its time and return address: equal runs have equal hashes.
     pub trace: u64,
     running: Running,
-    /// What goes on when `running` ends; Thread mode first.
+    /// The activations that continue after `running`; Thread mode first.
     preempted: Vec<Running>,
 }
 

@@ -1,57 +1,58 @@
-//! The mode in which an interrupt can come between any two instructions, and time advances with each of them.
+//! The mode in which an interrupt can come between any two instructions, and time advances with each instruction.
 //!
-//! The usual mode charges a block of code at once, before it runs, and looks for interrupts between blocks: several times as
-//! fast, and exact for everything but races. Here every instruction is charged and looked at. A seed lets some of them take
-//! longer, as waits on a bus do on silicon, so that interrupts meet the program elsewhere with each seed.
+//! The usual mode counts the cycles of a whole block of code before the block runs, and checks for interrupts between
+//! blocks. That mode is several times faster, and exact except for races. This mode counts and checks every
+//! instruction. With a seed, some instructions take longer, as waits on a bus do on silicon, so that each seed
+//! interrupts the program at other places.
 //!
-//! An IT block counts as one instruction: the CPU library does not stop inside of it.
+//! An IT block counts as one instruction, because the CPU library does not stop inside an IT block.
 
 use std::ops::Range;
 
 use crate::exception::Exception;
 
-/// An instruction takes up to so many cycles longer, one in eight of them.
+/// Longest extra wait of an instruction in cycles; one instruction in eight has a wait.
 const LONGEST_WAIT: u64 = 7;
 
-/// What the mode remembers.
+/// The state of the mode.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stepping {
-    /// Never zero, or nothing waits.
+    /// Zero only when no instruction waits.
     random: u64,
-    /// The instructions of the IT block that was charged.
+    /// The instructions of the IT block whose cycles have been counted.
     conditional: Range<u32>,
-    /// Pend this exception before this instruction.
+    /// The exception to pend, and the address of the instruction before which it is pended.
     place: Option<(u32, Exception)>,
 }
 
 impl Stepping {
-    /// Waits by `seed`; with `None` there are none.
+    /// With a seed, some instructions have waits; with `None`, no instruction has.
     pub(crate) fn new(seed: Option<u64>) -> Stepping {
         let random = seed.map_or(0, |seed| seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         Stepping { random, ..Stepping::default() }
     }
 
-    /// Pends an exception before the next time that this instruction runs.
+    /// Pends an exception before the next execution of this instruction.
     pub(crate) fn interrupt_before(&mut self, address: u32, exception: Exception) {
         self.place = Some((address, exception));
     }
 
-    /// What is to be pended before this instruction.
+    /// The exception to pend before this instruction.
     pub(crate) fn arrived(&mut self, address: u32) -> Option<Exception> {
         self.place.take_if(|(place, _)| *place == address).map(|(_, exception)| exception)
     }
 
-    /// Whether the instruction was charged with its IT block.
+    /// Whether the cycles of the instruction were counted with its IT block.
     pub(crate) fn is_charged(&self, address: u32) -> bool {
         self.conditional.contains(&address)
     }
 
-    /// An IT instruction and its block are charged together.
+    /// Records that an IT instruction and its block were counted together.
     pub(crate) fn charged(&mut self, first: u32, size: u32, block: u32) {
         self.conditional = first + size..first + block;
     }
 
-    /// Cycles that the next instruction takes longer (xorshift64).
+    /// Extra cycles of the next instruction (xorshift64).
     pub(crate) fn wait(&mut self) -> u32 {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 7;
@@ -63,12 +64,13 @@ impl Stepping {
 /// Bytes of the longest IT block: the IT instruction and four wide ones.
 pub(crate) const LONGEST_BLOCK: usize = 18;
 
-/// Bytes of the instruction at the start of `code`, and of its block where it is an IT instruction (ARMv7-M, A7.7.37).
+/// Length in bytes of the instruction at the start of `code`; for an IT instruction, with its block (ARMv7-M, A7.7.37).
 pub(crate) fn length(code: &[u8]) -> u32 {
     instructions(code).last().map_or(0, |(at, size)| at + size)
 }
 
-/// The instruction at the start of `code`, and those of its block where it is an IT instruction: distance and bytes of each.
+/// The instruction at the start of `code`, and those of its block if it is an IT instruction: offset and length of
+/// each.
 pub(crate) fn instructions(code: &[u8]) -> Vec<(u32, u32)> {
     let half = |at: u32| {
         let bytes = code.get(at as usize..at as usize + 2);
@@ -86,7 +88,7 @@ pub(crate) fn instructions(code: &[u8]) -> Vec<(u32, u32)> {
     all
 }
 
-/// Bytes of an instruction that begins with this halfword.
+/// Length in bytes of an instruction that begins with this halfword.
 pub(crate) fn width(first: u16) -> u32 {
     if first >> 11 >= 0b11101 { 4 } else { 2 }
 }

@@ -1,4 +1,4 @@
-//! SysTick, the 24-bit timer of the core (ARMv7-M, B3.3). Computed from virtual time, not counted down.
+//! SysTick, the 24-bit timer of the core (ARMv7-M, B3.3). The count is computed from virtual time.
 
 use canbus::Time;
 
@@ -7,26 +7,26 @@ const TICKINT: u32 = 1 << 1;
 const CLKSOURCE: u32 = 1 << 2;
 const COUNTFLAG: u32 = 1 << 16;
 
-/// The timer; it wraps to the reload value one tick after zero.
+/// The timer; one tick after zero it wraps to the reload value.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SysTick {
     control: u32,
     reload: u32,
     flag: bool,
-    /// The value while it stands.
+    /// The value while the timer is stopped.
     held: u32,
-    /// The instant of the next change from 1 to 0, while it runs.
+    /// The instant of the next change from 1 to 0, while the timer runs.
     zero: Time,
     tick: Time,
 }
 
 impl SysTick {
-    /// The instant of the next event; [`Time::NEVER`] when it stands.
+    /// The instant of the next event; [`Time::NEVER`] when the timer is stopped.
     pub(crate) fn deadline(&self) -> Time {
         if self.runs() { self.zero } else { Time::NEVER }
     }
 
-    /// Lets time pass; `true` when the exception becomes pending.
+    /// Advances to `now`; `true` when the exception becomes pending.
     pub(crate) fn advance(&mut self, now: Time) -> bool {
         let mut pend = false;
         while self.runs() && self.zero <= now {
@@ -47,7 +47,7 @@ impl SysTick {
         }
     }
 
-    /// `cycle` is the length of a core cycle now.
+    /// Writes a register; `cycle` is the current length of a core cycle.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time, cycle: Time) {
         let count = self.count(now);
         match offset {
@@ -60,7 +60,7 @@ impl SysTick {
         self.go_on(if offset == 0x8 { 0 } else { count }, now);
     }
 
-    /// The core clock has changed: the count goes on from where it is.
+    /// The core clock has changed; the count keeps its value.
     pub(crate) fn change_clock(&mut self, now: Time, cycle: Time) {
         let count = self.count(now);
         self.set_cycle(cycle);
@@ -72,7 +72,7 @@ impl SysTick {
         self.tick = if self.control & CLKSOURCE == 0 { Time(cycle.0 * 8) } else { cycle };
     }
 
-    /// From zero it is reloaded with the next tick.
+    /// Continues from `count`. A count of zero is reloaded at the next tick.
     fn go_on(&mut self, count: u32, now: Time) {
         self.held = count;
         let ticks = if count == 0 { u64::from(self.reload) + 1 } else { count.into() };
@@ -92,7 +92,7 @@ impl SysTick {
             return self.held;
         }
         let left = self.zero.since(now).0.div_ceil(self.tick.0.max(1)) as u32;
-        // Before the first tick it still is zero.
+        // Before its first tick the count is still zero.
         if left > self.reload.max(self.held) { 0 } else { left }
     }
 }

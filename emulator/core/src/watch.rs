@@ -1,5 +1,5 @@
-//! Stopping a program before an instruction, and going back to that moment: what a test of faults needs, which lets the same
-//! moment go on in many ways.
+//! Stops a program before an instruction and returns to that moment later. Tests with injected faults use this to
+//! continue the same moment in many ways.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -14,30 +14,30 @@ use crate::machine::Machine;
 use crate::model::Error;
 use crate::stepping;
 
-/// An instruction, and how often it has run.
+/// A visit of an instruction: its address and the number of the visit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Point {
-    /// Its address.
+    /// The address of the instruction.
     pub address: u32,
-    /// Which of its visits: 1 is the first.
+    /// The number of the visit: 1 is the first.
     pub visit: u64,
 }
 
-/// What is watched for.
+/// The state of the watch.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     visits: HashMap<u32, u64>,
     stops: HashSet<Point>,
-    /// The instructions of an IT block that has begun: the CPU library does not stop inside of it.
+    /// The instructions of an IT block that has begun: the CPU library does not stop inside an IT block.
     conditional: Range<u32>,
-    /// Stop before the first instruction that is not one of these, and count nothing.
+    /// If set: stop before the first instruction outside this range, without counting.
     outside: Option<Range<u32>>,
-    /// Where the program was stopped; not counted yet.
+    /// The point at which the program was stopped; this visit is not counted yet.
     pub(crate) stopped: Option<Point>,
 }
 
 impl Watch {
-    /// Counts an instruction that is about to run, unless the program is to stop before it.
+    /// Counts an instruction that is about to run, or returns `true` to stop before it.
     pub(crate) fn stops_before(&mut self, address: u32, size: u32, block: u32) -> bool {
         if let Some(inside) = &self.outside {
             return !inside.contains(&address);
@@ -57,7 +57,7 @@ impl Watch {
     }
 }
 
-/// A moment of a machine, to go back to.
+/// A saved state of a machine, to return to.
 pub struct Moment<P> {
     registers: Context,
     core: CoreMoment<P>,
@@ -66,10 +66,11 @@ pub struct Moment<P> {
 }
 
 impl<P: Peripherals + 'static> Machine<P> {
-    /// Counts from now on how often each instruction runs, and stops before each of these points. It is several times slower.
+    /// From now on, counts the visits of each instruction and stops before each of these points. Execution is several
+    /// times slower.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn watch(&mut self, stops: impl IntoIterator<Item = Point>) -> Result<(), Error> {
         self.unwatch()?;
         let watch = Watch { stops: stops.into_iter().collect(), ..Watch::default() };
@@ -77,7 +78,7 @@ impl<P: Peripherals + 'static> Machine<P> {
         self.resume_watch()
     }
 
-    /// How often each instruction has run while it was watched, by rising addresses.
+    /// The number of visits of each watched instruction, by rising addresses.
     pub fn visits(&self) -> Vec<Point> {
         let visits = self.cpu.get_data().watch.iter().flat_map(|watch| &watch.visits);
         let mut all: Vec<Point> = visits.map(|(&address, &visit)| Point { address, visit }).collect();
@@ -85,15 +86,15 @@ impl<P: Peripherals + 'static> Machine<P> {
         all
     }
 
-    /// Where the program was stopped.
+    /// The point at which the program was stopped.
     pub fn stopped(&self) -> Option<Point> {
         self.cpu.get_data().watch.as_ref()?.stopped
     }
 
-    /// Neither counts nor stops any more, at full speed, until [`Machine::resume_watch`].
+    /// Stops counting and stopping, and runs at full speed, until [`Machine::resume_watch`].
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn unwatch(&mut self) -> Result<(), Error> {
         if let Some(hook) = self.watching.take() {
             self.cpu.remove_hook(hook)?;
@@ -102,10 +103,10 @@ impl<P: Peripherals + 'static> Machine<P> {
         Ok(())
     }
 
-    /// Counts and stops as before.
+    /// Resumes counting and stopping.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn resume_watch(&mut self) -> Result<(), Error> {
         if self.watching.is_none() {
             let hook: UcHookId = engine::watch(&mut self.cpu)?;
@@ -114,10 +115,10 @@ impl<P: Peripherals + 'static> Machine<P> {
         Ok(())
     }
 
-    /// Everything but what was counted.
+    /// The current state of the machine, without the counters.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn moment(&self) -> Result<Moment<P>, Error>
     where
         P: Clone,
@@ -136,15 +137,15 @@ impl<P: Peripherals + 'static> Machine<P> {
         })
     }
 
-    /// Goes back to a moment of this machine.
+    /// Returns to a moment of this machine.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn go_back(&mut self, moment: &Moment<P>) -> Result<(), Error>
     where
         P: Clone,
     {
-        /// What is compared at once: most of memory is as it was, and what was translated from there stays.
+        /// Size of a piece to compare. Most of memory is unchanged, and its translated code is kept.
         const CHUNK: usize = 1024;
         let starts = [self.model().flash.start, self.model().ram.start];
         for (start, bytes) in starts.into_iter().zip(&moment.memory) {
@@ -163,19 +164,20 @@ impl<P: Peripherals + 'static> Machine<P> {
         Ok(())
     }
 
-    /// The instruction that is next, and those of its block where it is an IT instruction: address and bytes of each.
+    /// The next instruction, and those of its block if it is an IT instruction: address and length of each.
     pub fn next_instructions(&self) -> Vec<(u32, u32)> {
         let mut code = [0; stepping::LONGEST_BLOCK];
         let address = self.pc();
-        // Code that cannot be read is none.
+        // Unreadable code stays zero.
         let _ = self.read(address, &mut code);
         stepping::instructions(&code).into_iter().map(|(at, size)| (address + at, size)).collect()
     }
 
-    /// The next instruction does not run. Of an IT block it may be any: the others run as their conditions say.
+    /// Skips the next instruction, or any instruction of the IT block that is next; the other instructions of the block
+    /// run according to their conditions.
     ///
     /// # Errors
-    /// When the CPU library refuses.
+    /// When the CPU library reports an error.
     pub fn skip(&mut self, (address, size): (u32, u32)) -> Result<(), Error> {
         if address == self.pc() {
             self.set(RegisterARM::PC, (address + size) | 1);
@@ -191,14 +193,14 @@ impl<P: Peripherals + 'static> Machine<P> {
         engine::store(&mut self.cpu, address, original)
     }
 
-    /// Changes one bit of R0 to R14.
+    /// Flips one bit of R0 to R14.
     pub fn flip(&mut self, register: u8, bit: u8) {
         let value = engine::core_register(&self.cpu, register.into());
         self.set_register(register, value ^ 1 << bit);
     }
 
     fn run_until_outside(&mut self, block: Range<u32>) -> Result<(), Error> {
-        /// An IT block takes less.
+        /// Longer than any IT block takes.
         const ENOUGH: Time = Time::from_micros(10);
         let kept = self.cpu.get_data_mut().watch.replace(Watch { outside: Some(block), ..Watch::default() });
         self.resume_watch()?;

@@ -1,5 +1,5 @@
-//! The mechanics of the core, each shown by a program of `mechanics-images`, and each with a negative control: the
-//! same program must notice when the mechanism is switched off.
+//! The mechanics of the core. A program of `mechanics-images` shows each mechanism, and a negative control switches the
+//! mechanism off: the same program must notice.
 
 mod bench;
 
@@ -7,7 +7,7 @@ use bench::{Bench, Verdict};
 use canbus::Time;
 use emulator::Mechanism;
 
-/// The program passes as it is, and fails or hangs without the mechanism.
+/// The program passes with the mechanism, and fails or hangs without it.
 fn shows(program: &str, mechanism: Mechanism) {
     assert_eq!(Bench::new(program).run(), Verdict::Passed, "{program}");
     let mut crippled = Bench::new(program);

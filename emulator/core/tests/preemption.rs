@@ -1,19 +1,20 @@
-//! Interrupts between any two instructions: what that mode finds, and that programs without races do not notice it.
+//! Interrupts between any two instructions: the mode finds races, and programs without races pass in it.
 
 mod bench;
 
 use bench::{Bench, Verdict};
 use emulator::{Exception, Incident};
 
-/// TIM2.
+/// The interrupt of TIM2.
 const INTERRUPT: Exception = Exception::irq(28);
 
-/// Seeds that are tried; all of them with THOROUGH set.
+/// The seeds to try; all of them with THOROUGH set.
 fn seeds() -> std::ops::Range<u64> {
     0..if std::env::var_os("THOROUGH").is_some() { 200 } else { 5 }
 }
 
-/// What `lost_update` has noted: lost without an interrupt of its own, interrupts, lost to them, cycles of 100 NOPs.
+/// The notes of `lost_update`: counts lost without the program's own interrupt, number of interrupts, counts lost to
+/// them, cycles of 100 NOPs.
 fn notes(bench: &mut Bench) -> [u32; 4] {
     assert_eq!(bench.run_long(), Verdict::Passed);
     std::array::from_fn(|index| bench.note(index as u32))
@@ -33,7 +34,8 @@ fn an_increment_against_an_interrupt_loses_counts() {
     }
 }
 
-/// At each instruction of `x++`: the count is lost where the interrupt comes after the load and before the store is done.
+/// An interrupt at each instruction of `x++`: a count is lost if the interrupt comes after the load and before the end
+/// of the store.
 #[test]
 fn every_place_of_an_increment_is_tried() {
     let (start, size) = Bench::function("lost_update", "bump");
@@ -87,7 +89,7 @@ fn programs_without_races_pass_with_every_seed() {
     }
 }
 
-/// What silicon refuses: in the usual mode only the floating-point unit that is off.
+/// Instructions that silicon refuses. The usual mode only detects use of the disabled floating-point unit.
 #[test]
 fn instructions_that_silicon_refuses_fault() {
     let mut bench = Bench::new("traps");

@@ -1,7 +1,7 @@
-//! The programs of the mechanics in QEMU: a second opinion on exceptions and system registers, from the project that the CPU
-//! library was made from. Where the two differ, the table says who is right, and by which clause.
+//! The programs of the mechanics in QEMU: a second opinion on exceptions and system registers, from the project that
+//! the CPU library was made from. For each difference, the table states which emulator is right, and by which clause.
 //!
-//! `cargo xtask test --thorough` installs QEMU and runs this.
+//! `cargo xtask test --thorough` installs QEMU and runs this test.
 
 #[allow(dead_code)]
 mod bench;
@@ -13,14 +13,14 @@ use std::time::Duration;
 
 use bench::Verdict;
 
-/// The machine with the chip that is nearest: an STM32F405.
+/// QEMU's machine with the most similar chip: an STM32F405.
 const MACHINE: &str = "netduinoplus2";
 
-/// How often a program is asked for its verdict, and how long in between: a limit for a program that hangs, not a measurement.
+/// Number of polls for the verdict, and the pause between two polls. This only limits a program that hangs.
 const LOOKS: usize = 200;
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// QEMU with a program.
+/// A QEMU process that runs a program.
 struct Qemu {
     process: Child,
     requests: ChildStdin,
@@ -38,7 +38,7 @@ impl Qemu {
     fn start(program: &str) -> Qemu {
         let mut command = Command::new("qemu-system-arm");
         command.args(["-machine", MACHINE, "-display", "none", "-serial", "none", "-monitor", "none"]);
-        // An instruction takes 8 ns of the machine's time, whatever it takes of ours.
+        // An instruction takes 8 ns of the machine's time, whatever its time on the host.
         command.args(["-icount", "shift=3,sleep=off", "-qmp", "stdio", "-kernel"]).arg(bench::path(program));
         let started = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
         let mut process = started.expect("qemu-system-arm, which `cargo xtask test --thorough` installs");
@@ -57,7 +57,7 @@ impl Qemu {
         line
     }
 
-    /// The answer to a request; events of the machine in between are of no interest.
+    /// Sends a request and returns the answer; events of the machine in between are skipped.
     fn ask(&mut self, request: &str) -> String {
         writeln!(self.requests, "{request}").unwrap();
         loop {
@@ -68,13 +68,13 @@ impl Qemu {
         }
     }
 
-    /// The verdict of a program and what it has noted.
+    /// The first words at an address: the verdict of a program and its notes.
     fn words(&mut self, address: u32) -> [u32; 8] {
         let command = format!("xp /8xw {address:#x}");
         let answer = self.ask(&format!(
             r#"{{"execute":"human-monitor-command","arguments":{{"command-line":"{command}"}}}}"#
         ));
-        // Each line begins with its address, without a space before it.
+        // Each line begins with the address, without a space before it.
         let words =
             answer.split(" 0x").skip(1).filter_map(|word| u32::from_str_radix(word.get(..8)?, 16).ok());
         words.collect::<Vec<u32>>().try_into().expect("eight words")
@@ -95,17 +95,17 @@ fn run(program: &str) -> (Verdict, [u32; 6]) {
     (Verdict::Silent, [0; 6])
 }
 
-/// A program that passes on the emulated board, and what QEMU makes of it where that is something else.
+/// A program that passes on the emulated board, with QEMU's different verdict.
 struct Difference {
     program: &'static str,
     verdict: Verdict,
-    /// Which checks fail, where the program notes each.
+    /// The numbers of the failed checks, if the program notes them.
     notes: &'static [u32],
-    /// Who is right, and by which clause of the ARMv7-M Architecture Reference Manual.
+    /// Which emulator is right, and by which clause of the ARMv7-M Architecture Reference Manual.
     because: &'static str,
 }
 
-/// Programs of which QEMU says the same.
+/// Programs with the same verdict in QEMU.
 const AGREED: [&str; 15] = [
     "basepri",
     "escalation",
@@ -169,8 +169,8 @@ fn qemu_agrees_or_the_difference_is_known() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Three programs are missing: two program the flash of the chip, and QEMU has none that can be programmed; one measures cycles, and QEMU
-/// counts none.
+/// Three programs are excluded: two program the flash of the chip, which QEMU does not support; one measures cycles,
+/// which QEMU does not count.
 #[test]
 fn every_program_is_asked_about() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../images/src/bin");

@@ -1,4 +1,4 @@
-//! Faults of the core that a test makes: an instruction that does not run, a bit of a register that flips.
+//! Faults of the core that a test injects: a skipped instruction, a flipped bit of a register.
 
 use canbus::Time;
 use chip::{Board, Stm32f4, Variant};
@@ -6,7 +6,7 @@ use emulator::{Machine, Model, Point, Stop};
 
 const FLASH: u32 = 0x0800_0000;
 const RAM: u32 = 0x2000_0000;
-/// The first instruction, after stack pointer and entry.
+/// The address of the first instruction, after stack pointer and entry.
 const CODE: u32 = FLASH + 8;
 const COMPARE: u32 = CODE + 8;
 const IT: u32 = CODE + 10;
@@ -32,7 +32,7 @@ fn machine(stops: &[u32]) -> Machine<Stm32f4> {
 
 fn run(machine: &mut Machine<Stm32f4>) -> Stop {
     let until = machine.now() + Time::from_micros(100);
-    // At power-on the chip has the bus looked at, which is not there.
+    // At power-on the chip reports a change for the bus; this test has no bus.
     loop {
         match machine.run_until(until) {
             Stop::Poked => (),
@@ -41,7 +41,7 @@ fn run(machine: &mut Machine<Stm32f4>) -> Stop {
     }
 }
 
-/// What the program has stored of R2 and R3.
+/// The values of R2 and R3 that the program has stored.
 fn result(machine: &mut Machine<Stm32f4>) -> [u8; 2] {
     run(machine);
     let mut bytes = [0; 8];

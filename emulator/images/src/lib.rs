@@ -1,21 +1,21 @@
-//! What the programs share: how they tell their verdict.
+//! The common part of the programs: the report of the verdict.
 #![no_std]
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-// Its vector table, for programs that handle no interrupt of their own too.
+// Links the vector table of the crate, for programs that handle no interrupt of their own too.
 use stm32f4 as _;
 
-/// The verdict lies here for whoever runs the program: it looks the symbol up.
+/// The verdict. The runner of a program finds its address through the symbol.
 #[unsafe(no_mangle)]
 pub static VERDICT: [AtomicU32; 8] = [const { AtomicU32::new(0) }; 8];
 
-/// The first word of the verdict when the program is through and all was well.
+/// The first word of the verdict when the program has finished and all checks passed.
 pub const PASSED: u32 = 0x600D_600D;
-/// The first word of the verdict when the program found a fault; the second says which.
+/// The first word of the verdict when a check failed; the second word is the number of the check.
 pub const FAILED: u32 = 0xBAD0_BAD0;
 
-/// Tells the verdict and stops.
+/// Reports the verdict and stops.
 pub fn finish(check: Result<(), u32>) -> ! {
     if let Err(code) = check {
         VERDICT[1].store(code, Ordering::Relaxed);
@@ -26,12 +26,12 @@ pub fn finish(check: Result<(), u32>) -> ! {
     }
 }
 
-/// Tells a number in words 2 to 7 of the verdict.
+/// Reports a number in words 2 to 7 of the verdict.
 pub fn note(word: usize, value: u32) {
     VERDICT[2 + word % 6].store(value, Ordering::Relaxed);
 }
 
-/// An error with a number when something does not hold.
+/// An error with the number `code` unless `holds`.
 pub fn expect(holds: bool, code: u32) -> Result<(), u32> {
     if holds { Ok(()) } else { Err(code) }
 }

@@ -1,4 +1,4 @@
-//! `cargo sim` itself: builds the world from the command line, lets it run, shows it, and sums up.
+//! The application `cargo sim`: builds the world from the command line, runs and displays it, and returns the summary.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -25,10 +25,10 @@ use crate::setup;
 use crate::summary::Summary;
 use crate::world::World;
 
-/// Of this machine, for the page.
+/// The address for a socketcand port that only this machine can reach; the port is any free one.
 const ANY_PORT: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
-/// Clients, commands and the display are looked at this often, in virtual time.
+/// Period of serving clients, commands and the display, in virtual time.
 const STEP: Time = Time::from_millis(1);
 
 /// A running simulation.
@@ -39,7 +39,7 @@ struct App {
     commands: Option<Receiver<String>>,
     keeper: Option<Keeper>,
     control: Option<Control>,
-    /// Ends with this value.
+    /// The program that serves the page; it ends when this value is dropped.
     _page: Option<Page>,
     candump: Option<BufWriter<File>>,
     interrupted: Arc<AtomicBool>,
@@ -47,7 +47,7 @@ struct App {
     host_time: HostTime,
 }
 
-/// Runs until the time asked for is over, or the user ends it, and returns the summary.
+/// Runs for the requested duration or until the user ends the run, and returns the summary.
 pub fn run(options: Options) -> Result<Summary> {
     let mut app = App::open(options)?;
     let started = Instant::now();
@@ -77,7 +77,7 @@ impl App {
         let flag = Arc::clone(&interrupted);
         ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot catch Ctrl-C")?;
         let asked = options.page();
-        // The page needs one, whoever else does.
+        // The page needs a control connection, even if the user has requested none.
         let control = options.control.or(asked.map(|_| ANY_PORT)).map(Control::listen).transpose()?;
         let control_address = control.as_ref().map(Control::address).transpose()?;
         let page = match (asked, control_address) {
@@ -133,7 +133,7 @@ impl App {
         Ok(())
     }
 
-    /// One millisecond of everything.
+    /// One step of a millisecond: clients, world and display.
     fn step(&mut self, end: Time) -> Result<()> {
         let start = Instant::now();
         self.gateway.poll(&mut self.world);
@@ -195,7 +195,7 @@ impl App {
         }
     }
 
-    /// Keeps what is to be kept.
+    /// Writes the files that outlive the run.
     fn close(&mut self) -> Result<()> {
         if let Some(candump) = &mut self.candump {
             candump.flush().context("cannot write the candump file")?;

@@ -1,4 +1,4 @@
-//! One emulated board: the machine that runs the images, its flash, its log, and what was counted.
+//! One emulated board: the machine that runs the images, its flash, its log, and its counters.
 
 use std::rc::Rc;
 
@@ -18,40 +18,40 @@ use crate::stimuli::{BoardStimuli, Knob, Stimulus};
 use crate::summary::NodeSummary;
 use crate::traffic::Heard;
 
-/// Where the application's header is (memory.x).
+/// The address of the application's header (memory.x).
 const HEADER_ADDRESS: u32 = 0x0802_0000;
-/// Where RAM begins.
+/// Start of RAM.
 const RAM: u32 = 0x2000_0000;
 
 /// The ELF files that every board runs.
 pub struct Images {
     /// The application.
     pub(crate) firmware: Image,
-    /// Its header, signed with the development key.
+    /// The application's header, signed with the development key.
     pub(crate) header: Option<[u8; HEADER_LEN]>,
-    /// What starts it, if anything does.
+    /// The bootloader, if any.
     pub(crate) bootloader: Option<Image>,
 }
 
-/// What a board has kept while it was off.
+/// The memory contents that a board has kept without power.
 #[derive(Clone, Copy)]
 pub(crate) struct Contents<'a> {
     /// The flash array.
     pub(crate) flash: &'a [u8],
-    /// The backup SRAM; `None` when no battery has kept it.
+    /// The backup SRAM; `None` when no battery has kept its content.
     pub(crate) backup: Option<&'a [u8]>,
-    /// Whether the images are written over the flash as a debug probe does it, or it stays as it is.
+    /// Whether the images are written over the flash, as a debug probe does; otherwise the flash stays unchanged.
     pub(crate) writes_images: bool,
 }
 
-/// Which programs a board runs.
+/// The programs that a board runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Programs {
-    /// The images: they were written into its flash.
+    /// The images, which were written into the flash.
     Written,
-    /// The images: its flash has kept them.
+    /// The images, which the flash has kept.
     Kept,
-    /// Others, which its flash has kept. Their log cannot be read.
+    /// Other programs, which the flash has kept. Their log cannot be read.
     Others,
 }
 
@@ -65,12 +65,12 @@ pub struct Board {
     bootloader_flash: u32,
     programs: Programs,
     log: Log,
-    /// Where the core stands still until a watchdog resets it.
+    /// The address at which the core has locked up; a watchdog resets it.
     locked_up: Option<u32>,
 }
 
 impl Board {
-    /// A board with these contents of its memory. It is switched on.
+    /// A board with these memory contents, switched on.
     ///
     /// # Errors
     /// When an image does not fit the chip.
@@ -112,22 +112,22 @@ impl Board {
         })
     }
 
-    /// The node-ID it was given on the command line.
+    /// The node-ID from the command line.
     pub fn id(&self) -> u8 {
         self.id
     }
 
-    /// Which programs it runs.
+    /// The programs that the board runs.
     pub fn programs(&self) -> Programs {
         self.programs
     }
 
-    /// How often its flash has changed.
+    /// Number of changes of the flash.
     pub(crate) fn flash_changes(&self) -> u64 {
         self.machine.flash_changes()
     }
 
-    /// Runs to `limit`, or to the moment at which it requests a frame; returns the time reached.
+    /// Runs to `limit`, or to the request of a frame if that comes first; returns the instant reached.
     pub(crate) fn run_until(&mut self, limit: Time) -> Time {
         let stop = self.machine.run_until(limit);
         self.locked_up = if let Stop::Lockup { pc } = stop { Some(pc) } else { None };
@@ -139,18 +139,18 @@ impl Board {
         &mut self.machine
     }
 
-    /// Its CAN controller.
+    /// The CAN controller.
     pub(crate) fn controller(&mut self) -> &mut dyn Controller {
         self.machine.peripherals_mut().can1_mut()
     }
 
     pub(crate) fn apply(&mut self, stimulus: &Stimulus, now: Time) {
-        // It may have run on by a few instructions, and for its chip time only goes forwards.
+        // The board may have run a few instructions further, and the chip's time cannot go back.
         let now = now.max(self.machine.now());
         stimulus.act_on(self.machine.peripherals_mut().plant_mut(now), now);
     }
 
-    /// What its sensors see.
+    /// The current stimuli of the sensors.
     pub(crate) fn stimuli(&self, node_id: u8) -> BoardStimuli {
         let (now, plant) = (self.machine.now(), self.machine.peripherals().plant());
         let knob = |spec: &dyn ToString, value| Knob { spec: spec.to_string(), value };
@@ -167,7 +167,7 @@ impl Board {
         }
     }
 
-    /// What the firmware has logged since the last call.
+    /// Reads the lines that the firmware has logged since the last call.
     pub(crate) fn read_log(&mut self, into: &mut Vec<Line>) {
         let (at, node) = (self.machine.now(), self.id);
         let (Some(control_block), Some(table)) = (self.firmware.rtt, &self.images.firmware.log) else {
@@ -186,23 +186,23 @@ impl Board {
         self.machine.flash()
     }
 
-    /// What the battery keeps when the board is switched off now.
+    /// The content of the backup SRAM that the battery would keep if the board were switched off now.
     pub fn backup(&self) -> Option<Vec<u8>> {
         self.machine.peripherals().kept_by_battery(self.machine.now())
     }
 
-    /// Rules of the chip that its program has broken.
+    /// Rules of the chip that the board's program has broken.
     pub(crate) fn broken_rules(&self) -> Vec<String> {
         let images = [Some(&self.images.firmware), self.images.bootloader.as_ref()];
         figures::broken_rules(&self.machine, |pc| {
-            // The bootloader lies below the application, and runs from RAM.
+            // The bootloader is located below the application, and also runs from RAM.
             let ours =
                 if (FLASH_BASE..HEADER_ADDRESS).contains(&pc) || pc >= RAM { images[1] } else { images[0] };
             ours.or(images[0])?.place(pc)
         })
     }
 
-    /// Whether its program has broken a rule of the chip.
+    /// Whether the board's program has broken a rule of the chip.
     pub(crate) fn has_broken_rules(&self) -> bool {
         self.machine.incidents().iter().any(|(_, incident)| matches!(incident, Incident::Breach { .. }))
     }
@@ -244,7 +244,7 @@ impl Board {
 }
 
 impl Images {
-    /// Firmware and bootloader as the chip takes them.
+    /// Firmware and bootloader, parsed for the chip.
     fn parsed(&self, machine: &Machine<Stm32f4>) -> Result<(emulator::Image, Option<emulator::Image>)> {
         let parse = |image: &Image| {
             machine

@@ -69,13 +69,13 @@ pub struct Options {
     #[arg(long, requires = "flash")]
     pub reflash: bool,
 
-    /// Let interrupts come between any two instructions, and time advance with each of them; the number chooses one of the
-    /// possible courses. Several times slower.
+    /// Let interrupts come between any two instructions; the number selects one of the possible interleavings. Several
+    /// times slower.
     #[arg(long, value_name = "SEED")]
     pub interleave: Option<u64>,
 
-    /// Count the cycles of the cores by this end of what is published: best, modelled or worst. At worst the flash is waited for
-    /// whenever its caches do not have what is asked for. Silicon lies between best and worst.
+    /// The cycle counts of the cores within the published range: best, modelled or worst. With worst, a core waits for
+    /// the flash at each miss of its caches. Silicon lies between best and worst.
     #[arg(long, value_name = "ESTIMATE", default_value = "modelled")]
     pub cycles: Estimate,
 
@@ -111,7 +111,8 @@ pub struct Options {
     #[arg(long, value_name = "[ID=]SPEC", value_parser = |text: &str| Stimulus::parse("fault", text))]
     pub fault: Vec<Targeted<Stimulus>>,
 
-    /// How far the board's oscillator is off, in ppm: what the CAN controller makes of it, to within 100 ppm at 1 Mbit/s.
+    /// Error of the board's oscillator in ppm; the bit time of the CAN controller follows to within 100 ppm at 1
+    /// Mbit/s.
     #[arg(long, value_name = "[ID=]PPM", allow_negative_numbers = true)]
     pub oscillator: Vec<Targeted<Oscillator>>,
 
@@ -119,8 +120,9 @@ pub struct Options {
     #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
     pub load: u8,
 
-    /// Show the page in a browser here, and take the next free port where this one is taken; 127.0.0.1:8301 if it is left out. With
-    /// --speed max there is a page only when it is asked for: virtual time is faster than anybody can look.
+    /// Serve the page for a browser here, or on the next free port if this one is in use; the default is
+    /// 127.0.0.1:8301. With --speed max there is a page only with this flag, because virtual time is then too fast to
+    /// watch.
     #[arg(long, value_name = "ADDR:PORT", value_parser = address)]
     pub page: Option<SocketAddr>,
 
@@ -136,31 +138,31 @@ pub struct Options {
     #[arg(long, value_name = "ADDR:PORT", value_parser = address)]
     pub control: Option<SocketAddr>,
 
-    /// Print JSON only: a line with the addresses served when they are, and the summary as the last line. The log goes to
-    /// the standard error output.
+    /// Print JSON only: one line with the served addresses as soon as they are served, and the summary as the last
+    /// line. The log goes to the standard error output.
     #[arg(long)]
     pub json: bool,
 }
 
-/// A board that was asked for.
+/// A board from the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
-    /// Node-ID, 1 to 127, or from [`UNCONFIGURED`] on the number of a board that has none.
+    /// Node-ID, 1 to 127, or a number from [`UNCONFIGURED`] on for a board without a node-ID.
     pub id: u8,
-    /// What it measures.
+    /// The personality of the board.
     pub personality: Personality,
-    /// Whether it is to detect the bit rate.
+    /// Whether the board detects the bit rate.
     pub auto: bool,
 }
 
-/// What the boards are called, for messages.
+/// The valid numbers of boards, for messages.
 pub(crate) const BOARD_NUMBERS: &str =
     "a node-ID is a number from 1 to 127, and boards without a node-ID have 201 to 254";
 
-/// Where the page usually is.
+/// The default address of the page.
 const PAGE: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8301);
 
-/// The first number of boards without a node-ID.
+/// The first number of a board without a node-ID.
 pub const UNCONFIGURED: u8 = 201;
 
 impl FromStr for Node {
@@ -179,7 +181,7 @@ impl FromStr for Node {
 }
 
 impl Options {
-    /// Where the page is to be, and the program that serves it; `None` where there is to be none.
+    /// The address for the page and the program that serves it; `None` when no page is wanted.
     pub(crate) fn page(&self) -> Option<(SocketAddr, &Path)> {
         let program = self.page_program.as_deref().filter(|_| !self.no_page)?;
         let usual = (self.speed == Speed::Real).then_some(PAGE);
@@ -187,7 +189,7 @@ impl Options {
     }
 }
 
-/// How virtual time relates to that of the host.
+/// The speed of virtual time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Speed {
     /// One virtual second takes one second.
@@ -199,21 +201,21 @@ pub enum Speed {
 /// Levels of the firmware's log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub enum LogLevel {
-    /// Everything.
+    /// All messages.
     Trace,
-    /// For its developers.
+    /// Messages for developers.
     Debug,
-    /// What happens.
+    /// Normal events.
     Info,
-    /// What should not happen.
+    /// Unexpected events.
     Warn,
-    /// What must not happen.
+    /// Errors.
     Error,
-    /// Nothing.
+    /// No messages.
     Off,
 }
 
-/// A node-ID of CiA 301, or the number of a board that has none.
+/// Parses a node-ID of CiA 301, or the number of a board without a node-ID.
 pub(crate) fn board_number(text: &str) -> Option<u8> {
     text.parse().ok().filter(|id| matches!(id, 1..=127 | UNCONFIGURED..=254))
 }
@@ -223,13 +225,13 @@ fn bit_rate(text: &str) -> Result<u16, String> {
     rate.ok_or_else(|| format!("CANopen has these bit rates in kbit/s: {:?}", DeviceRecord::BIT_RATES))
 }
 
-/// An address may be a name, as localhost is.
+/// Parses an address, which may be a name such as localhost.
 fn address(text: &str) -> Result<SocketAddr, String> {
     let mut addresses = text.to_socket_addrs().map_err(|_| "it is not of the form ADDR:PORT".to_owned())?;
     addresses.next().ok_or_else(|| "no such host".to_owned())
 }
 
-/// Virtual seconds; ten years are as good as for ever.
+/// Parses virtual seconds; the limit of ten years serves as "for ever".
 fn seconds(text: &str) -> Result<Time, String> {
     const MOST: f64 = 315_360_000.0;
     let seconds = text.parse::<f64>().ok().filter(|seconds| (0.0..=MOST).contains(seconds));
@@ -238,7 +240,7 @@ fn seconds(text: &str) -> Result<Time, String> {
     Ok(Time::from_micros((seconds * 1e6).round() as u64))
 }
 
-/// The first paragraph of clap's message, which says what is wrong, without the usage that follows it.
+/// The first paragraph of clap's message, which describes the error; the usage text after it is left out.
 pub fn one_line(message: &str) -> String {
     let words = message.lines().take_while(|line| !line.trim().is_empty()).flat_map(str::split_whitespace);
     words.collect::<Vec<_>>().join(" ")

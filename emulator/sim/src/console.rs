@@ -1,4 +1,4 @@
-//! Commands that are typed while the simulation runs.
+//! Commands that the user types while the simulation runs.
 
 use std::io::BufRead;
 use std::sync::mpsc::{Receiver, channel};
@@ -6,19 +6,19 @@ use std::thread;
 
 use crate::stimuli::{Stimulus, Targeted};
 
-/// What can be asked for.
+/// A command.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// Another stimulus from now on.
+    /// Sets a stimulus from now on.
     Stimulus(Targeted<Stimulus>),
-    /// End the run, with its summary.
+    /// Ends the run, with its summary.
     Quit,
 }
 
-/// How to write a command.
+/// The syntax of the commands.
 pub const HELP: &str = "commands: pressure|temperature|thermistor|shaft|button|fault [ID=]SPEC, e.g. pressure 1=const:300000; quit";
 
-/// Reads one line; `None` for an empty one.
+/// Parses one line; `None` for an empty line.
 pub fn parse(line: &str) -> Option<Result<Command, String>> {
     let line = line.trim();
     let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
@@ -33,7 +33,7 @@ pub fn parse(line: &str) -> Option<Result<Command, String>> {
     })
 }
 
-/// Lines from the standard input, read by a thread of their own.
+/// Lines from the standard input; a separate thread reads them.
 pub fn lines() -> Receiver<String> {
     let (sender, lines) = channel();
     thread::spawn(move || {

@@ -1,8 +1,8 @@
-//! The control connection: programs change what the sensors see, and look at it, over TCP.
+//! The control connection: programs set and read the stimuli of the sensors over TCP.
 //!
-//! A line is a command, as it is typed on the terminal, and a line of JSON the answer. `boards` asks for all stimuli; after
-//! `watch` they are told whenever one has changed, and once a second. Everything runs in the world's thread, between two steps,
-//! and nothing waits.
+//! A line of text is a command, as typed on the terminal; the answer is a line of JSON. `boards` returns all stimuli.
+//! After `watch` a client gets them whenever a stimulus has changed, and once a second. All connections are served in
+//! the world's thread, between two steps, without waiting.
 
 use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -15,20 +15,20 @@ use serde_json::{Value, json};
 use crate::console::{self, Command};
 use crate::world::World;
 
-/// Connections at the same time.
+/// Maximum number of simultaneous connections.
 const CLIENTS: usize = 16;
-/// The longest command.
+/// Maximum length of a command in bytes.
 const LINE: usize = 1024;
-/// Bytes that may wait for a client; one that does not read them is let go.
+/// Maximum number of bytes that may wait for a client; a client that does not read is disconnected.
 const WAITING: usize = 256 * 1024;
-/// How often those who watch are told what has not been changed: a sine goes on.
+/// Period of reports to watching clients without a change of a stimulus: the value of a sine changes all the time.
 const PERIOD: Time = Time::from_millis(1000);
 
-/// The port and its clients.
+/// The listening port and the clients.
 pub struct Control {
     listener: TcpListener,
     clients: Vec<Client>,
-    /// The newest change that was told, and when.
+    /// The number of the last reported change, and the instant of the report.
     told: (u64, Time),
 }
 
@@ -43,10 +43,10 @@ struct Client {
 }
 
 impl Control {
-    /// Listens. Port 0 takes a free one.
+    /// Listens on an address. Port 0 takes a free port.
     ///
     /// # Errors
-    /// When the address cannot be had; the message names it.
+    /// When the address is not available; the message names the address.
     pub fn listen(address: SocketAddr) -> Result<Control> {
         let listen = || {
             let listener = TcpListener::bind(address)?;
@@ -57,15 +57,15 @@ impl Control {
         Ok(Control { listener, clients: Vec::new(), told: (0, Time::ZERO) })
     }
 
-    /// What it listens on.
+    /// The address of the listening port.
     ///
     /// # Errors
-    /// When the host does not tell.
+    /// When the host does not return the address.
     pub fn address(&self) -> Result<SocketAddr> {
         self.listener.local_addr().context("the control connection has no address")
     }
 
-    /// Serves all clients. Returns whether one has asked for the end.
+    /// Serves all clients. Returns whether a client has requested the end of the run.
     pub fn poll(&mut self, world: &mut World) -> bool {
         while self.clients.len() < CLIENTS
             && let Ok((stream, _)) = self.listener.accept()
@@ -82,7 +82,7 @@ impl Control {
         quit
     }
 
-    /// Tells those who watch.
+    /// Reports the stimuli to the watching clients.
     fn tell(&mut self, world: &World) {
         let (changes, at) = self.told;
         let is_due = world.stimuli_changes() != changes || world.now().since(at) >= PERIOD;
@@ -94,12 +94,12 @@ impl Control {
     }
 }
 
-/// What came of a line.
+/// The answer to a line.
 enum Answer {
     Line(Value),
-    /// The same, and from now on again.
+    /// An answer, and further reports from now on.
     Watch(Value),
-    /// It is no command of this connection.
+    /// The line is no command of this connection.
     No(String),
 }
 
@@ -122,7 +122,7 @@ fn obey(line: &str, world: &mut World, quit: &mut bool) -> Option<Answer> {
     })
 }
 
-/// All stimuli, and the faults that there can be.
+/// All stimuli, and the names of all faults.
 fn boards(world: &World) -> Value {
     let faults: Vec<Value> =
         FaultKind::all().map(|kind| json!({ "name": kind.name(), "text": kind.text() })).collect();
@@ -146,7 +146,7 @@ impl Client {
         })
     }
 
-    /// Takes the lines that have arrived.
+    /// Processes the received lines.
     fn listen(&mut self, mut obey: impl FnMut(&str) -> Option<Answer>) {
         let mut bytes = [0; LINE];
         match self.stream.read(&mut bytes) {
@@ -165,7 +165,8 @@ impl Client {
                 }
                 Some(Answer::No(error)) => {
                     self.say(&json!({ "error": error }).to_string());
-                    // A browser that a page has told to send a request here begins with no command.
+                    // A web page can make a browser send a request to this port. Such a request does not begin with a
+                    // command.
                     if !self.has_spoken {
                         return self.leave();
                     }
@@ -189,7 +190,7 @@ impl Client {
         self.is_gone = true;
     }
 
-    /// Writes what the client takes.
+    /// Writes as much as the client accepts.
     fn flush(&mut self) {
         while !self.unsent.is_empty() && !self.is_gone {
             match self.stream.write(&self.unsent) {

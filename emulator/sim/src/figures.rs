@@ -1,4 +1,4 @@
-//! What a board's machine has counted, as figures for the summary.
+//! The counters of a board's machine as figures for the summary.
 
 use canbus::Time;
 use chip::Stm32f4;
@@ -8,14 +8,14 @@ use crate::image::Image;
 use crate::status::{per_second, share};
 use crate::summary::{Cpu, Memory, Receiving, Sampling};
 
-/// DMA2 stream 0 takes the samples over: its interrupt is the sampling task (RM0390, table 38).
+/// DMA2 stream 0 delivers the samples: its interrupt is the sampling task (RM0390, table 38).
 const SAMPLING: Exception = Exception::irq(56);
 /// CAN1 receive FIFO 0 and 1.
 const RECEIVE: [Exception; 2] = [Exception::irq(20), Exception::irq(21)];
-/// Samples are due at every millisecond.
+/// The sampling period.
 const PERIOD: Time = Time::from_millis(1);
 
-/// The 1 kHz measurement.
+/// Figures of the 1 kHz measurement.
 pub(crate) fn sampling(machine: &Machine<Stm32f4>) -> Sampling {
     let activity = machine.stats().of(SAMPLING);
     // The intervals are zero before the second sample.
@@ -30,7 +30,7 @@ pub(crate) fn sampling(machine: &Machine<Stm32f4>) -> Sampling {
     }
 }
 
-/// Frames for this node.
+/// Figures of the received frames.
 pub(crate) fn receiving(machine: &Machine<Stm32f4>) -> Receiving {
     let reception = machine.peripherals().can1().reception();
     let instructions = RECEIVE.iter().map(|&exception| machine.stats().of(exception).instructions).sum();
@@ -41,15 +41,15 @@ pub(crate) fn receiving(machine: &Machine<Stm32f4>) -> Receiving {
     }
 }
 
-/// The core.
+/// Figures of the core.
 pub(crate) fn cpu(machine: &Machine<Stm32f4>) -> Cpu {
     let stats = machine.stats();
     let load = share(machine.now().since(stats.asleep), machine.now());
     Cpu { instructions: stats.instructions, load }
 }
 
-/// What the images take. The stack grows down from its start towards the start of RAM, and RAM that was never
-/// written still has what it came up with.
+/// Memory of the images. The stack grows down towards the start of RAM. RAM that was never written still has its
+/// content from power-on, which shows the deepest stack.
 pub(crate) fn memory(
     machine: &Machine<Stm32f4>,
     image: &Image,
@@ -83,7 +83,7 @@ pub(crate) fn broken_rules(machine: &Machine<Stm32f4>, place: impl Fn(u32) -> Op
     told.collect()
 }
 
-/// Faults and resets after power-on; of a board that resets in circles only the first of them.
+/// Faults and resets after power-on; only the first ones of a board that resets again and again.
 pub(crate) fn incidents(machine: &Machine<Stm32f4>) -> impl Iterator<Item = String> {
     const SHOWN: usize = 10;
     let is_told = |incident: &&(Time, Incident)| !matches!(incident.1, Incident::Breach { .. });

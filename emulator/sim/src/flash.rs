@@ -1,4 +1,4 @@
-//! What boards keep without power as files, so that it outlives a run: the flash, and the backup SRAM.
+//! Files for the memory that boards keep without power, from one run to the next: the flash and the backup SRAM.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use chip::Variant;
 
-/// Bytes of its backup SRAM.
+/// Size of the backup SRAM in bytes.
 const BACKUP_SIZE: usize = 4 * 1024;
 
-/// One file a node.
+/// The flash file of a node.
 pub fn file(dir: &Path, node: u8) -> PathBuf {
     dir.join(format!("node-{node}.flash"))
 }
@@ -19,22 +19,22 @@ fn backup_file(dir: &Path, node: u8) -> PathBuf {
     dir.join(format!("node-{node}.backup"))
 }
 
-/// The kept contents of a board's flash; `None` when there are none yet.
+/// The kept content of a board's flash; `None` without a file.
 pub fn load(dir: &Path, node: u8, chip: Variant) -> Result<Option<Vec<u8>>> {
     read(&file(dir, node), chip.flash_size() as usize)
 }
 
-/// What a board's battery has kept; `None` when it has kept nothing.
+/// The kept content of a board's backup SRAM; `None` without a file.
 pub(crate) fn load_backup(dir: &Path, node: u8) -> Result<Option<Vec<u8>>> {
     read(&backup_file(dir, node), BACKUP_SIZE)
 }
 
-/// Keeps the contents of a board's flash. A reader sees the old or the new contents, never a part.
+/// Writes the content of a board's flash. A reader sees either the old or the new content, never a mixture.
 pub fn save(dir: &Path, node: u8, bytes: &[u8]) -> Result<()> {
     write(dir, &file(dir, node), bytes)
 }
 
-/// Keeps what a board's battery keeps: with `None` nothing is kept any more.
+/// Writes the content of a board's backup SRAM; `None` removes the file.
 pub(crate) fn save_backup(dir: &Path, node: u8, bytes: Option<&[u8]>) -> Result<()> {
     let path = backup_file(dir, node);
     match bytes {
@@ -76,7 +76,7 @@ mod tests {
     const CHIP: Variant = Variant::F446;
     const SIZE: usize = CHIP.flash_size() as usize;
 
-    /// A directory of this test's own, empty.
+    /// An empty directory for this test.
     fn dir(test: &str) -> PathBuf {
         let dir = std::env::temp_dir().join(format!("sim-flash-{test}-{}", std::process::id()));
         let _ = fs::remove_dir_all(&dir);

@@ -1,4 +1,4 @@
-//! The first lines: what runs, and what to type to talk to it.
+//! The first lines: the running boards and the served addresses, with the commands to connect.
 
 use std::net::SocketAddr;
 
@@ -9,19 +9,19 @@ use crate::cli::Options;
 use crate::console;
 use crate::gateway::BUS_NAME;
 
-/// What there is to tell, with the addresses that are really served.
+/// The content of the greeting, with the addresses that are actually served.
 pub(crate) struct Greeting<'a> {
     pub(crate) options: &'a Options,
     pub(crate) socketcand: SocketAddr,
     pub(crate) slcan: Option<SocketAddr>,
     pub(crate) control: Option<SocketAddr>,
-    /// Where the page is, or why there is none; `None` where none was asked for.
+    /// The address of the page, or the reason why there is none; `None` when no page was requested.
     pub(crate) page: Option<Result<&'a str, &'a str>>,
     pub(crate) boards: &'a [Board],
 }
 
 impl Greeting<'_> {
-    /// For people: the start of the display.
+    /// Lines for the start of the display.
     pub(crate) fn lines(&self) -> Vec<String> {
         let Greeting { options, socketcand, slcan, control, page, boards } = *self;
         let nodes: Vec<String> =
@@ -67,7 +67,7 @@ impl Greeting<'_> {
         lines
     }
 
-    /// For programs: one line.
+    /// One line of JSON for programs.
     pub(crate) fn json(&self) -> Value {
         let boards =
             self.boards.iter().map(|board| json!({ "id": board.id(), "programs": name(board.programs()) }));
@@ -78,7 +78,7 @@ impl Greeting<'_> {
     }
 }
 
-/// What became of the flash that a board has kept.
+/// The programs in the board's flash: written now, or kept.
 fn programs(board: &Board) -> String {
     let what = match board.programs() {
         Programs::Written => "firmware and bootloader are written into its flash",

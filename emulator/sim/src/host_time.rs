@@ -1,11 +1,11 @@
-//! Where the host's time goes, for who wants a run to be faster.
+//! The host's time by kind of work, to find out what makes a run slow.
 
 use std::fmt;
 use std::time::{Duration, Instant};
 
 use serde::{Serialize, Serializer};
 
-/// What the host works for.
+/// A kind of work.
 #[derive(Clone, Copy, Debug)]
 pub enum Work {
     /// The cores and the chips of the boards.
@@ -18,22 +18,22 @@ pub enum Work {
     Output,
 }
 
-/// Names of the kinds of work, in their order.
+/// Names of the kinds of work, in the order of [`Work`].
 const NAMES: [&str; 4] = ["boards", "bus", "clients", "output"];
 
-/// Time by the kind of work.
+/// The host's time by kind of work.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HostTime([Duration; NAMES.len()]);
 
 impl HostTime {
-    /// Counts what has passed since `start` for this work, and returns the present time.
+    /// Adds the time since `start` to this work, and returns the current time.
     pub fn count(&mut self, work: Work, start: Instant) -> Instant {
         let now = Instant::now();
         self.0[work as usize] += now - start;
         now
     }
 
-    /// The time of both.
+    /// The sum of both.
     #[must_use]
     pub fn and(&self, other: &HostTime) -> HostTime {
         HostTime(std::array::from_fn(|work| self.0[work] + other.0[work]))
@@ -50,7 +50,7 @@ impl fmt::Display for HostTime {
 }
 
 impl Serialize for HostTime {
-    /// Seconds by name.
+    /// Seconds of each kind of work, by name.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(NAMES.iter().zip(self.0.map(|time| time.as_secs_f64())))
     }

@@ -1,27 +1,27 @@
-//! An ELF file with what is needed to read its log.
+//! An ELF file with the data needed to read its log.
 
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use defmt_decoder::Table;
 
-/// One of the two files that a board runs.
+/// The firmware or the bootloader.
 pub struct Image {
-    /// Its path, for messages.
+    /// The path of the file, for messages.
     pub(crate) path: String,
-    /// The file.
+    /// The content of the file.
     pub(crate) elf: Vec<u8>,
     /// The log's format strings; `None` for an image without a log.
     pub(crate) log: Option<Table>,
-    /// Where its stack starts, which grows downwards.
+    /// The start address of the stack, which grows downwards.
     pub(crate) stack_start: Option<u32>,
 }
 
 impl Image {
-    /// Reads a file; the error is one line that names it.
+    /// Reads a file; the error is one line that names the file.
     ///
     /// # Errors
-    /// When it cannot be read, or is no ELF file.
+    /// When the file cannot be read, or is no ELF file.
     pub fn load(path: &Path) -> Result<Image> {
         let name = path.display().to_string();
         let elf = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
@@ -37,7 +37,7 @@ impl Image {
 }
 
 impl Image {
-    /// Where the code at an address is written: a file and a line.
+    /// The source file and line of the code at an address.
     pub(crate) fn place(&self, address: u32) -> Option<String> {
         let loader = addr2line::Loader::new(&self.path).ok()?;
         let place = loader.find_location(address.into()).ok()??;

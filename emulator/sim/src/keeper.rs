@@ -1,4 +1,5 @@
-//! Writes what boards keep without power to files while the simulation runs: whoever kills it loses a second at most.
+//! Writes the boards' flash to files while the simulation runs, so that a killed simulation loses one second at most.
+//! The backup SRAM is written at the end.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -8,24 +9,24 @@ use anyhow::Result;
 use crate::board::Board;
 use crate::flash;
 
-/// How often boards are looked at, in the host's time.
+/// Period of the checks for changes, in the host's time.
 const PERIOD: Duration = Duration::from_millis(1000);
 
-/// The directory of the files, and what is in them.
+/// The directory of the files, and the state of the files.
 pub(crate) struct Keeper {
     dir: PathBuf,
-    /// For each board how often its flash had changed when it was written.
+    /// For each board, the number of changes of its flash when it was last written.
     written: Vec<Option<u64>>,
     looked: Instant,
 }
 
 impl Keeper {
-    /// Nothing is written yet.
+    /// A keeper that has written nothing yet.
     pub(crate) fn new(dir: PathBuf) -> Keeper {
         Keeper { dir, written: Vec::new(), looked: Instant::now() }
     }
 
-    /// Writes the boards whose flash has changed, when it is time to at `now`.
+    /// Writes the boards whose flash has changed, if a check is due at `now`.
     ///
     /// # Errors
     /// When a file cannot be written; the message names it.
@@ -45,7 +46,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Writes everything, at the end.
+    /// Writes the flash and the backup SRAM of all boards, at the end.
     ///
     /// # Errors
     /// When a file cannot be written; the message names it.

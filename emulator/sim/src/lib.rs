@@ -1,8 +1,8 @@
-//! `cargo sim`: emulated boards, a CAN bus in virtual time, and the programs that talk to them.
+//! `cargo sim`: emulated boards and a CAN bus in virtual time, for programs that communicate with the boards.
 //!
-//! [`world`] is the simulation: deterministic, in one thread, without a socket or a clock of the host. Around it
-//! lie the [`gateway`] for clients, the [`display`], and [`app`], which ties them together. Tests build a
-//! [`world::World`] with [`setup`] and let it run as fast as it can.
+//! [`world`] is the simulation: deterministic, in one thread, without sockets and without the host's clock. The
+//! [`gateway`] serves clients, the [`display`] shows the state, and [`app`] connects all of them. Tests build a
+//! [`world::World`] with [`setup`] and run it as fast as possible.
 
 pub mod app;
 pub mod board;

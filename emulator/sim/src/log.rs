@@ -1,4 +1,4 @@
-//! The firmware's log: defmt frames in a ring in the board's RAM, read as a debug probe reads them.
+//! The firmware's log: defmt frames in a ring buffer in the board's RAM, read in the same way as by a debug probe.
 //!
 //! Layout of the control block: SEGGER, "J-Link User Guide" UM08001, chapter RTT; `defmt-rtt` has one up-channel.
 
@@ -10,17 +10,17 @@ use crate::cli::LogLevel;
 /// One line of a board's log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Line {
-    /// Virtual time at which it was read, at most a millisecond after it was written.
+    /// Virtual time of the read, at most a millisecond after the line was written.
     pub at: Time,
-    /// The node that wrote it.
+    /// The node of the board.
     pub node: u8,
-    /// Its level.
+    /// The log level.
     pub level: LogLevel,
-    /// What it says.
+    /// The message.
     pub text: String,
 }
 
-/// The RAM of a board, as a probe sees it.
+/// Access to the RAM of a board, like that of a debug probe.
 pub(crate) trait Ram {
     /// Reads bytes at an absolute address; `None` outside of RAM.
     fn read(&self, address: u32, bytes: &mut [u8]) -> Option<()>;
@@ -28,15 +28,15 @@ pub(crate) trait Ram {
     fn write(&mut self, address: u32, bytes: &[u8]) -> Option<()>;
 }
 
-/// Identifies the control block once the firmware has written it.
+/// The magic number of the control block; the firmware writes it at start-up.
 const MAGIC: &[u8; 16] = b"SEGGER RTT\0\0\0\0\0\0";
 /// Offsets from the control block: buffer, size, write offset and read offset of up-channel 0.
 const UP_CHANNEL: u32 = 28;
 const READ_OFFSET: u32 = 40;
-/// A larger ring than this is taken for garbage.
+/// Maximum size of the ring; a larger value is treated as garbage.
 const MAX_RING: u32 = 0x1_0000;
 
-/// Takes what the firmware has written into the ring since the last call.
+/// Moves the bytes that the firmware has written since the last call out of the ring.
 pub(crate) fn drain(ram: &mut dyn Ram, control_block: u32, into: &mut Vec<u8>) -> Option<()> {
     let mut magic = [0; 16];
     ram.read(control_block, &mut magic)?;
@@ -63,14 +63,14 @@ fn words<const N: usize>(ram: &dyn Ram, address: u32) -> Option<[u32; N]> {
     Some(words)
 }
 
-/// Decodes what `drain` has taken.
+/// The decoder of the drained bytes.
 #[derive(Debug, Default)]
 pub(crate) struct Log {
     pending: Vec<u8>,
 }
 
 impl Log {
-    /// Reads the ring and hands every complete line to `sink`.
+    /// Reads the ring and passes every complete line to `sink`.
     pub(crate) fn poll(
         &mut self,
         table: &Table,
@@ -83,7 +83,8 @@ impl Log {
         }
     }
 
-    /// Frames end with a zero (rzCOBS, which defmt uses by default); what follows the last one waits.
+    /// Decodes complete frames. Frames end with a zero (rzCOBS, which defmt uses by default); an incomplete frame stays
+    /// pending.
     fn decode(&mut self, table: &Table, sink: &mut dyn FnMut(LogLevel, String)) {
         let Some(end) = self.pending.iter().rposition(|&byte| byte == 0) else { return };
         let mut decoder = table.new_stream_decoder();
@@ -101,7 +102,7 @@ impl Log {
     }
 }
 
-/// `println!` has no level and is always shown.
+/// The level of a frame. `println!` has no level and is always shown.
 fn level(frame: &Frame) -> LogLevel {
     match frame.level().map(|level| level.as_str()) {
         Some("trace") => LogLevel::Trace,

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use clap::Parser;
 use sim::cli::Options;
 
-/// Something that the user can put right: a flag, a file, a port in use.
+/// Exit status for an error that the user can correct: a flag, a file, a port in use.
 const USAGE: u8 = 2;
-/// A program did what its chip does not forgive; the summary says what and where.
+/// Exit status when a program has broken a rule of its chip; the summary names the rule and the place.
 const BROKEN_RULE: u8 = 1;
 
 fn main() -> ExitCode {
@@ -27,12 +27,12 @@ fn main() -> ExitCode {
         Err(error) => return refuse(&format!("error: {error:#}"), json),
     };
     let text = if json { format!("{}\n", serde_json::json!(summary)) } else { summary.to_string() };
-    // Nobody may be reading any more.
+    // The reader may have closed the output.
     let _ = io::stdout().write_all(text.as_bytes());
     if summary.has_broken_rules() { ExitCode::from(BROKEN_RULE) } else { ExitCode::SUCCESS }
 }
 
-/// As `nodectl` does: with --json an error is an object on the standard output.
+/// Reports an error like `nodectl`: with --json, as an object on the standard output.
 fn refuse(line: &str, json: bool) -> ExitCode {
     if json {
         let error = line.strip_prefix("error: ").unwrap_or(line);

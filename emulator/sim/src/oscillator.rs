@@ -4,10 +4,10 @@ use std::str::FromStr;
 
 use chip::Board;
 
-/// The most that can be asked for: 2 %.
+/// Largest error in ppm: 2 %.
 const MOST: i32 = 20_000;
 
-/// How far the oscillator of a board is off, in parts per million: positive is fast.
+/// The error of a board's oscillator in parts per million: positive is fast.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Oscillator(i32);
 

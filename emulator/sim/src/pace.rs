@@ -5,23 +5,22 @@ use std::time::{Duration, Instant};
 
 use canbus::Time;
 
-/// Being late by more than this is forgotten instead of made good: a host that was suspended must not be
-/// followed by a burst.
+/// A longer delay is not caught up: after a suspension of the host, the simulation must not run in a burst.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// Ties the two clocks together.
+/// The relation of the two clocks.
 pub(crate) struct Pace {
     host: Instant,
     world: Time,
 }
 
 impl Pace {
-    /// Virtual time 0 is now.
+    /// A pace with virtual time 0 at the current time of the host.
     pub(crate) fn new() -> Pace {
         Pace { host: Instant::now(), world: Time::ZERO }
     }
 
-    /// Returns when the host's clock has reached `now`.
+    /// Waits until the host's clock has reached `now`.
     pub(crate) fn wait(&mut self, now: Time) {
         let host = Instant::now();
         match self.lead(now, host) {
@@ -31,7 +30,7 @@ impl Pace {
         }
     }
 
-    /// How far virtual time is ahead, or else how far it is behind.
+    /// The lead of virtual time over the host's clock; the error is its delay.
     fn lead(&self, now: Time, host: Instant) -> Result<Duration, Duration> {
         let due = self.host + Duration::from_micros(now.since(self.world).as_micros());
         due.checked_duration_since(host).ok_or_else(|| host - due)

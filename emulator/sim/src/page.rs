@@ -1,4 +1,4 @@
-//! The page in the browser: a program of its own (`nodectl serve`), with which the simulator shares two connections.
+//! The page in the browser: a separate program (`nodectl serve`), which gets two connections to the simulator.
 
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
@@ -12,17 +12,18 @@ use serde_json::Value;
 
 use crate::gateway::BUS_NAME;
 
-/// How long the program may take to say where the page is.
+/// Time limit for the program to report the address of the page.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The program that serves the page. It ends when its standard input does: with the simulator, however that ends.
+/// The program that serves the page. The program ends when its standard input closes, and so with the simulator in any
+/// case.
 pub(crate) struct Page {
-    /// Holds the other end of its standard input.
+    /// Owns the other end of the program's standard input.
     _program: Option<Child>,
     address: Result<String, String>,
 }
 
-/// The connections that the program is given, and where the page is to be.
+/// The connections for the program, and the address for the page.
 pub(crate) struct Connections {
     pub(crate) socketcand: SocketAddr,
     pub(crate) control: SocketAddr,
@@ -30,12 +31,12 @@ pub(crate) struct Connections {
 }
 
 impl Page {
-    /// What a browser opens, or why there is nothing to open.
+    /// The address for the browser, or the reason why there is no page.
     pub(crate) fn address(&self) -> Result<&str, &str> {
         self.address.as_deref().map_err(String::as_str)
     }
 
-    /// Starts the program, and waits until it says where the page is. Without it the simulation runs all the same.
+    /// Starts the program, and waits until it reports the address of the page. A failure does not stop the simulation.
     pub(crate) fn start(program: &Path, connections: &Connections) -> Page {
         let Connections { socketcand, control, page } = connections;
         let mut command = Command::new(program);

@@ -1,4 +1,4 @@
-//! What a node is: the number that selects its dictionary.
+//! The personality of a node: the number that selects its dictionary.
 
 use std::fmt;
 use std::str::FromStr;
@@ -20,7 +20,7 @@ pub enum Personality {
 }
 
 impl Personality {
-    /// Every personality that the firmware has.
+    /// All personalities of the firmware.
     const ALL: [Personality; 4] =
         [Personality::Pressure, Personality::Encoder, Personality::Combined, Personality::Lift];
 

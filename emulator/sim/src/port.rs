@@ -2,28 +2,29 @@
 
 use canbus::{Attachment, Controller, ErrorReport, Frame, HostNode, Order, Stamped, Time};
 
-/// How a client's adapter takes part in the bus.
+/// The settings of a client's adapter on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Adapter {
-    /// In bit/s. Another rate than that of the bus destroys frames, as a real adapter would.
+    /// The bit rate in bit/s. A rate that differs from the bus destroys frames, as with a real adapter.
     pub bit_rate: u32,
-    /// Only listens: sends and acknowledges nothing.
+    /// Listen-only: neither sends nor acknowledges.
     pub silent: bool,
 }
 
-/// A frame that the bus has not taken for so long will not be taken: nobody is there, or the bit rate is another one.
+/// Time limit for a waiting frame. After this time the bus will not take the frame: no other node is on the bus, or the
+/// bit rate is wrong.
 const PATIENCE: Time = Time::from_millis(1000);
 
-/// A place on the bus: empty, or with an adapter whose driver sends in the order of the requests.
+/// A place on the bus: empty, or with an adapter that sends in the order of the requests.
 #[derive(Debug, Default)]
 pub struct Port {
     node: Option<HostNode>,
-    /// When a frame last went out, or the first one began to wait.
+    /// The instant at which a frame last went out, or at which the first one began to wait.
     moved: Time,
 }
 
 impl Port {
-    /// Goes on the bus, or leaves it with `None`. What waits to be sent is forgotten.
+    /// Attaches an adapter to the bus; `None` detaches it. Waiting frames are dropped.
     pub fn attach(&mut self, adapter: Option<Adapter>) {
         self.node = adapter.map(|adapter| {
             let node = HostNode::new(Time::of_cycle(adapter.bit_rate.into())).with_order(Order::Fifo);
@@ -31,12 +32,12 @@ impl Port {
         });
     }
 
-    /// Changes the bit rate of what is attached.
+    /// Changes the bit rate of the attached adapter.
     pub(crate) fn set_bit(&mut self, bit: Time) {
         self.tell(|node| node.set_bit(bit));
     }
 
-    /// Queues a frame. Off the bus it is lost, as with an interface that is down.
+    /// Queues a frame. Without an adapter the frame is lost, as with an interface that is down.
     pub fn send(&mut self, frame: Frame, now: Time) {
         if let Some(node) = &mut self.node {
             if node.backlog() == 0 {
@@ -46,7 +47,7 @@ impl Port {
         }
     }
 
-    /// Forgets what waits when nothing has gone out for a second. Returns how many frames that were.
+    /// Drops the waiting frames when none has gone out for a second. Returns their number.
     pub fn give_up(&mut self, now: Time) -> u64 {
         let stuck = self.node.as_mut().filter(|node| node.backlog() > 0 && now.since(self.moved) > PATIENCE);
         stuck.map_or(0, HostNode::forget)
@@ -57,7 +58,7 @@ impl Port {
         self.node.as_mut()?.receive()
     }
 
-    /// Frames that wait to be sent.
+    /// Number of frames that wait to be sent.
     pub fn backlog(&self) -> usize {
         self.node.as_ref().map_or(0, HostNode::backlog)
     }

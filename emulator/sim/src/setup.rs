@@ -16,7 +16,7 @@ use crate::world::World;
 /// The two pages of the parameter store: sectors 2 and 3 (memory.x).
 const PAGES: Pages = Pages::new(0x8000, 0x4000);
 
-/// A bit rate as controllers count it.
+/// A bit rate in bit/s from one in kbit/s.
 pub fn bits_per_second(kbit: u16) -> u32 {
     u32::from(kbit) * 1000
 }
@@ -34,7 +34,7 @@ pub fn world(options: &Options) -> Result<World> {
     let boards = 0..options.nodes.len();
     boards.clone().try_for_each(|board| world.machine(board).set_estimate(options.cycles))?;
     if let Some(seed) = options.interleave {
-        // Boards differ, or all of them would meet their interrupts at the same places.
+        // Each board gets another seed, so that interrupts do not come at the same instructions on all boards.
         boards
             .into_iter()
             .try_for_each(|board| world.machine(board).interleave(Some(seed + board as u64)))?;
@@ -64,20 +64,21 @@ fn board(node: &Node, options: &Options, images: &Rc<Images>) -> Result<Board> {
     Board::new(node.id, node.personality, chip, contents, Rc::clone(images))
 }
 
-/// The chip of a board, with its clock and with the identifier that every chip has of its own: the firmware makes the serial number of it.
+/// The chip of a board, with its clock and its own unique identifier, from which the firmware derives the serial
+/// number.
 fn chip(node: &Node, options: &Options) -> Stm32f4 {
     let mut wiring = Wiring { hse: oscillator(node, options).hertz(), ..Wiring::default() };
     wiring.unique_id[0] = node.id.into();
     Stm32f4::new(options.chip, wiring)
 }
 
-/// The last one that is meant for the board.
+/// The last oscillator error on the command line that applies to the board.
 fn oscillator(node: &Node, options: &Options) -> Oscillator {
     let own = options.oscillator.iter().rfind(|oscillator| oscillator.is_for(node.id));
     own.map_or_else(Oscillator::default, |oscillator| oscillator.what)
 }
 
-/// Tells a fresh board what it is. A board that knows it already, because its flash was kept, is left as it is.
+/// Writes the device record of a new board. A board whose flash was kept already has one, and is not changed.
 fn provision(flash: &mut [u8], node: &Node, bit_rate: u16) -> Result<()> {
     let known = View::open(Memory(&*flash), PAGES).and_then(|mut view| view.device());
     if matches!(known, Ok(Some(_))) {

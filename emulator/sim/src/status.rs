@@ -1,4 +1,4 @@
-//! The state of everything at one moment, for people to look at.
+//! The state of the simulation at one instant, for display.
 
 use canbus::Time;
 
@@ -10,7 +10,7 @@ use crate::traffic::Heard;
 pub struct Status {
     /// Virtual time.
     pub at: Time,
-    /// How long the bus has not been idle since power-on.
+    /// Time in which the bus was busy, since power-on.
     pub bus_busy: Time,
     /// One for each board, in the order of the command line.
     pub nodes: Vec<NodeStatus>,
@@ -19,44 +19,44 @@ pub struct Status {
 /// One board.
 #[derive(Clone, Debug)]
 pub struct NodeStatus {
-    /// Its number on the command line.
+    /// The board's number on the command line.
     pub id: u8,
-    /// The node-ID with which it has booted.
+    /// The node-ID that the node has booted with.
     pub node_id: u8,
-    /// What it is.
+    /// The personality.
     pub personality: Personality,
-    /// What the bus tells of it.
+    /// The state observed on the bus.
     pub heard: Heard,
-    /// At its sensor, in Pa.
+    /// The pressure at the sensor, in Pa.
     pub pressure: f64,
-    /// At its sensor, in K.
+    /// The temperature of the chip, in K.
     pub temperature: f64,
-    /// Of its shaft, in revolutions.
+    /// The position of the shaft, in revolutions.
     pub position: f64,
-    /// How long its core has not slept since power-on.
+    /// Time in which the core was awake, since power-on.
     pub awake: Time,
 }
 
-/// What happened between two moments.
+/// The rates between two instants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rates {
-    /// Share of the time in which the bus was busy, 0 to 1.
+    /// Bus load, 0 to 1.
     pub bus_load: f64,
     /// One for each board.
     pub nodes: Vec<NodeRates>,
 }
 
-/// One board.
+/// The rates of one board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeRates {
-    /// Frames sent in a second.
+    /// Frames sent per second.
     pub frames: f64,
-    /// Share of the time in which the core did not sleep, 0 to 1.
+    /// Share of time in which the core was awake, 0 to 1.
     pub cpu_load: f64,
 }
 
 impl Status {
-    /// What happened since `earlier`; all zero when no time has passed.
+    /// The rates since `earlier`; all zero when no time has passed.
     pub fn rates(&self, earlier: &Status) -> Rates {
         let span = self.at.since(earlier.at);
         let nodes = self.nodes.iter().enumerate().map(|(index, node)| {
@@ -69,12 +69,12 @@ impl Status {
     }
 }
 
-/// `part` of `whole`, 0 to 1.
+/// The ratio of `part` to `whole`, 0 to 1.
 pub(crate) fn share(part: Time, whole: Time) -> f64 {
     if whole == Time::ZERO { 0.0 } else { part.as_secs_f64() / whole.as_secs_f64() }
 }
 
-/// How many of `count` things fall into a second of `span`.
+/// The number of events per second, for `count` events in `span`.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn per_second(count: u64, span: Time) -> f64 {
     if span == Time::ZERO { 0.0 } else { count as f64 / span.as_secs_f64() }

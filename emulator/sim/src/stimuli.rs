@@ -1,4 +1,4 @@
-//! What the sensors see, and which boards a specification is meant for.
+//! The stimuli of the sensors, and the boards that a specification applies to.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,30 +10,30 @@ use serde::Serialize;
 use crate::cli::{BOARD_NUMBERS, board_number};
 use crate::personality::Personality;
 
-/// A change of what a board's sensors see.
+/// A change of a board's stimuli.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stimulus {
-    /// In Pa.
+    /// The pressure, in Pa.
     Pressure(Signal),
-    /// Of the chip, in K.
+    /// The temperature of the chip, in K.
     Temperature(Signal),
-    /// Of the thermistor, in K.
+    /// The temperature of the thermistor, in K.
     Thermistor(Signal),
-    /// In revolutions, or a speed.
+    /// The position of the shaft in revolutions, or its speed.
     Shaft(Motion),
     /// A button is pressed or released.
     Button(Push),
-    /// A defect of the wiring or of a sensor.
+    /// A fault of the wiring or of a sensor, with its span of time.
     Fault(Fault),
-    /// One that comes now, or goes.
+    /// A fault that begins or ends now.
     Switch(FaultSwitch),
 }
 
 impl Stimulus {
-    /// Reads `[ID=]SPEC` of a kind: pressure, temperature, thermistor, shaft, button or fault.
+    /// Parses `[ID=]SPEC` of a kind: pressure, temperature, thermistor, shaft, button or fault.
     ///
     /// # Errors
-    /// One line that says what is wrong.
+    /// One line that describes the error.
     pub fn parse(kind: &str, text: &str) -> Result<Targeted<Stimulus>, String> {
         match kind {
             "pressure" => text.parse().map(|spec: Targeted<_>| spec.map(Stimulus::Pressure)),
@@ -51,7 +51,7 @@ impl Stimulus {
         }
     }
 
-    /// Lets it act from `now` on.
+    /// Applies the stimulus from `now` on.
     pub(crate) fn act_on(&self, plant: &mut Plant, now: Time) {
         match self.clone() {
             Stimulus::Pressure(signal) => plant.set_pressure(signal, now),
@@ -65,39 +65,39 @@ impl Stimulus {
     }
 }
 
-/// What the sensors of one board see at a moment.
+/// The stimuli of one board at an instant.
 #[derive(Clone, Debug, Serialize)]
 pub struct BoardStimuli {
-    /// Its number on the command line.
+    /// The board's number on the command line.
     pub board: u8,
-    /// The node-ID with which it has booted.
+    /// The node-ID that the node has booted with.
     pub node: u8,
-    /// What it is.
+    /// The personality.
     pub personality: Personality,
-    /// In Pa.
+    /// The pressure, in Pa.
     pub pressure: Knob,
-    /// Of the chip, in K.
+    /// The temperature of the chip, in K.
     pub temperature: Knob,
-    /// Of the thermistor, in K.
+    /// The temperature of the thermistor, in K.
     pub thermistor: Knob,
-    /// In revolutions.
+    /// The position of the shaft, in revolutions.
     pub shaft: Knob,
-    /// Which of its buttons are held down.
+    /// The buttons that are held down.
     pub buttons: [bool; BUTTONS],
-    /// The faults that are there.
+    /// The names of the active faults.
     pub faults: Vec<&'static str>,
 }
 
-/// A quantity.
+/// A quantity with its setting.
 #[derive(Clone, Debug, Serialize)]
 pub struct Knob {
-    /// What it is set to, as on the command line.
+    /// The setting, as written on the command line.
     pub spec: String,
-    /// Its value now.
+    /// The current value.
     pub value: f64,
 }
 
-/// What is colder than -100 degC was meant in degC.
+/// A temperature below -100 degC is refused: the user probably meant degC instead of K.
 const COLDEST: f64 = 173.15;
 
 fn in_kelvin(text: &str) -> Result<Targeted<Signal>, String> {
@@ -112,22 +112,22 @@ fn in_kelvin(text: &str) -> Result<Targeted<Signal>, String> {
     Ok(spec)
 }
 
-/// Something for one node, written `ID=SPEC`, or for all of them, written `SPEC`.
+/// A value for one node, written `ID=SPEC`, or for all nodes, written `SPEC`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Targeted<T> {
     /// The node; `None` for all.
     pub node: Option<u8>,
-    /// What it is to get.
+    /// The value.
     pub what: T,
 }
 
 impl<T> Targeted<T> {
-    /// Whether the node of this ID is meant.
+    /// Whether the value applies to the node with this ID.
     pub fn is_for(&self, node: u8) -> bool {
         self.node.is_none_or(|target| target == node)
     }
 
-    /// The same nodes, another thing.
+    /// Another value for the same nodes.
     pub fn map<U>(self, change: impl FnOnce(T) -> U) -> Targeted<U> {
         Targeted { node: self.node, what: change(self.what) }
     }
@@ -139,7 +139,7 @@ where
 {
     type Err = String;
 
-    /// An equals sign inside a SPEC, as in a file name, is no target: a target is a number.
+    /// Only a number before an equals sign is a target: the SPEC itself may contain an equals sign, as in a file name.
     fn from_str(text: &str) -> Result<Targeted<T>, String> {
         let target = text.split_once('=').filter(|(id, _)| id.bytes().all(|byte| byte.is_ascii_digit()));
         let (node, spec) = match target {

@@ -1,4 +1,4 @@
-//! What is said of a run at its end, for people and, as JSON, for scripts.
+//! The summary at the end of a run, as text and, for scripts, as JSON.
 
 use std::fmt;
 
@@ -8,14 +8,14 @@ use crate::host_time::HostTime;
 use crate::personality::Personality;
 use crate::traffic::Heard;
 
-/// A whole run.
+/// The summary of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
     /// Seconds since power-on.
     pub virtual_seconds: f64,
-    /// Seconds that the host took.
+    /// Seconds of the host's time.
     pub host_seconds: f64,
-    /// What they went to, where that was measured.
+    /// The host's time by kind of work, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub host_time: Option<HostTime>,
     /// The bus.
@@ -24,81 +24,81 @@ pub struct Summary {
     pub nodes: Vec<NodeSummary>,
 }
 
-/// The bus.
+/// The summary of the bus.
 #[derive(Clone, Debug, Serialize)]
 pub struct BusSummary {
-    /// In kbit/s.
+    /// The bit rate in kbit/s.
     pub bit_rate: u16,
-    /// Frames that were sent and acknowledged.
+    /// Number of frames sent and acknowledged.
     pub frames: u64,
-    /// Frames that were destroyed by an error.
+    /// Number of frames destroyed by an error.
     pub errors: u64,
-    /// Share of the time in which it was not idle, 0 to 1.
+    /// Share of time in which the bus was busy, 0 to 1.
     pub load: f64,
-    /// Frames that clients of the gateway were too slow to take.
+    /// Number of frames lost because clients of the gateway were too slow.
     pub lost_by_clients: u64,
 }
 
-/// One board.
+/// The summary of one board.
 #[derive(Clone, Debug, Serialize)]
 pub struct NodeSummary {
-    /// Its node-ID.
+    /// The node-ID.
     pub id: u8,
-    /// What it is.
+    /// The personality.
     pub personality: Personality,
-    /// What the bus tells of it.
+    /// The state observed on the bus.
     #[serde(flatten)]
     pub heard: Heard,
     /// The 1 kHz measurement.
     pub sampling: Sampling,
-    /// Frames for this node.
+    /// The received frames.
     pub receiving: Receiving,
-    /// What the core has done.
+    /// The activity of the core.
     pub cpu: Cpu,
-    /// What the image takes.
+    /// The memory of the images.
     pub memory: Memory,
-    /// Rules of the chip that the program has broken, each once, with the place in its source.
+    /// Rules of the chip that the program has broken, each once, with the place in the program's source.
     pub broken_rules: Vec<String>,
     /// Faults and resets after power-on, each with its time.
     pub incidents: Vec<String>,
-    /// Accesses to registers that the chip model does not have.
+    /// Accesses to registers that the chip model lacks.
     pub unmodelled: Vec<String>,
 }
 
-/// The 1 kHz measurement.
+/// Figures of the 1 kHz measurement.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Sampling {
-    /// Starts of the sampling task.
+    /// Number of samples: starts of the sampling task.
     pub samples: u64,
-    /// Samples in a second, from the first to the last.
+    /// Samples per second, from the first to the last.
     pub rate: f64,
-    /// Largest distance of a start from the millisecond at which it was due, in microseconds.
+    /// Largest deviation of a start from its due millisecond, in microseconds.
     pub worst_jitter: f64,
-    /// Instructions of one sample, on average.
+    /// Average instructions of one sample.
     pub instructions: f64,
 }
 
-/// Frames that have passed the acceptance filters.
+/// Figures of frames that have passed the acceptance filters.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Receiving {
-    /// All of them.
+    /// Number of all these frames.
     pub frames: u64,
-    /// Those that were lost because a FIFO was full.
+    /// Number of frames lost because a FIFO was full.
     pub lost: u64,
-    /// Instructions of the receive interrupts for one frame, on average.
+    /// Average instructions of the receive interrupts for one frame.
     pub instructions: f64,
 }
 
-/// What the core has done.
+/// Figures of the core.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Cpu {
     /// Instructions since power-on.
     pub instructions: u64,
-    /// Share of the time in which it did not sleep, 0 to 1.
+    /// Share of time in which the core was awake, 0 to 1.
     pub load: f64,
 }
 
-/// What the image takes, in bytes.
+/// Memory of the images, in bytes.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Memory {
     /// Flash of the firmware.
@@ -107,17 +107,17 @@ pub struct Memory {
     pub bootloader_flash: u32,
     /// RAM without the stack.
     pub ram: u32,
-    /// The deepest stack that was seen.
+    /// The deepest observed stack.
     pub stack: u32,
 }
 
 impl Summary {
-    /// Whether a program has broken a rule of its chip: then the run has failed.
+    /// Whether a program has broken a rule of its chip, which means that the run has failed.
     pub fn has_broken_rules(&self) -> bool {
         self.nodes.iter().any(|node| !node.broken_rules.is_empty())
     }
 
-    /// Virtual seconds in a host second.
+    /// Virtual seconds per second of the host.
     pub fn ratio(&self) -> f64 {
         if self.host_seconds > 0.0 { self.virtual_seconds / self.host_seconds } else { 0.0 }
     }

@@ -1,6 +1,6 @@
-//! What the frames on the bus tell of the nodes: nothing here looks into a board's memory.
+//! The state of the nodes as observed on the bus, without a look into a board's memory.
 //!
-//! COB-IDs are those of the pre-defined connection set (CiA 301, 7.3.3).
+//! The COB-IDs are those of the pre-defined connection set (CiA 301, 7.3.3).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,14 +8,14 @@ use std::fmt;
 use canbus::{Frame, Id};
 use serde::Serialize;
 
-/// NMT states as a heartbeat tells them (CiA 301, 7.2.8.3.2.2).
+/// NMT states with their codes in heartbeats (CiA 301, 7.2.8.3.2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NmtState {
-    /// Nothing was heard yet, or a code that is not defined.
+    /// No heartbeat yet, or an undefined code.
     #[default]
     Unknown,
-    /// Boot-up was heard and no heartbeat since.
+    /// A boot-up message, but no heartbeat since.
     Initialising,
     /// 4
     Stopped,
@@ -49,22 +49,22 @@ impl fmt::Display for NmtState {
     }
 }
 
-/// What was heard of one node.
+/// The observations of one node.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Heard {
-    /// From the last heartbeat or boot-up.
+    /// The NMT state from the last heartbeat or boot-up message.
     pub state: NmtState,
-    /// Boot-up messages.
+    /// Number of boot-up messages.
     pub boot_ups: u64,
-    /// Heartbeats, boot-up not counted.
+    /// Number of heartbeats, without boot-up messages.
     pub heartbeats: u64,
-    /// TPDO 1 to 4.
+    /// Number of TPDOs 1 to 4.
     pub tpdos: u64,
-    /// SDO frames to the node and from it.
+    /// Number of SDO requests and responses.
     pub sdo_frames: u64,
-    /// EMCY messages that tell of an error.
+    /// Number of EMCY messages that report an error.
     pub emcys: u64,
-    /// Messages of the node in all: EMCY, TPDO, SDO response, heartbeat, whatever they hold.
+    /// Number of all messages from the node: EMCY, TPDO, SDO response, heartbeat.
     pub sent: u64,
     /// The error code of the last EMCY.
     pub last_emcy: Option<u16>,
@@ -90,13 +90,13 @@ impl Heard {
     fn on_emcy(&mut self, data: &[u8]) {
         let Some(code) = data.first_chunk().map(|code| u16::from_le_bytes(*code)) else { return };
         self.last_emcy = Some(code);
-        // 0000h: an error has gone, or the last of them (CiA 301, 7.2.7).
+        // 0000h: an error, or the last one, has gone (CiA 301, 7.2.7).
         self.emcys += u64::from(code != 0);
     }
 
     fn on_tpdo(&mut self, number: u16, data: &[u8]) {
         self.tpdos += 1;
-        // Nobody sends PDOs in another state (CiA 301, 7.3.2.2.4).
+        // A node sends PDOs only when Operational (CiA 301, 7.3.2.2.4).
         self.state = NmtState::Operational;
         if number == 1 {
             self.tpdo1 = Some(data.to_vec());
@@ -112,7 +112,7 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// A frame has ended on the bus. Answers with the node if this was its boot-up.
+    /// Processes a frame that has ended on the bus. Returns the node if the frame is its boot-up message.
     pub fn on_frame(&mut self, frame: &Frame) -> Option<u8> {
         let Id::Standard(id) = frame.id() else { return None };
         let (function, node) = (id.as_raw() & 0x780, (id.as_raw() & 0x7F) as u8);
@@ -136,7 +136,7 @@ impl Traffic {
         heard
     }
 
-    /// What was heard of this node.
+    /// The observations of a node.
     pub fn node(&self, node: u8) -> Heard {
         self.nodes.get(&node).cloned().unwrap_or_default()
     }

@@ -1,7 +1,7 @@
-//! The simulation: boards, the bus and everything else that is wired to it, in one virtual time.
+//! The simulation: boards, the bus and all other participants of the bus, in one virtual time.
 //!
-//! The loop is the one that the documentation of [`canbus`] describes. With one board it is exact; with several,
-//! a board may be ahead of a start of frame by less than the shortest frame, too little to miss anything of it.
+//! The loop follows the documentation of [`canbus`]. With one board the simulation is exact. With several boards, a
+//! board may be ahead of a start of frame by less than the shortest frame, so that it misses no event of the frame.
 
 use std::time::Instant;
 
@@ -19,16 +19,16 @@ use crate::stimuli::{BoardStimuli, Stimulus, Targeted};
 use crate::summary::{BusSummary, Summary};
 use crate::traffic::Traffic;
 
-/// Any number of bits is causal up to this one, which is less than the shortest frame has.
+/// The longest quantum in bits without a missed event: less than the bits of the shortest frame.
 const QUANTUM_BITS: u64 = 43;
-/// Of the foreign traffic: any number will do, the same one gives the same traffic.
+/// The seed of the foreign traffic: any number will do, and the same number gives the same traffic.
 const SEED: u64 = 1;
 
-/// Names a place on the bus for a client.
+/// Identifies a client's port on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PortId(usize);
 
-/// A stimulus is for a board that is not there.
+/// A stimulus is addressed to a board that does not exist.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no node {0} here")]
 pub struct NoSuchBoard(pub u8);
@@ -40,38 +40,38 @@ pub struct World {
     bit: Time,
     bus: Bus,
     boards: Vec<Board>,
-    /// The adapter of the machine that everything runs on. It acknowledges frames also when no client is there,
-    /// for a board alone on its bus could send nothing, and is the NMT master then.
+    /// The adapter of the host. It acknowledges frames even without a client, because a board alone on its bus could
+    /// send nothing. Without a client, it is also the NMT master.
     host: HostNode,
     load: Option<Babbler>,
-    /// Places are used again but never given up: the bus knows its participants by their order.
+    /// Ports are reused but never removed: the bus identifies its participants by their order.
     ports: Vec<Place>,
     records: Records,
-    /// Measured only for who asks: the clock of the host costs time as well.
+    /// Measured only on request, because reading the host's clock costs time.
     host_time: Option<HostTime>,
     enforces_rules: bool,
     stimuli_changes: u64,
 }
 
-/// A port and whether a client has it.
+/// A port, and whether a client uses it.
 #[derive(Default)]
 struct Place {
     port: Port,
     taken: bool,
-    /// A client that leaves the start of the nodes to the host.
+    /// A client that does not start nodes, so that the host starts them.
     only_looks: bool,
 }
 
-/// What was seen of the bus.
+/// The observations of the bus and the logs.
 #[derive(Default)]
 struct Records {
     traffic: Traffic,
     frames: Vec<Stamped>,
     log: Vec<Line>,
-    /// Nodes whose boot-up was heard since the last look.
+    /// Nodes that have booted since the last step.
     booted: Vec<u8>,
-    /// The node-ID of each board: that of the command line until it boots with another one, which it has by LSS or from its
-    /// flash.
+    /// The node-ID of each board: that of the command line until the board boots with another one, set by LSS or kept
+    /// in its flash.
     node_ids: Vec<u8>,
     retuning: Retuning,
     good: u64,
@@ -79,7 +79,7 @@ struct Records {
 }
 
 impl World {
-    /// Boards on a bus that runs at `bit_rate` (kbit/s), with `load` percent of foreign traffic.
+    /// A world with boards on a bus at `bit_rate` (kbit/s), with `load` percent of foreign traffic.
     pub fn new(boards: Vec<Board>, bit_rate: u16, load: u8) -> World {
         let bit = Time::of_cycle(u64::from(bit_rate) * 1000);
         let load = (load > 0).then(|| Babbler::new(bit, f64::from(load) / 100.0, Babbler::foreign(), SEED));
@@ -117,25 +117,25 @@ impl World {
         &self.boards
     }
 
-    /// The machine of a board, in the order of the command line, for a test that breaks it.
+    /// The machine of a board, in the order of the command line, for a test that injects faults.
     ///
     /// # Panics
-    /// Without such a board.
+    /// When the board does not exist.
     pub fn machine(&mut self, index: usize) -> &mut Machine<Stm32f4> {
         self.boards[index].machine()
     }
 
-    /// The bus, for bit errors.
+    /// The bus, for the injection of bit errors.
     pub fn bus(&mut self) -> &mut Bus {
         &mut self.bus
     }
 
-    /// A place on the bus for a client; it takes part once it is attached.
+    /// A port on the bus for a client; it is inactive until an adapter is attached.
     pub fn open_port(&mut self) -> PortId {
         self.open(false)
     }
 
-    /// The same for a client that does not start the nodes, as masters do: the page in the browser.
+    /// A port for a client that does not start the nodes, unlike a master: the page in the browser.
     pub fn open_looking_port(&mut self) -> PortId {
         self.open(true)
     }
@@ -149,20 +149,20 @@ impl World {
         PortId(index)
     }
 
-    /// The place of a client.
+    /// The port of a client.
     pub fn port(&mut self, id: PortId) -> &mut Port {
         &mut self.ports[id.0].port
     }
 
-    /// The client is gone, with all that it had still to send.
+    /// Closes the port of a client and drops its waiting frames.
     pub fn close_port(&mut self, id: PortId) {
         self.ports[id.0] = Place::default();
     }
 
-    /// Gives the boards another stimulus from now on.
+    /// Applies a stimulus to the boards, from now on.
     ///
     /// # Errors
-    /// When the board that is meant is not there.
+    /// When the addressed board does not exist.
     pub fn apply(&mut self, stimulus: &Targeted<Stimulus>) -> Result<(), NoSuchBoard> {
         let mut meant = self.boards.iter_mut().filter(|board| stimulus.is_for(board.id())).peekable();
         if let (None, Some(node)) = (meant.peek(), stimulus.node) {
@@ -173,20 +173,20 @@ impl World {
         Ok(())
     }
 
-    /// What the sensors of each board see, in the order of the command line.
+    /// The stimuli of each board, in the order of the command line.
     pub fn stimuli(&self) -> Vec<BoardStimuli> {
         self.boards.iter().zip(&self.records.node_ids).map(|(board, &id)| board.stimuli(id)).collect()
     }
 
-    /// How often a stimulus was changed.
+    /// Number of stimuli applied so far.
     pub fn stimuli_changes(&self) -> u64 {
         self.stimuli_changes
     }
 
-    /// Lets everything up to `end` happen.
+    /// Runs the simulation to `end`.
     ///
     /// # Panics
-    /// When a program has broken a rule of its chip after [`World::enforce_rules`].
+    /// When a program has broken a rule of its chip and [`World::enforce_rules`] is on.
     pub fn run_until(&mut self, end: Time) {
         loop {
             let start = self.host_time.is_some().then(Instant::now);
@@ -212,17 +212,18 @@ impl World {
         }
     }
 
-    /// From now on a broken rule of the chip fails the test, or is only told by the summary: for a test that breaks one itself.
+    /// Sets whether a broken rule of the chip panics, or is only reported in the summary. A test that breaks a rule on
+    /// purpose turns this off.
     pub fn enforce_rules(&mut self, on: bool) {
         self.enforces_rules = on;
     }
 
-    /// Measures from now on what the host's time goes to.
+    /// Starts to measure the host's time by kind of work.
     pub fn measure_host_time(&mut self) {
         self.host_time = Some(HostTime::default());
     }
 
-    /// What the host's time went to since that is measured.
+    /// The host's time by kind of work since the start of the measurement.
     pub fn host_time(&self) -> Option<HostTime> {
         self.host_time
     }
@@ -231,7 +232,7 @@ impl World {
         Some(self.host_time.as_mut()?.count(work, start?))
     }
 
-    /// Lets the bus catch up with the boards; returns when something will next happen on it.
+    /// Brings the bus up to the time of the boards; returns the instant of its next event.
     fn step_bus(&mut self) -> Time {
         let boards = self.boards.iter_mut().map(|board| board.controller());
         let load = self.load.iter_mut().map(|load| load as &mut dyn Controller);
@@ -243,8 +244,8 @@ impl World {
         self.bus.step(&mut participants, self.now, &mut |event| records.on_event(&event))
     }
 
-    /// Starts the nodes that have booted while there was no client that could do it. Returns when the bus has to
-    /// look at the request: now, if there is one.
+    /// Starts the nodes that have booted while no client was there to start them. Returns the instant at which the bus
+    /// must look at the request: now, or never without a request.
     fn start_nodes(&mut self) -> Time {
         let booted = std::mem::take(&mut self.records.booted);
         if booted.is_empty() || self.ports.iter().any(|place| place.taken && !place.only_looks) {
@@ -254,7 +255,7 @@ impl World {
         self.now
     }
 
-    /// Sets the host's adapters to the bit rate that LSS has activated. Returns when that will be the case.
+    /// Sets the host's adapters to the bit rate that LSS has activated. Returns the instant of the next change.
     fn retune(&mut self) -> Time {
         if let Some(kbit) = self.records.retuning.take(self.now) {
             self.bit_rate = kbit;
@@ -270,24 +271,24 @@ impl World {
         std::mem::take(&mut self.records.frames)
     }
 
-    /// The boards' log since the last call.
+    /// The log lines of all boards since the last call.
     pub fn take_log(&mut self) -> Vec<Line> {
         std::mem::take(&mut self.records.log)
     }
 
-    /// What the bus tells of the nodes.
+    /// The observations of the nodes on the bus.
     pub fn traffic(&self) -> &Traffic {
         &self.records.traffic
     }
 
-    /// The present state of everything.
+    /// The current state of the simulation.
     pub fn status(&self) -> Status {
         let nodes = self.boards.iter().zip(&self.records.node_ids);
         let nodes = nodes.map(|(board, &id)| board.status(id, self.records.traffic.node(id)));
         Status { at: self.now, bus_busy: self.bus.busy(self.now), nodes: nodes.collect() }
     }
 
-    /// What can be said of the whole run, which took the host `host_seconds`.
+    /// The summary of the run; `host_seconds` is its duration on the host.
     pub fn summary(&self, host_seconds: f64, lost_by_clients: u64) -> Summary {
         let bus = BusSummary {
             bit_rate: self.bit_rate,

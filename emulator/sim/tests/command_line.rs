@@ -1,9 +1,9 @@
-//! What a user gets wrong is told in one line on the standard error, and the exit status is 2.
+//! Errors of the user are reported in one line on the standard error output, with exit status 2.
 
 use std::net::TcpListener;
 use std::process::{Command, Stdio};
 
-/// The line on the standard error of a run that must be refused.
+/// Runs the simulator with invalid flags and returns the line on the standard error output.
 fn refused(flags: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_sim")).args(flags).stdin(Stdio::null()).output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();

@@ -88,7 +88,7 @@ fn who_watches_is_told_of_the_changes_of_others() {
     assert!(after - before < 1.0, "a change is told at once: {before} {after}");
 }
 
-/// A page of any site can have a browser send a request to this port, with commands in its body.
+/// Any web page can make a browser send a request to this port, with commands in its body.
 #[test]
 fn a_browser_gives_no_commands() {
     let mut bench = Bench::new();

@@ -1,4 +1,5 @@
-//! Many clients, slow ones and a greedy one: the others do not notice. Latency is virtual time, memory is that of the process.
+//! Many clients, some slow and one greedy: the other clients are not affected. Latency is virtual time; memory is that
+//! of the process.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -9,7 +10,7 @@ use sim::world::World;
 
 const MILLISECOND: Time = Time::from_millis(1);
 
-/// Clients in all, those of them that never read, and the most memory that the process may take, in bytes.
+/// Number of clients, number of clients that never read, and the memory limit of the process in bytes.
 const CLIENTS: usize = 400;
 const DEAF: usize = 20;
 const MEMORY: u64 = 200_000_000;
@@ -18,7 +19,7 @@ struct Crowd {
     world: World,
     gateway: Gateway,
     address: SocketAddr,
-    /// One that asks and one that answers, and the others.
+    /// The two clients whose latency is measured; `others` are the rest.
     pair: [TcpStream; 2],
     others: Vec<TcpStream>,
 }
@@ -37,13 +38,13 @@ impl Crowd {
         let address = self.address;
         for _ in 0..count {
             self.others.push(connect(address));
-            // The listener's queue of the host is shorter than the crowd.
+            // The host's queue for the listener is shorter than the number of clients.
             self.step();
         }
         self.settle();
     }
 
-    /// Lets everybody get onto the bus.
+    /// Runs until all clients are on the bus.
     fn settle(&mut self) {
         while self.gateway.clients() < self.others.len() + 2 {
             self.step();
@@ -59,12 +60,12 @@ impl Crowd {
         self.gateway.deliver(&mut self.world);
     }
 
-    /// All but so many of the others read.
+    /// All other clients but the first `deaf` ones read.
     fn read(&mut self, deaf: usize) {
         self.others.iter_mut().skip(deaf).for_each(|client| drop(taken(client)));
     }
 
-    /// Virtual milliseconds from a frame of the one to its arrival at the other: the mean of many.
+    /// Mean virtual milliseconds from a frame of the first client to its arrival at the second.
     fn latency(&mut self, mut meanwhile: impl FnMut(&mut Crowd)) -> f64 {
         const TIMES: u32 = 20;
         let start = self.world.now();
@@ -87,13 +88,13 @@ impl Crowd {
 fn connect(address: SocketAddr) -> TcpStream {
     let mut client = TcpStream::connect(address).unwrap();
     client.set_nonblocking(true).unwrap();
-    // The host is not to wait for a second frame before it sends the first.
+    // The host must not delay a frame to join it with the next one.
     client.set_nodelay(true).unwrap();
     client.write_all(b"S6\rO\r").unwrap();
     client
 }
 
-/// What has come for a client.
+/// The text that a client has received.
 fn taken(client: &mut TcpStream) -> String {
     let (mut all, mut buffer) = (Vec::new(), [0; 65536]);
     loop {
@@ -106,14 +107,14 @@ fn taken(client: &mut TcpStream) -> String {
     }
 }
 
-/// Resident memory of this process in bytes, the clients' side included.
+/// Resident memory of this process in bytes, which includes the clients.
 fn memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find(|line| line.starts_with("VmRSS")).unwrap();
     line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() * 1024
 }
 
-/// Sends without pause, whatever becomes of it.
+/// Sends without pause and ignores errors.
 fn flood(client: &mut TcpStream) {
     while client.write(&b"t7FF80000000000000000\r".repeat(100)).is_ok() {}
 }
@@ -125,7 +126,7 @@ fn a_crowd_with_deaf_and_greedy_clients_keeps_its_latency_and_its_memory() {
     let alone = crowd.latency(|_| {});
     crowd.join(CLIENTS - 2);
     let greedy = CLIENTS - 3;
-    // A minute of flood takes minutes of the host.
+    // A minute of virtual time takes minutes on the host.
     let span = if std::env::var_os("THOROUGH").is_some() { 60_000 } else { 200 };
     for _ in 0..span {
         flood(&mut crowd.others[greedy]);

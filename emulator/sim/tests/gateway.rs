@@ -39,7 +39,7 @@ impl Bench {
         (0..steps).for_each(|_| self.step());
     }
 
-    /// What the client gets, up to and including `end`.
+    /// The bytes that the client receives, up to and including `end`.
     fn answer(&mut self, client: &mut TcpStream, end: u8) -> String {
         let mut text = Vec::new();
         while text.last() != Some(&end) {
@@ -126,7 +126,8 @@ fn a_client_that_leaves_gives_its_place_to_the_next() {
     }
 }
 
-/// What a client has sent before it closed its connection reaches the bus, over both protocols: six times `nmt start`.
+/// Frames that a client has sent before it closed its connection reach the bus, over both protocols: six times `nmt
+/// start`.
 #[test]
 fn what_was_sent_before_the_end_reaches_the_bus() {
     let mut bench = Bench::new();
@@ -145,7 +146,7 @@ fn what_was_sent_before_the_end_reaches_the_bus() {
     assert_eq!(bench.gateway.clients(), 0, "and then it is gone");
 }
 
-/// Also what is more than the queue of one client holds.
+/// More frames than a client's queue holds.
 #[test]
 fn a_thousand_frames_before_the_end_reach_the_bus() {
     let mut bench = Bench::new();
@@ -158,7 +159,7 @@ fn a_thousand_frames_before_the_end_reach_the_bus() {
     assert_eq!((bench.gateway.clients(), bench.gateway.lost()), (0, 0));
 }
 
-/// Frames that nobody takes at this bit rate are given up: the client can go, and what comes after is served.
+/// Frames that the bus does not take at this bit rate are dropped: the client can leave, and later clients are served.
 #[test]
 fn frames_that_the_bus_does_not_take_are_given_up() {
     let mut bench = Bench::new();

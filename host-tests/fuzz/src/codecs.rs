@@ -1,11 +1,11 @@
-//! The codecs: any eight bytes are refused, or mean the same after they were encoded again.
+//! The codecs: eight arbitrary bytes are refused, or have the same meaning after decoding and encoding.
 
 use canopen::emcy::Message;
 use canopen::pdo::{MappedObject, Transmission};
 use canopen::sdo::{BlockSegment, Request, Response};
 use canopen::{CanId, CobId, Frame, NodeId, lss, nmt};
 
-/// Takes frames of eight bytes.
+/// Decodes and encodes frames of eight bytes.
 pub fn run(data: &[u8]) {
     for frame in data.as_chunks::<8>().0 {
         services(*frame);
@@ -47,7 +47,7 @@ fn frame(data: &[u8]) {
     }
 }
 
-/// What was accepted means the same after a round trip, whatever its reserved bits were.
+/// An accepted message has the same meaning after a round trip, whatever the values of its reserved bits.
 fn again<T: PartialEq + std::fmt::Debug>(
     frame: [u8; 8],
     parse: impl Fn([u8; 8]) -> Option<T>,

@@ -1,5 +1,5 @@
-//! An update: what a master, noise and power cuts can do to a node that runs image A and is sent image B. Whatever it
-//! is, the node starts A or B, whole: nobody but the owner of the key can sign a third.
+//! An update under the actions of a master, noise and power cuts. The node runs image A and is sent image B. In any
+//! case the node starts A or B, complete: nobody without the owner's key can sign a third image.
 
 use std::sync::LazyLock;
 
@@ -10,44 +10,44 @@ use update::{
     Target, Trial, Updater, Version, boot,
 };
 
-/// Security counter; application in two sectors; staging in two; the kept image in two.
+/// Sectors: security counter; application in two sectors; staging in two; the kept image in two.
 const SECTORS: [usize; 7] = [256, 512, 512, 512, 1024, 512, 1024];
 const APPLICATION: usize = 256;
 const PRODUCT: u32 = 0x8271;
-/// More polls than any step of an update takes.
+/// Number of polls that no step of an update exceeds.
 const POLLS: u32 = 2000;
 
 #[derive(Arbitrary, Debug)]
 enum Step<'a> {
-    /// 1F51h = 3.
+    /// A write of 3 (clear) to 1F51h.
     Clear,
-    /// A download to 1F50h begins.
+    /// The begin of a download to 1F50h.
     Begin { size: Option<u16> },
-    /// Some bytes come.
+    /// Received bytes.
     Receive(&'a [u8]),
-    /// The next bytes of image B come, perhaps with one of them changed.
+    /// The next bytes of image B, with one byte changed if `flip` is set.
     ReceiveImage { len: u16, flip: Option<(u16, u8)> },
-    /// The download ends.
+    /// The end of the download.
     Finish,
-    /// 1F51h = 1.
+    /// A write of 1 (start) to 1F51h, which installs the image.
     Install,
-    /// Time passes.
+    /// Polls while time passes.
     Poll { times: u8 },
-    /// Time passes until nothing is left to do.
+    /// Polls until no work is left.
     PollAll,
     /// Power off and on.
     Restart,
-    /// The power is cut so many operations from now.
+    /// A power cut in the middle of an operation, after `after` further operations.
     Cut { after: u8, weak: u8 },
     /// The application confirms itself.
     Confirm,
-    /// The application is to be taken back.
+    /// The application is withdrawn.
     Withdraw,
     /// The application crashes.
     Crash,
 }
 
-/// Takes steps; and the first bytes as a header.
+/// Runs the steps, and decodes the first bytes as a header.
 pub fn run(data: &[u8]) {
     if let Some(bytes) = data.first_chunk::<HEADER_LEN>()
         && let Ok(header) = Header::parse(bytes)
@@ -91,10 +91,10 @@ fn image(major: u16, len: usize) -> Image {
     (header, [&header.encode()[..], &code].concat())
 }
 
-/// An image and its header.
+/// The header of an image and all its bytes.
 type Image = (Header, Vec<u8>);
 
-/// A and B, and the flash of a node that runs A: signing takes longer than all the rest.
+/// A and B, and the flash of a node that runs A. Shared, because signing takes longer than everything else.
 static START: LazyLock<([Image; 2], MockFlash)> = LazyLock::new(|| {
     let images = [image(1, 300), image(2, 420)];
     let flash = installed(&images[0].1);
@@ -104,7 +104,7 @@ static START: LazyLock<([Image; 2], MockFlash)> = LazyLock::new(|| {
 struct Node {
     updater: Updater<MockFlash>,
     images: &'static [Image; 2],
-    /// Bytes of B that have been sent.
+    /// Number of bytes of B that have been sent.
     sent: usize,
 }
 
@@ -126,7 +126,7 @@ impl Node {
                 let weak = Weak::ALL[usize::from(weak) % Weak::ALL.len()];
                 self.updater.flash().cut_after(after.into(), weak);
             }
-            // A refusal is an answer to the master, and no more.
+            // A refusal is only an answer to the master.
             ref command => drop(self.command(command)),
         }
         if self.updater.flash().is_down() {
@@ -148,7 +148,7 @@ impl Node {
             }
             Step::Finish => self.updater.finish(),
             Step::Install => self.updater.install(),
-            // No application runs while the bootloader is at work.
+            // No application runs while the updater has work to do.
             Step::Confirm | Step::Withdraw if self.updater.next() != Next::Nothing => Ok(()),
             Step::Confirm => Trial::confirm(self.updater.flash(), &target().layout),
             Step::Withdraw => Trial::withdraw(self.updater.flash(), &target().layout),
@@ -169,7 +169,7 @@ impl Node {
         piece
     }
 
-    /// A start: what the bootloader does, and what must come of it.
+    /// A start of the bootloader: carries out its decision and checks that A or B runs.
     fn restart(&mut self, reset: Reset) {
         let mut flash = self.updater.flash().clone();
         flash.power_up();
@@ -197,7 +197,7 @@ fn poll_all(updater: &mut Updater<MockFlash>) {
     }
 }
 
-/// The flash after a whole update, as a master does it.
+/// The flash after a complete update, with the steps of a master.
 fn installed(image: &[u8]) -> MockFlash {
     let mut updater = Updater::new(MockFlash::new(&SECTORS, 1), target(), Status::GOOD);
     updater.clear().expect("it is idle");

@@ -1,7 +1,8 @@
-//! Fuzz targets. Each takes any bytes, makes of them what the outside world could do, and panics when a rule is broken.
+//! Fuzz targets. Each target derives the actions of the outside world from arbitrary bytes, and panics when a rule is
+//! broken.
 //!
-//! `cargo xtask fuzz TARGET` lets libFuzzer look for such bytes; the tests replay the corpus that it has found, and
-//! some thousand inputs by chance, the same at every run.
+//! With `cargo xtask fuzz TARGET`, libFuzzer searches for such bytes. The tests replay the corpus of the searches and
+//! some thousand random inputs, the same at every run.
 
 pub mod codecs;
 pub mod image;
@@ -9,16 +10,16 @@ pub mod node;
 pub mod pages;
 pub mod sheet;
 
-/// One target.
+/// A fuzz target.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// Its name, and that of its folder in the corpus.
+    /// The name of the target and of its folder in the corpus.
     pub name: &'static str,
-    /// What it does with an input.
+    /// Runs the target with an input.
     pub run: fn(&[u8]),
 }
 
-/// All of them.
+/// All targets.
 pub const TARGETS: [Target; 5] = [
     Target { name: "node", run: node::run },
     Target { name: "codecs", run: codecs::run },

@@ -1,4 +1,5 @@
-//! The parameter pages: saves, power cuts and damage in any order. What was saved is there, or the store says why not.
+//! The parameter pages: saves, power cuts and damage in any order. Saved values can be read, or the store reports why
+//! not.
 
 use arbitrary::{Arbitrary, Unstructured};
 use storage::mock::{MockFlash, PowerCut, Weak};
@@ -22,31 +23,31 @@ enum Step<'a> {
     },
     /// Power off and on.
     Restart,
-    /// The power is cut so many operations from now.
+    /// A power cut in the middle of an operation, after `after` further operations.
     Cut {
         after: u8,
         weak: u8,
     },
-    /// A byte of the flash changes by itself.
+    /// A byte of the flash changes without a write.
     Damage {
         offset: u16,
         flip: u8,
     },
 }
 
-/// A group as it reads: layout version and value, or nothing.
+/// The content of a group: layout version and value, or nothing.
 type Read = Option<(u16, Vec<u8>)>;
 
 struct Bench {
     flash: MockFlash<PAGE>,
-    /// As what each group may read: more than one value after saves that were cut, until a start has decided.
+    /// The possible contents of each group. A cut save leaves two possibilities until the next start decides.
     possible: [Vec<Read>; 4],
     is_damaged: bool,
-    /// An erase was cut: where nothing was ever saved, what it leaves cannot be told from damage.
+    /// An erase was cut. If nothing was ever saved, the store cannot tell the remains from damage.
     is_half_erased: bool,
 }
 
-/// Takes steps.
+/// Runs the steps.
 pub fn run(data: &[u8]) {
     let mut input = Unstructured::new(data);
     let mut bench = Bench {
@@ -89,7 +90,7 @@ impl Bench {
         }
     }
 
-    /// A start decides what a save that was cut has left, once and for all.
+    /// Starts the store, which decides about a cut save for good.
     fn restart(&mut self) {
         let view = View::open(&mut self.flash, PAGES).expect("there is power");
         let Ok(mut store) = Store::prepare(view) else {
@@ -105,7 +106,7 @@ impl Bench {
         }
     }
 
-    /// Saves after a start, as the pages are small.
+    /// Saves after a start, because only a start frees a page, and the pages are small.
     fn save(&mut self, group: Group, change: &Change<'_>, value: Read) {
         self.restart();
         let Ok(view) = View::open(&mut self.flash, PAGES) else { return };
@@ -119,7 +120,7 @@ impl Bench {
         }
     }
 
-    /// Every group reads as it was saved.
+    /// Checks that every group has one of its possible contents.
     fn check(&mut self) {
         let mut view = View::open(&mut self.flash, PAGES).expect("there is power");
         for (group, possible) in GROUPS.into_iter().zip(&self.possible) {

@@ -1,13 +1,13 @@
-//! Every input of the corpus, and some by chance: the same at every run.
+//! Every input of the corpus, and some random inputs: the same at every run.
 
 use std::fs;
 use std::path::Path;
 
 use fuzz::TARGETS;
 
-/// Inputs by chance for each target.
+/// Random inputs for each target.
 const RANDOM: u64 = 200;
-/// Longest of them.
+/// Longest random input in bytes.
 const LONGEST: usize = 600;
 
 #[test]

@@ -1,7 +1,8 @@
-//! Everything that a node does with what comes from the bus, the sensors and the flash, linked with a panic handler that
-//! cannot link: `cargo xtask test --only "no panic"` builds it for the target. It is never run.
+//! All code of a node that handles the bus, the sensors and the flash, linked with a panic handler that cannot be
+//! linked. `cargo xtask test --only "no panic"` builds the program for the target; the program never runs.
 //!
-//! What the optimiser proves unreachable is gone from the image; a panic that is left names the missing symbol.
+//! The optimiser removes panics that it proves unreachable; any remaining panic makes the link fail with the name of
+//! the missing symbol.
 #![no_std]
 #![no_main]
 
@@ -12,9 +13,9 @@ use profiles::board::{Inputs, Outputs, PowerOn};
 use storage::{Pages, Store, View};
 
 unsafe extern "C" {
-    /// Defined nowhere.
+    /// Not defined anywhere.
     fn a_panic_path_is_left() -> !;
-    /// The outside, of which the optimiser must know nothing.
+    /// Functions of the outside, which the optimiser must know nothing about.
     safe fn send(id: u16, bytes: *const u8, len: usize) -> bool;
     safe fn room() -> usize;
     safe fn read(offset: u32, to: *mut u8, len: usize) -> bool;
@@ -23,7 +24,7 @@ unsafe extern "C" {
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    // SAFETY: the linker never lets it be called.
+    // SAFETY: the link fails if a call remains.
     unsafe { a_panic_path_is_left() }
 }
 
@@ -76,7 +77,7 @@ impl NorFlash for Flash {
     }
 }
 
-/// Start-up: the parameter store is read and made ready.
+/// Start-up: reads and prepares the parameter store.
 #[unsafe(no_mangle)]
 extern "C" fn start(protocol: &mut Protocol, setup: &Setup, store: &mut Option<Store<Flash>>, now: u64) {
     *protocol = Protocol::new(setup);
@@ -86,7 +87,7 @@ extern "C" fn start(protocol: &mut Protocol, setup: &Setup, store: &mut Option<S
     let _ = protocol.start(Instant(now), &mut Queue);
 }
 
-/// Everything that comes from the bus, and time.
+/// Frames of every kind, and time.
 #[unsafe(no_mangle)]
 extern "C" fn communicate(protocol: &mut Protocol, frame: &Frame, now: u64, ids: &mut u32) {
     let now = Instant(now);
@@ -104,7 +105,7 @@ extern "C" fn fail(protocol: &mut Protocol, fault: &Fault, event: &BusEvent, act
     let _ = protocol.bus_event(*event, Instant(now));
 }
 
-/// The measurement, and its way into the dictionary.
+/// The measurement, and the transfer of its values into the dictionary.
 #[unsafe(no_mangle)]
 extern "C" fn measure(
     protocol: &mut Protocol,
@@ -119,7 +120,7 @@ extern "C" fn measure(
     *outputs = protocol.outputs();
 }
 
-/// What outlives a loss of power, out and in again.
+/// Saves and restores the values that survive a loss of power.
 #[unsafe(no_mangle)]
 extern "C" fn power_cycle(measurement: &mut Measurement, personality: &Personality, power_on: &PowerOn) {
     let retained = measurement.retained();
@@ -135,7 +136,7 @@ extern "C" fn store(protocol: &mut Protocol, job: &mut StoreJob, store: &mut Sto
     }
 }
 
-/// The negative control.
+/// The negative control: an index that may panic.
 #[cfg(feature = "with-a-panic")]
 #[unsafe(no_mangle)]
 extern "C" fn index(values: &[u8; 4], at: usize) -> u8 {

@@ -1,37 +1,37 @@
-//! What can happen to a frame: it is destroyed and sent again, it arrives twice, it is held up.
+//! Disturbances of a frame: a frame is destroyed and sent again, arrives twice, or is delayed.
 
 use canbus::{Bus, Fault, Frame, HostNode, Position, SeenBy, StandardId, Time};
 use fastrand::Rng;
 
-/// Frames of more urgent traffic that hold up everything else, some 2.5 ms at 1 Mbit/s.
+/// Number of more urgent frames that delay all other frames, for some 2.5 ms at 1 Mbit/s.
 const BURST: u32 = 20;
-/// Their identifier, which CANopen does not use.
+/// The identifier of the urgent frames; CANopen does not use it.
 const URGENT: StandardId = StandardId::new(0x001).expect("11 bits");
 
-/// How often each of it has happened.
+/// The number of disturbances of each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// A bit error that destroys the frame: its transmitter sends it again.
+    /// Frames destroyed by a bit error; the transmitter sends the frame again.
     pub destroyed: u32,
-    /// A bit error at its very end, which only the transmitter sees: the receivers get the frame twice.
+    /// Frames with a bit error in the last bit, which only the transmitter sees; the receivers get the frame twice.
     pub repeated: u32,
-    /// Urgent traffic that holds up what comes next.
+    /// Bursts of urgent traffic that delay the next frame.
     pub delayed: u32,
 }
 
-/// Draws the fate of every frame, the same for the same seed.
+/// Draws the disturbance of every frame; the same seed gives the same disturbances.
 #[derive(Debug)]
 pub struct Disturbance {
     rng: Rng,
     percent: u32,
-    /// Frames whose fate is drawn.
+    /// Number of frames whose disturbance is drawn.
     drawn: u64,
     pub(super) burst: HostNode,
     tally: Tally,
 }
 
 impl Disturbance {
-    /// Each of the three happens to so many frames in a hundred.
+    /// Each kind of disturbance affects `percent` of the frames.
     #[must_use]
     pub fn new(seed: u64, percent: u32) -> Disturbance {
         let rng = Rng::with_seed(seed);
@@ -42,7 +42,8 @@ impl Disturbance {
         self.tally
     }
 
-    /// Prepares the faults of the frames that can begin next. The participants are the stations and a master.
+    /// Schedules the faults of the frames that can begin next. The participants of the bus are the stations and a
+    /// master.
     pub(super) fn prepare(&mut self, bus: &mut Bus, stations: usize, now: Time) {
         while self.drawn <= bus.frames() {
             let fate = self.rng.u32(..100) / self.percent;

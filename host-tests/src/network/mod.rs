@@ -1,4 +1,4 @@
-//! Stations and one master on one bus, in virtual time: every run of a test takes the same course.
+//! Stations and one master on one bus, in virtual time: every run of a test is the same.
 
 mod disturbance;
 mod port;
@@ -17,13 +17,13 @@ pub use station::{Station, Unit};
 
 /// A bit at 1 Mbit/s.
 const BIT: Time = Time::from_micros(1);
-/// How long the master waits for an SDO response.
+/// The time-out of the master for an SDO response.
 const TIME_OUT: Duration = Duration::from_millis(500);
 
-/// What a bus analyser would count.
+/// The counters of a bus analyser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
-    /// Frames that somebody has received.
+    /// Frames that at least one participant has received.
     pub frames: u64,
     /// Error frames.
     pub errors: u64,
@@ -37,7 +37,7 @@ pub struct Network<U> {
     /// The stations.
     pub stations: Vec<Station<U>>,
     master: HostNode,
-    /// What the master has received and nobody has taken.
+    /// The frames that the master has received and no test has taken yet.
     heard: VecDeque<Stamped>,
     disturbance: Option<Disturbance>,
     traffic: Traffic,
@@ -70,7 +70,7 @@ impl<U: Unit> Network<U> {
         self.stations.iter_mut().for_each(|station| station.start(now));
     }
 
-    /// The time on the bus.
+    /// The current time of the bus.
     #[must_use]
     pub fn now(&self) -> Time {
         self.now
@@ -86,27 +86,27 @@ impl<U: Unit> Network<U> {
         self.traffic
     }
 
-    /// What has been done to the frames so far.
+    /// The numbers of disturbances so far.
     #[must_use]
     pub fn tally(&self) -> Tally {
         self.disturbance.as_ref().map(Disturbance::tally).unwrap_or_default()
     }
 
-    /// The time in which the bus was not idle.
+    /// The time in which the bus was busy.
     #[must_use]
     pub fn busy(&self) -> Time {
         self.bus.busy(self.now)
     }
 
-    /// Lets the master send a frame.
+    /// Sends a frame from the master.
     pub fn send(&mut self, frame: &Frame) {
         self.master.send(to_bus(frame), self.now);
     }
 
-    /// Lets the master send and waits until the frame has left.
+    /// Sends a frame from the master and waits until the frame is on the bus.
     ///
     /// # Panics
-    /// When the bus does not take it within a second.
+    /// When the bus does not take the frame within a second.
     pub fn transmit(&mut self, frame: &Frame) {
         self.send(frame);
         let end = self.now + Time::from_millis(1000);
@@ -116,19 +116,19 @@ impl<U: Unit> Network<U> {
         }
     }
 
-    /// The oldest frame that the master has received and nobody has taken.
+    /// The oldest frame that the master has received and no test has taken yet.
     pub fn hear(&mut self) -> Option<Stamped> {
         self.heard.pop_front()
     }
 
-    /// As [`hear`](Network::hear), for one identifier. Others stay.
+    /// Like [`hear`](Network::hear), for one identifier. Frames with other identifiers stay.
     pub fn hear_id(&mut self, id: u16) -> Option<Frame> {
         let id = StandardId::new(id).map(Id::from);
         let place = self.heard.iter().position(|heard| Some(heard.frame.id()) == id)?;
         self.heard.remove(place).and_then(|heard| from_bus(&heard.frame))
     }
 
-    /// Waits for a frame with this identifier, at most so long.
+    /// Waits for a frame with this identifier, for `span` at most.
     pub fn await_id(&mut self, id: u16, span: Duration) -> Option<Frame> {
         let end = self.now + Time::from_micros(span.0);
         loop {
@@ -148,7 +148,7 @@ impl<U: Unit> Network<U> {
         }
     }
 
-    /// Does all that happens now and goes on to the next instant at which something will, at most to `end`.
+    /// Processes everything that is due now and advances to the next event, at most to `end`.
     pub fn step(&mut self, end: Time) {
         let now = self.instant();
         for station in self.stations.iter_mut().filter(|station| station.due() <= now) {
@@ -185,7 +185,7 @@ impl<U: Unit> Network<U> {
     }
 }
 
-/// The way from the master to one SDO server.
+/// The SDO channel from the master to one server.
 #[derive(Debug)]
 pub struct Link<'a, U> {
     network: &'a mut Network<U>,

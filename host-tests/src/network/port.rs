@@ -1,4 +1,5 @@
-//! How a station is connected: the firmware's transmit queue, mailboxes that behave as those of bxCAN, a receive queue.
+//! The connection of a station: the firmware's transmit queue, mailboxes that behave like those of bxCAN, and a receive
+//! queue.
 
 use std::collections::VecDeque;
 
@@ -6,7 +7,7 @@ use bsp::transmit_queue::{Mailboxes, Offer, TransmitQueue};
 use canbus::{Attachment, BitTiming, Confinement, Controller, ErrorReport, ErrorState, Id, StandardId, Time};
 use canopen::{Frame, QueueFull, Transmit};
 
-/// Transmit mailboxes of bxCAN.
+/// Number of transmit mailboxes of bxCAN.
 const MAILBOXES: usize = 3;
 
 /// A station's connection to the bus.
@@ -15,7 +16,7 @@ pub struct Port {
     bit: Time,
     queue: TransmitQueue,
     mailboxes: Boxes,
-    /// Since when a mailbox has been waiting.
+    /// The instant since which a mailbox has been waiting.
     since: Time,
     inbox: VecDeque<Frame>,
     confinement: Confinement,
@@ -25,7 +26,8 @@ pub struct Port {
     pub received: u64,
 }
 
-/// Only a frame that is more urgent than all in the mailboxes is taken, so the most urgent one is the last.
+/// The transmit mailboxes. A mailbox only takes a frame that is more urgent than all others, so the last frame is the
+/// most urgent.
 #[derive(Debug, Default)]
 struct Boxes {
     frames: Vec<Frame>,
@@ -41,7 +43,7 @@ impl Mailboxes for Boxes {
         if self.frames.len() <= MAILBOXES {
             return Offer::Taken;
         }
-        // The least urgent one gives way, but for one that is being sent.
+        // The least urgent frame is replaced, unless it is being sent.
         let is_sending = self.frames.first().is_some_and(|first| self.on_wire == Some(first.id()));
         Offer::Replaced(self.frames.remove(usize::from(is_sending)))
     }
@@ -72,19 +74,19 @@ impl Port {
         self.inbox.pop_front()
     }
 
-    /// Whether a received frame waits.
+    /// Whether a received frame is waiting.
     #[must_use]
     pub fn has_mail(&self) -> bool {
         !self.inbox.is_empty()
     }
 
-    /// Whether a frame waits to be sent.
+    /// Whether a frame is waiting to be sent.
     #[must_use]
     pub fn is_sending(&self) -> bool {
         !self.mailboxes.frames.is_empty()
     }
 
-    /// Drops what waits to be sent, as the start of the communication does.
+    /// Drops the frames that wait to be sent, as the start of the communication does.
     pub fn clear(&mut self) {
         self.queue.clear();
         let on_wire = self.mailboxes.on_wire;
@@ -166,7 +168,7 @@ impl Controller for Port {
     fn idle(&mut self, _since: Time) {}
 }
 
-/// The frame as the bus knows it.
+/// Converts a frame for the bus.
 ///
 /// # Panics
 /// Never: a CANopen frame is a valid one.
@@ -181,7 +183,7 @@ pub fn to_bus(frame: &Frame) -> canbus::Frame {
     .expect("at most eight bytes")
 }
 
-/// The frame as a node knows it; `None` for an extended identifier, which no filter of a node lets pass.
+/// Converts a frame for a node; `None` for an extended identifier, which no acceptance filter of a node passes.
 #[must_use]
 pub fn from_bus(frame: &canbus::Frame) -> Option<Frame> {
     let Id::Standard(id) = frame.id() else { return None };
@@ -199,7 +201,7 @@ mod tests {
 
     const BIT: Time = Time::from_micros(1);
 
-    /// Runs the bus until `end` and gives the identifiers that have arrived.
+    /// Runs the bus until `end` and returns the identifiers that have arrived.
     fn run(bus: &mut Bus, port: &mut Port, other: &mut HostNode, end: Time) -> Vec<u16> {
         bus.step(&mut [port, other], end, &mut |_| {});
         std::iter::from_fn(|| other.receive())

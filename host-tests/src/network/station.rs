@@ -1,10 +1,10 @@
-//! A station: what the firmware's tasks are around a node, in one function.
+//! A station: does the work of the firmware's tasks around a node, in one function.
 
 use canopen::{Action, Frame, Instant, Transmit};
 
 use super::port::Port;
 
-/// What a station runs: a node, or a device of a test's own.
+/// The device in a station: a node, or a device of a test.
 pub trait Unit {
     /// Boots, or boots again after a reset.
     fn start(&mut self, now: Instant, out: &mut impl Transmit);
@@ -12,11 +12,11 @@ pub trait Unit {
     fn on_process_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit);
     /// A frame of FIFO 1.
     fn on_service_frame(&mut self, frame: &Frame, now: Instant, out: &mut impl Transmit);
-    /// Does what is due and gives the instant of the next call.
+    /// Does the work that is due and returns the instant of the next call.
     fn poll(&mut self, now: Instant, out: &mut impl Transmit) -> Instant;
-    /// The next thing that only the firmware can do.
+    /// The next action that only the firmware can carry out.
     fn take_action(&mut self) -> Option<Action>;
-    /// Stores what it has asked to be stored.
+    /// Carries out a requested store job.
     fn store(&mut self, _now: Instant, _out: &mut impl Transmit) {}
     /// Identifiers for FIFO 0.
     fn process_ids(&self) -> Vec<u16>;
@@ -27,16 +27,16 @@ pub trait Unit {
 /// A unit, its port and its acceptance filters.
 #[derive(Debug)]
 pub struct Station<U> {
-    /// What it runs.
+    /// The device.
     pub unit: U,
-    /// Its connection.
+    /// The connection to the bus.
     pub port: Port,
     filters: [Vec<u16>; 2],
     due: Instant,
 }
 
 impl<U: Unit> Station<U> {
-    /// A station that is silent and deaf until it is started.
+    /// A station that neither sends nor receives until it is started.
     pub(super) fn new(unit: U, port: Port) -> Station<U> {
         Station { unit, port, filters: [vec![], vec![]], due: Instant::NEVER }
     }
@@ -47,12 +47,12 @@ impl<U: Unit> Station<U> {
         self.poll(now);
     }
 
-    /// When it wants to run, if nothing arrives before.
+    /// The instant at which the station must run if no frame arrives earlier.
     pub(super) fn due(&self) -> Instant {
         if self.port.has_mail() { Instant(0) } else { self.due }
     }
 
-    /// Takes what has arrived and does what is due.
+    /// Processes the received frames and the work that is due.
     pub(super) fn run(&mut self, now: Instant) {
         while let Some(frame) = self.port.receive() {
             self.filter(&frame, now);
@@ -77,7 +77,7 @@ impl<U: Unit> Station<U> {
 
     fn poll(&mut self, now: Instant) {
         self.fulfil(now);
-        // Whoever is due is so at least a microsecond later: a deadline that has passed must not stop the time.
+        // The next call is at least a microsecond later: a deadline in the past must not stop the time.
         self.due = self.unit.poll(now, &mut self.port).max(Instant(now.0 + 1));
         self.fulfil(now);
     }

@@ -13,13 +13,14 @@ use sim::world::World;
 
 use crate::support::Master;
 
-/// How often the adapter looks for a frame.
+/// Period at which the adapter polls for a frame.
 const STEP: Time = Time::from_micros(100);
 
-/// A world that the adapter and the test look into.
+/// The world that the adapter and the test share.
 pub(crate) type Shared = Rc<RefCell<World>>;
 
-/// Does a command with an adapter of its own; what it printed, and how it ended. `each` is called between two looks of the adapter.
+/// Runs a command with its own adapter; returns its output and its result. `each` is called between two polls of the
+/// adapter.
 pub(crate) fn run(
     world: &Shared,
     cli: &Cli,

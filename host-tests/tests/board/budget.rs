@@ -1,4 +1,5 @@
-//! What the application may take. The longest image has 127 KiB of code: the rest is for what it grows by in the field.
+//! Memory budget of the application. The longest image has 127 KiB of code: the remaining space is a reserve for growth
+//! in the field.
 
 use budget::{Budget, Compiler};
 
@@ -6,7 +7,7 @@ use crate::support::{SECOND, images, world};
 
 const KIB: u64 = 1024;
 const FLASH: Budget = Budget { what: "application, bytes of flash", limit: 114 * KIB, width: 10 };
-/// Of variables; the stack has 24 KiB of its own.
+/// RAM of the variables; the stack has 24 KiB of its own.
 const RAM: Budget = Budget { what: "application, bytes of RAM", limit: 28 * KIB, width: 5 };
 
 #[test]

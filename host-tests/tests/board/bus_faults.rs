@@ -1,4 +1,4 @@
-//! Others on the bus fail, or there is too much on it.
+//! Faults of other bus participants, and a full bus.
 
 use canbus::{Fault, Position, SeenBy, Time};
 use chip::Peripherals;
@@ -13,10 +13,10 @@ const CAN1_IER: u32 = 0x4000_6414;
 /// EMCY codes (CiA 301, table 26).
 const OVERRUN: u16 = 0x8110;
 const PASSIVE: u16 = 0x8120;
-/// Errors in a row that make a transmitter passive, and that switch it off: 8 each, above 127 and 255.
+/// Errors in a row that make a transmitter error passive, and bus-off: each adds 8; the limits are 127 and 255.
 const ENOUGH_TO_BE_PASSIVE: u64 = 17;
 
-/// The EMCY codes that a node sends while this happens.
+/// The EMCY codes that a node sends in this span.
 fn emergencies(world: &mut sim::world::World, master: &Master, span: Time) -> Vec<u16> {
     master.heard(world, 0x081);
     world.run_until(world.now() + span);
@@ -24,7 +24,7 @@ fn emergencies(world: &mut sim::world::World, master: &Master, span: Time) -> Ve
     heard.iter().map(|frame| u16::from_le_bytes([frame.bytes()[0], frame.bytes()[1]])).collect()
 }
 
-/// The receive interrupts are held up for 20 ms: what the FIFO cannot hold is lost, and is told.
+/// The receive interrupts are delayed by 20 ms: the FIFO overflows, and the node reports the loss.
 #[test]
 fn frames_that_the_fifo_loses_are_told() {
     let mut world = running();
@@ -62,7 +62,7 @@ fn an_error_passive_node_tells_it() {
     assert_eq!(after.nodes[0].heard.boot_ups, 1, "{after}");
 }
 
-/// Somebody with another bit rate destroys what is on the bus until it is bus-off itself; the node outlives it.
+/// A participant with a wrong bit rate destroys frames until it is bus-off; the node must survive this.
 #[test]
 fn a_participant_with_a_wrong_bit_rate_is_outlived() {
     let mut world = running();
@@ -80,17 +80,18 @@ fn a_participant_with_a_wrong_bit_rate_is_outlived() {
     assert!(after.nodes[0].incidents.is_empty(), "{after}");
 }
 
-/// For half a minute, two minutes with `--thorough`, somebody sends nothing but a frame that comes before all of the node's: it is silent all the time, goes on
-/// measuring, and is back with the first gap. Of its heartbeats and PDOs it has kept what was in a mailbox and the newest.
+/// For half a minute (two minutes with `--thorough`) another participant sends only a frame that is more urgent than
+/// all frames of the node. The node is silent for this time, but goes on measuring, and sends again in the first gap.
+/// Of its heartbeats and PDOs it has kept the frame in the mailbox and the newest one.
 #[test]
 fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
     const BIT_RATE: u32 = 125_000;
     const MORE_URGENT: u16 = 0x001;
     let seconds = either(30, 120);
-    /// More than 100 ms of frames of eight bytes.
+    /// Number of frames of eight bytes that take more than 100 ms.
     const FRAMES: usize = 120;
     const HEARTBEAT: u16 = 0x701;
-    /// More than the whole queue takes, less than the period of heartbeat and PDO.
+    /// Longer than the whole queue takes, shorter than the period of heartbeat and PDO.
     const GAP: Time = Time::from_millis(50);
     let mut world = world("--bitrate 125");
     let babbler = Master::join_at(&mut world, BIT_RATE);
@@ -122,8 +123,7 @@ fn a_node_that_minutes_of_more_urgent_frames_keep_silent_comes_back() {
     assert!(node.heard.boot_ups == 1 && node.incidents.is_empty(), "{after}");
 }
 
-/// A babbling node leaves no gap on the bus for half a minute: what the node wants to send waits, and nothing is lost but
-/// the time.
+/// A babbling node leaves no gap on the bus for half a minute: the node's frames wait, and are delayed but not lost.
 #[test]
 fn a_node_on_a_full_bus_keeps_measuring() {
     let mut world = world("--bitrate 1000 --load 100");

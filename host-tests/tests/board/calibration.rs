@@ -1,15 +1,17 @@
-//! The program that compares the model of cycles with a chip, on the emulated board: what it prints there, beside what is published.
+//! The program that compares the cycle model with a chip, run on the emulated board: its output is compared with the
+//! published figures.
 
 use canbus::Time;
 use emulator::Estimate;
 
 use crate::hal_examples::{run, start_program};
 
-/// What the program repeats, and the cycles of each that are published, at least and at most.
+/// The instructions that the program repeats, and the published least and most cycles of each.
 ///
-/// By the Cortex-M4 technical reference manual, tables 3-1 and 7-1. On the peripheral buses: two cycles of the bus for a transfer (AMBA 3 APB,
-/// 2.1), at most as many again for a transfer that was stored before and one for the edge, and two for the bus matrix, at
-/// PCLK1 = HCLK / 4 and PCLK2 = HCLK / 2. In a row that is longer than the caches, a line of 128 bits is waited for (RM0390, 3.4).
+/// The source is the Cortex-M4 technical reference manual, tables 3-1 and 7-1. On the peripheral buses a transfer takes
+/// two cycles of the bus (AMBA 3 APB, 2.1), at most as many again for a previous buffered transfer, one for the edge,
+/// and two for the bus matrix, at PCLK1 = HCLK / 4 and PCLK2 = HCLK / 2. Straight-line code that is longer than the
+/// caches waits for each line of 128 bits (RM0390, 3.4).
 const LINES: [(&str, f64, f64); 16] = [
     ("ADDS", 1.0, 1.0),
     ("LDR, one after the other", 1.0, 2.0),
@@ -29,10 +31,10 @@ const LINES: [(&str, f64, f64); 16] = [
     ("4 KiB of NOP", 1.0, 1.63),
 ];
 
-/// What the ends of the measured code come to, for each instruction.
+/// Tolerance per instruction for the code around the measured one, in cycles.
 const ENDS: f64 = 0.1;
 
-/// The cycles of each line as the program prints them.
+/// The cycles of each line in the program's output.
 fn measured(estimate: Estimate) -> Vec<f64> {
     let mut machine = start_program("calibrate", None);
     machine.set_estimate(estimate).unwrap();

@@ -1,4 +1,5 @@
-//! The chip fails: a clock, the converter, an interrupt, the flash, the power. The node comes back, or says what is lost.
+//! Faults of the chip: a clock, the converter, an interrupt, the flash, the power. The node recovers, or reports the
+//! loss.
 
 use canbus::Time;
 use chip::Peripherals;
@@ -13,17 +14,17 @@ const TIM2: u32 = 28;
 /// The interrupts of the services and of the sampling.
 const CAN1_SCE: u32 = 22;
 const DMA2_STREAM0: u32 = 56;
-/// The application's vector table (memory.x), an instruction that never ends, and one that there is not.
+/// The application's vector table (memory.x), an endless loop, and an undefined instruction.
 const VECTORS: u32 = 0x0802_0200;
 const BRANCH_TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
 /// UDF #0.
 const UNDEFINED: [u8; 2] = [0x00, 0xDE];
-/// EMCY code for a reset that nobody asked for (object 3000h:3, bit 6).
+/// EMCY code for an unexpected reset (object 3000h:3, bit 6).
 const UNEXPECTED_RESET: u16 = 0x6101;
 /// RAM of the chip (RM0390, 2.3.1).
 const RAM: u32 = 0x2000_0000;
 const RAM_SIZE: usize = 128 * 1024;
-/// Clock enables of APB2 with the bit of the converter: without a clock it takes no writes (RM0390, 6.3.14).
+/// Clock enables of APB2 with the bit of the converter: without a clock the converter ignores writes (RM0390, 6.3.14).
 const RCC_APB2ENR: u32 = 0x4002_3844;
 const ADC1EN: u32 = 1 << 8;
 /// The interrupt of the task that stores parameters.
@@ -44,19 +45,19 @@ pub(crate) fn peek(world: &mut World, register: u32) -> u32 {
     world.machine(0).peripherals_mut().read(register, 4, now).unwrap()
 }
 
-/// No restart brings it back.
+/// No restart of the conversions helps.
 #[test]
 fn a_dead_converter_is_ended_by_the_watchdog() {
     let mut world = running();
     let clocks = peek(&mut world, RCC_APB2ENR);
-    // The firmware meets a converter without its clock.
+    // The firmware accesses the converter without its clock, which breaks a rule.
     world.enforce_rules(false);
     poke(&mut world, RCC_APB2ENR, clocks & !ADC1EN);
     let log = comes_back(&mut world);
     assert!(log.contains("reset by independent watchdog"), "{log}");
 }
 
-/// A handler that never ends, as that of an interrupt that nobody can clear: everything below it starves.
+/// A handler that never ends, like that of an interrupt that cannot be cleared: all lower priorities starve.
 #[test]
 fn an_interrupt_without_end_is_ended_by_the_watchdog() {
     let mut world = running();
@@ -67,7 +68,7 @@ fn an_interrupt_without_end_is_ended_by_the_watchdog() {
     assert!(after.nodes[0].heard.boot_ups == 2 && after.nodes[0].heard.heartbeats > 1, "{after}");
 }
 
-/// The task of the lowest priority hangs: everybody else goes on, and parameters could not be stored any more.
+/// The task of the lowest priority hangs: all other tasks go on, but parameters could no longer be stored.
 #[test]
 fn a_task_that_stores_for_ever_is_ended_by_the_watchdog() {
     let mut world = running();
@@ -76,7 +77,7 @@ fn a_task_that_stores_for_ever_is_ended_by_the_watchdog() {
     assert!(log.contains("reset by independent watchdog"), "{log}");
 }
 
-/// Each of the tasks that run by themselves meets an undefined instruction: the crash record names the place.
+/// Each task with an interrupt of its own meets an undefined instruction: the crash record has the address.
 #[test]
 fn a_fault_in_a_task_ends_in_a_recorded_reset() {
     for irq in [TIM2, CAN1_SCE, DMA2_STREAM0] {
@@ -88,7 +89,7 @@ fn a_fault_in_a_task_ends_in_a_recorded_reset() {
     }
 }
 
-/// Puts an instruction in place of the first one of a handler, until that has ended in a reset. Gives the address.
+/// Replaces the first instruction of a handler until a reset follows. Returns the address.
 fn run_broken(world: &mut World, irq: u32, instruction: [u8; 2]) -> u32 {
     let mut vector = [0; 4];
     world.machine(0).read(VECTORS + 4 * (16 + irq), &mut vector).unwrap();
@@ -96,7 +97,7 @@ fn run_broken(world: &mut World, irq: u32, instruction: [u8; 2]) -> u32 {
     let mut code = [0; 2];
     world.machine(0).read(handler, &mut code).unwrap();
     world.machine(0).write(handler, &instruction).unwrap();
-    // The bootloader starts no application that was changed, so the code must be as it was before its CRC is computed.
+    // The bootloader does not start a changed application, so the code must be restored before its CRC is computed.
     let reset = (0..1000).find(|_| {
         world.run_until(world.now() + Time::from_millis(1));
         !world.machine(0).incidents().is_empty()
@@ -106,14 +107,14 @@ fn run_broken(world: &mut World, irq: u32, instruction: [u8; 2]) -> u32 {
     handler
 }
 
-/// Stops the clock on OSC_IN, from now until so much later.
+/// Stops the clock on OSC_IN, from now until `until`.
 fn stop_crystal(world: &mut World, until: Time) {
     let fault = Fault { kind: FaultKind::NoCrystal, from: world.now(), until: world.now() + until };
     let now = world.now();
     world.machine(0).peripherals_mut().plant_mut(now).add_fault(fault);
 }
 
-/// Without the crystal the node never gets on the bus, and the watchdog has it try again and again.
+/// Without the crystal the node never joins the bus, and the watchdog restarts it again and again.
 #[test]
 fn a_node_without_its_clock_is_silent_and_comes_back_with_it() {
     let mut world = running();
@@ -128,14 +129,15 @@ fn a_node_without_its_clock_is_silent_and_comes_back_with_it() {
     assert!(after.nodes[0].heard.heartbeats > silent.heard.heartbeats, "{after}");
 }
 
-/// The clock security system tells it at once: with HSI for a clock the node would destroy the frames of everybody.
+/// The clock security system reports the failure at once: clocked by HSI, the node would destroy the frames of other
+/// nodes.
 #[test]
 fn a_node_whose_clock_fails_leaves_the_bus_at_once() {
     let mut world = world("--bitrate 1000 --load 50 --node 1:pressure --node 2:pressure");
     let before = run(&mut world, SECOND);
     stop_crystal(&mut world, SECOND * 3);
     let silent = run(&mut world, SECOND * 3);
-    // Until the node has left, its controller runs with the wrong clock: that costs others one frame at most.
+    // Until the node has left, its controller runs with the wrong clock, which costs other nodes one frame at most.
     assert!(silent.bus.errors <= before.bus.errors + 1, "{silent}");
     let after = run(&mut world, SECOND * 5);
     let log: Vec<String> = world.take_log().into_iter().map(|line| line.text).collect();
@@ -145,14 +147,15 @@ fn a_node_whose_clock_fails_leaves_the_bus_at_once() {
     assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET));
 }
 
-/// The 32-bit counter of microseconds comes to its half and to its end, as it does every 71 minutes.
+/// The 32-bit counter of microseconds reaches its half and its end, as happens every 71 minutes.
 #[test]
 fn the_time_goes_on_where_its_counter_wraps() {
     let mut world = running();
     let master = Master::join(&mut world);
     for before in [0x7FFF_0000, 0xFFFF_0000] {
         poke(&mut world, TIM2_CNT, before);
-        // The counter has jumped over the deadlines that were set, which time never does: two frames have them set again.
+        // The test moves the counter past the deadlines that were set, which time never does: two frames make the node
+        // set them again.
         master.send(&mut world, 0x000, &[0x80, 1]);
         master.send(&mut world, 0x601, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]);
         run(&mut world, SECOND);
@@ -164,7 +167,7 @@ fn the_time_goes_on_where_its_counter_wraps() {
     }
 }
 
-/// The power fails in each phase of a save: the node has what was saved before or what was saved now.
+/// The power fails in each phase of a save: afterwards the node has either the old or the new values.
 #[test]
 fn a_save_that_the_power_cuts_is_made_or_not_made() {
     cut_saves(|world| {
@@ -173,7 +176,7 @@ fn a_save_that_the_power_cuts_is_made_or_not_made() {
     });
 }
 
-/// The supply fails for so short a time that RAM keeps what is in it: the note for the bootloader and the crash record, too.
+/// The supply fails so briefly that RAM keeps its content, including the note for the bootloader and the crash record.
 #[test]
 fn a_save_that_a_brown_out_cuts_is_made_or_not_made() {
     cut_saves(|world| {
@@ -186,11 +189,11 @@ fn a_save_that_a_brown_out_cuts_is_made_or_not_made() {
     });
 }
 
-/// Cuts one save after the other, each at a later operation of the flash, and restarts the node in this way.
+/// Cuts one save after the other, each at a later operation of the flash, and restarts the node with `restart`.
 fn cut_saves(restart: impl Fn(&mut World)) {
     const OLD: [u8; 4] = [1, 2, 3, 4];
     const NEW: [u8; 4] = [5, 6, 7, 8];
-    /// Every operation is cut in the tests of the store itself.
+    /// Only every fifth operation; the tests of the store itself cut every operation.
     const STRIDE: u64 = 5;
     let mut found = [0, 0];
     let mut operation = 0;
@@ -237,7 +240,7 @@ fn store(world: &mut World, master: &Master, value: [u8; 4]) {
     assert_eq!(master.ask(world, 1, &SAVE)[0], 0x60);
 }
 
-/// Cells that do not take what is programmed: the client is told, and what was saved before stays.
+/// Flash cells that cannot be programmed: the client gets an error, and the earlier saved values stay.
 #[test]
 fn a_flash_that_does_not_take_a_save_is_told() {
     let mut world = world("--bitrate 1000");
@@ -249,7 +252,7 @@ fn a_flash_that_does_not_take_a_save_is_told() {
         let machine = world.machine(0);
         machine.read(page, &mut bytes).unwrap();
         let used = bytes.iter().rposition(|&byte| byte != 0xFF).map_or(0, |last| last / 4 * 4 + 4);
-        // Bits that stay 0 whatever is erased; the first words after the last save.
+        // Bits that stay 0 even after an erase: the first words after the last save.
         bytes[used + 8..used + 64].fill(0xA5);
         machine.write(page, &bytes).unwrap();
     }

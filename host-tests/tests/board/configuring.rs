@@ -1,4 +1,4 @@
-//! What a node keeps, and how it gets its node-ID and its bit rate.
+//! The stored configuration of a node, and the configuration of node-ID and bit rate.
 
 use canbus::Time;
 use sim::traffic::NmtState;
@@ -10,7 +10,7 @@ const fn ms(milliseconds: u64) -> Time {
     Time::from_millis(milliseconds)
 }
 
-/// A download of up to four bytes; the response.
+/// A download of up to four bytes; returns the response.
 fn write(world: &mut World, master: &Master, index: u16, sub: u8, value: &[u8]) -> Vec<u8> {
     let unused = 4 - value.len();
     let mut request = [0; 8];
@@ -76,7 +76,7 @@ fn pages_that_fill_up_are_erased_by_a_restart_and_lose_nothing() {
             last = 1000 + number;
             return false;
         }
-        // "Cannot be stored because of the present device state": it wants a restart.
+        // "Cannot be stored because of the present device state": the node needs a restart.
         assert_eq!(response[4..], [0x22, 0, 0, 8]);
         true
     });
@@ -86,7 +86,7 @@ fn pages_that_fill_up_are_erased_by_a_restart_and_lose_nothing() {
     assert_eq!(write(&mut world, &master, 0x1010, 1, b"save")[0], 0x60, "there is room again");
 }
 
-/// Finds one unconfigured node by fastscan; its identity.
+/// Finds one unconfigured node by fastscan; returns its identity.
 fn fastscan(world: &mut World, master: &Master) -> Option<[u32; 4]> {
     let mut scan = |value: u32, bit: u8, part: u8, next: u8| {
         let [a, b, c, d] = value.to_le_bytes();
@@ -158,7 +158,7 @@ fn lss_moves_a_node_to_another_bit_rate_for_good() {
     assert_eq!(run(&mut moving, SECOND).bus.errors, 0);
 }
 
-/// At every bit rate, on a bus with a frame every 50 ms that others acknowledge.
+/// At every bit rate, on a bus with a frame every 50 ms that other nodes acknowledge.
 #[test]
 fn a_node_finds_the_bit_rate_by_listening_and_disturbs_nobody() {
     for rate in [10, 20, 50, 125, 250, 500, 800, 1000] {
@@ -177,8 +177,9 @@ fn a_node_finds_the_bit_rate_by_listening_and_disturbs_nobody() {
     }
 }
 
-/// A frame that ends while the node moves on to the next rate was heard at the rate before. Long frames at every phase: the node may
-/// miss some of them, but the node never takes one for a frame of another rate, whose bus it would then destroy.
+/// A frame that ends while the node moves on to the next rate was received at the previous rate. The test sends long
+/// frames at every phase. The node may miss some of them, but must never take one for a frame at another rate, because
+/// it would then destroy frames on the bus.
 #[test]
 fn a_frame_of_the_rate_before_is_not_taken_for_one_of_the_next() {
     for rate in [10, 20, 50, 125] {

@@ -12,10 +12,10 @@ use crate::adapter::{Shared, run};
 use crate::support::{SECOND, world};
 use crate::update::HEADER;
 
-/// The virtual time that a device may take.
+/// Limit of the virtual time for a device.
 const LIMIT: f64 = 180.0;
 
-/// Does a command; its JSON, and how it ended.
+/// Runs a command; returns its JSON output and its result.
 fn json(world: &Shared, line: &[&str]) -> (String, Result<(), Failure>) {
     let line = ["nodectl", "--bus", "socketcan:emulated", "--json"].iter().chain(line);
     run(world, &Cli::try_parse_from(line).unwrap(), |_| ())
@@ -27,7 +27,7 @@ fn command(world: &Shared, line: &[&str]) -> String {
     printed
 }
 
-/// Checks the node, and gives the report.
+/// Checks the node, and returns the report.
 fn check(world: &Shared, more: &[&str]) -> Value {
     let start = world.borrow().now();
     let (printed, result) = json(world, &[&["check", "--yes"], more].concat());
@@ -47,7 +47,7 @@ fn check(world: &Shared, more: &[&str]) -> Value {
     report
 }
 
-/// A check that did not pass, in words.
+/// A check that did not pass, as text.
 fn told(check: &Value) -> Option<String> {
     let text = |key: &str| check[key].as_str().unwrap_or_default().to_owned();
     match check["verdict"].as_str()? {
@@ -73,7 +73,7 @@ fn a_pressure_transmitter_conforms() {
 fn the_bootloader_conforms() {
     let world = board("pressure");
     command(&world, &["write", "1F51:1", "0"]);
-    // With a program it would start that after each restart.
+    // With a valid program, the bootloader would start it after each restart.
     world.borrow_mut().machine(0).write(HEADER, &[0; 1024]).unwrap();
     let report = check(&world, &[]);
     assert!(report["passed"].as_u64() > Some(100), "{}", report["passed"]);
@@ -81,7 +81,7 @@ fn the_bootloader_conforms() {
     assert!(bytes.contains(&u32::from_be_bytes(*b"BOOT").to_string()), "{bytes}");
 }
 
-/// The same library and the same firmware: in every run the node in process conforms in all personalities, here the boards.
+/// The firmware in every personality on the board. The same checks run on the node in process in every test run.
 #[test]
 fn every_personality_conforms() {
     if is_thorough() {

@@ -1,4 +1,4 @@
-//! What a sample costs: both profiles, filters, eight cams, and the position kept.
+//! The cost of a sample: both profiles, filters, eight cams, and the kept position.
 
 use canbus::Time;
 use emulator::{Estimate, Exception};
@@ -10,7 +10,7 @@ use crate::support::{Master, SECOND, world, write};
 const SAMPLING: Exception = Exception::irq(56);
 /// 2 % of a millisecond at 144 MHz.
 const BUDGET: u64 = 144_000 * 2 / 100;
-/// Entry and exit of an exception in cycles, which are not counted with what runs in it.
+/// Cycles of exception entry and exit, which the activity counters do not include.
 const AROUND: u64 = 24;
 
 /// A writable object: index, sub-index, bytes, value.
@@ -42,10 +42,10 @@ fn spent(world: &mut World) -> (u64, u64, u64) {
     (activity.entries, activity.instructions, activity.cycles + AROUND * activity.entries)
 }
 
-/// A second of samples.
+/// The samples of one second.
 struct Samples {
     instructions: u64,
-    /// Cycles of a sample on average, and of the longest.
+    /// Cycles of a sample: average and maximum.
     cycles: u64,
     longest: u64,
 }
@@ -82,10 +82,10 @@ fn measure(estimate: Estimate) -> Samples {
 fn a_sample_of_both_profiles_takes_two_per_cent_of_the_core() {
     let [best, modelled, worst] = [Estimate::Best, Estimate::Modelled, Estimate::Worst].map(measure);
     assert!(modelled.cycles <= BUDGET, "{} cycles of {BUDGET}", modelled.cycles);
-    // The one in a revolution that checks the index.
+    // One sample in each revolution also checks the index.
     assert!(modelled.longest <= BUDGET + BUDGET / 20, "{} cycles", modelled.longest);
     assert!(worst.longest <= 2 * BUDGET, "{} cycles at worst", worst.longest);
     assert!(best.cycles < modelled.cycles && modelled.cycles < worst.cycles);
-    // The way of the program does not depend on what its instructions take.
+    // The executed path must not depend on the cycles of the instructions.
     assert_eq!((best.instructions, worst.instructions), (modelled.instructions, modelled.instructions));
 }

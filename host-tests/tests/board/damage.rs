@@ -1,5 +1,5 @@
-//! Damage to what is stored: one bit changes while the power is off. The node says which group is damaged and what holds
-//! instead, after its boot-up message, and it says nothing of any other group.
+//! Damage to stored values: one bit changes while the power is off. After its boot-up message the node reports the
+//! damaged group and the values used instead. It reports no other group.
 
 use canbus::{Id, Time};
 use sim::world::World;
@@ -15,10 +15,10 @@ const BOOT_UP: u16 = 0x700;
 const TPDO1: u16 = 0x180;
 /// The heartbeat of another node.
 const SOMEBODY: u16 = 0x77F;
-/// First byte of the error field: what holds instead of what was stored last.
+/// First byte of the error field: the values used instead of the last stored ones.
 const OLDER: u8 = 1;
 const DEFAULTS: u8 = 2;
-/// Values of which the bytes are nowhere else in the pages.
+/// Values whose bytes occur nowhere else in the pages.
 const OLD: u32 = 0x5A17;
 const NEW: u32 = 0x6B29;
 const OTHER: u32 = 0x1235;
@@ -33,7 +33,7 @@ enum Group {
 
 const ALL: [Group; 4] = [Group::Device, Group::Communication, Group::Application, Group::Calibration];
 
-/// What an examiner asks a node.
+/// The checks of a node.
 struct Examiner {
     world: World,
     master: Master,
@@ -60,7 +60,7 @@ impl Group {
         }
     }
 
-    /// The object with the value that tells one set from another, the default of the object, and what saves the group.
+    /// The object whose value tells one set from another, the object's default, and the save command of the group.
     fn objects(self) -> ((u16, u8), u32, (u16, u8)) {
         match self {
             Group::Device => unreachable!("LSS stores the device record"),
@@ -70,7 +70,8 @@ impl Group {
         }
     }
 
-    /// The value as its record has it: in the device record the node-ID is followed by the personality and the bit rate.
+    /// The value as stored in its record: in the device record the node-ID is followed by the personality and the bit
+    /// rate.
     fn bytes(self, value: u32) -> Vec<u8> {
         let [a, b, c, d] = value.to_le_bytes();
         match self {
@@ -87,7 +88,7 @@ fn node_id(value: u32) -> u8 {
 }
 
 impl Examiner {
-    /// A node that starts by itself once its communication parameters are saved.
+    /// A node that becomes Operational without a command once its communication parameters are saved.
     fn new() -> Examiner {
         let mut world = world("--pressure const:250000");
         let master = Master::join_at(&mut world, 250_000);
@@ -141,15 +142,15 @@ impl Examiner {
         self.world.machine(0).write(address, &[pages[at] ^ 0x80]).unwrap();
     }
 
-    /// Switches the power off and on: the EMCY messages, as code and first byte of the error field, and whether the node has
-    /// started by itself. Nothing may come before the boot-up message.
+    /// Switches the power off and on. Returns the EMCY messages as code and first byte of the error field, and whether
+    /// the node has become Operational without a command. No message may come before the boot-up message.
     fn power_cycle(&mut self, node: u8) -> (Vec<(u16, u8)>, bool) {
         self.node = node;
         let now = self.world.now();
         self.world.machine(0).power_off();
         self.world.machine(0).power_on(now);
         self.world.take_frames();
-        // A node without a record listens until somebody speaks.
+        // A node without a record listens until another node sends a frame.
         for round in 1..=50 {
             self.world.run_until(now + Time::from_millis(20 * round));
             self.master.send(&mut self.world, SOMEBODY, &[5]);
@@ -170,7 +171,7 @@ fn said(frame: &canbus::Frame) -> (u16, Vec<u8>) {
     (id.as_raw(), frame.bytes().to_vec())
 }
 
-/// The newest of two saves, the one before the last, the only one.
+/// The damaged record: the newest of two saves, the one before the newest, or the only one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Newest,
@@ -186,7 +187,7 @@ fn only_the_group_that_is_damaged_is_told_with_its_own_code_and_what_holds_inste
             let mut examiner = Examiner::new();
             let others = ALL.into_iter().filter(|other| !matches!(other, Group::Device) && *other != group);
             others.for_each(|other| examiner.save(other, OTHER));
-            // The device record has been stored in production.
+            // The device record has already been stored in production.
             let is_stored = group == Group::Device;
             if kind != Kind::Only && !is_stored {
                 examiner.save(group, OLD);
@@ -229,7 +230,7 @@ fn only_the_group_that_is_damaged_is_told_with_its_own_code_and_what_holds_inste
     }
 }
 
-/// The EMCYs of a fault that lasts follow the boot-up message, at power-on and at a reset of the communication.
+/// The EMCY of a lasting fault follows the boot-up message, at power-on and at a reset of the communication.
 #[test]
 fn nothing_comes_before_the_boot_up_message() {
     for rate in [10, 125, 1000] {

@@ -1,4 +1,5 @@
-//! The node in this process and the image on the emulated board are told the same, frame by frame, and say the same.
+//! The node in this process and the image on the emulated board get the same frames one by one, and must send the same
+//! frames.
 
 use std::collections::BTreeMap;
 
@@ -13,29 +14,29 @@ use sim::world::World;
 
 use crate::support::{LSS_REQUEST, LSS_RESPONSE, Master, SDO_REQUEST, SDO_RESPONSE, SECOND, SYNC, world};
 
-/// Node-ID of both.
+/// Node-ID of both nodes.
 const ID: u8 = 1;
 const ERROR_CONTROL: u16 = 0x701;
 const EMCY: u16 = 0x081;
-/// What is compared. A PDO carries what is measured, and the two sensors are not the same to the last bit.
+/// The compared frames. PDOs are left out: they carry measured values, and the two sensors differ in the last bits.
 const COMPARED: [u16; 4] = [EMCY, SDO_RESPONSE, ERROR_CONTROL, LSS_RESPONSE];
-/// Frames of a script.
+/// Number of frames in a script.
 const FRAMES: usize = 400;
-/// Time from frame to frame; after a reset.
+/// Time between two frames, and after a reset, in ms.
 const PAUSE: u64 = 4;
 const RESET_PAUSE: u64 = 1000;
 
-/// A frame, and how long to wait then, in ms.
+/// A frame, and the wait after it in ms.
 type Line = (Frame, u64);
 
-/// What was said under each identifier, in order; of error control the boot-up messages. A heartbeat comes when its time
-/// has come, and the two take different times to start.
+/// The sent frames of each identifier, in order. Of error control only the boot-up messages count: a heartbeat depends
+/// on time, and the two nodes take different times to start.
 type Said = BTreeMap<u16, Vec<Vec<u8>>>;
 
-/// Whether both nodes have the same value of this object, and a write to it leaves it so.
+/// Whether the object has the same value in both nodes, and a write keeps it so.
 fn is_comparable(row: &Object) -> bool {
     let is_measured = row.index >= 0x2000 && row.access == Access::ReadOnly && row.mapping != Mapping::No;
-    // Names and versions of the image, its identification, and the measured value that is taken as zero.
+    // Excluded: names and versions of the image, its identification, and the measured value that is taken as zero.
     let is_own = matches!(row.index, 0x1008..=0x100A | 0x1F56) || row.access == Access::WriteOnly;
     let is_stored = matches!(
         row.rule,

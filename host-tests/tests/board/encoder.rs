@@ -22,11 +22,11 @@ pub(crate) const SENSOR_TYPE: (u16, u8) = (0x2100, 1);
 pub(crate) const FASTEST: (u16, u8) = (0x2104, 1);
 pub(crate) const SENSOR_STATE: (u16, u8) = (0x210B, 1);
 
-/// Codes of sensor types (object 1000h).
+/// Code of a sensor type, as in the device type (object 1000h).
 pub(crate) const MULTI_TURN: u32 = 2;
-/// Operating parameters: the scaling works.
+/// Bit of the operating parameters: scaling is enabled.
 const SCALING: u32 = 1 << 2;
-/// Sensor states.
+/// Bits of the sensor state.
 pub(crate) const NO_SIGNAL: u32 = 1 << 0;
 pub(crate) const IMPLAUSIBLE: u32 = 1 << 3;
 pub(crate) const UNREFERENCED: u32 = 1 << 5;
@@ -48,7 +48,7 @@ pub(crate) fn wait(world: &mut World, millis: u64) {
     world.run_until(world.now() + Time::from_millis(millis));
 }
 
-/// Where the shaft is, in steps.
+/// The position of the shaft, in steps.
 pub(crate) fn shaft(world: &mut World, at: Time, steps: f64) -> i64 {
     (world.machine(0).peripherals().plant().revolutions(at) * steps).floor() as i64
 }
@@ -57,14 +57,14 @@ pub(crate) fn position(tpdo: &[u8]) -> i64 {
     i64::from(u32::from_le_bytes(tpdo[..4].try_into().unwrap()))
 }
 
-/// The largest age of a position, at the SYNC that samples it, that explains what came, in microseconds; the range of
-/// positions has `range` steps, and the shaft makes `per_second` of them.
+/// The age of a position at the SYNC that samples it, in microseconds, computed from the received position. The range
+/// of positions has `range` steps, and the shaft moves `per_second` steps a second.
 fn age(shaft: i64, position: i64, range: i64, per_second: f64) -> f64 {
     let behind = (shaft - position + range / 2).rem_euclid(range) - range / 2;
     behind as f64 / per_second * 1e6
 }
 
-/// The ages of the positions that a thousand SYNCs get, the least and the most.
+/// The ages of the positions that a thousand SYNCs sample: the least and the most.
 pub(crate) fn ages(
     world: &mut World,
     master: &Master,
@@ -74,7 +74,7 @@ pub(crate) fn ages(
 ) -> (f64, f64) {
     let (mut least, mut most) = (f64::MAX, f64::MIN);
     for _ in 0..1000 {
-        // A SYNC lasts 44 to 56 us at 1 Mbit/s; what it samples is right when it has ended.
+        // A SYNC lasts 44 to 56 us at 1 Mbit/s; the node samples at its end.
         let end = world.now() + Time::from_micros(50);
         let expected = shaft(world, end, steps);
         master.send(world, SYNC, &[]);
@@ -87,8 +87,8 @@ pub(crate) fn ages(
     (least, most)
 }
 
-/// The shaft turns at 6000 rpm, 410 counts a millisecond: the timer wraps every 160 ms. What a SYNC gets is at most one
-/// sample old, the speed is right, and each index comes where it is expected.
+/// The shaft turns at 6000 rpm, 410 counts a millisecond: the timer wraps every 160 ms. The position for a SYNC is at
+/// most one sample old, the speed is right, and each index is accepted.
 #[test]
 fn a_fast_shaft_is_followed_both_ways_across_the_wrap() {
     for rpm in [6000, -6000] {
@@ -107,7 +107,7 @@ fn a_fast_shaft_is_followed_both_ways_across_the_wrap() {
             0,
             "no step is lost and the index is in its place"
         );
-        // In 64 units a revolution the speed fits 6030h.
+        // With 64 units per revolution, the speed fits into 6030h.
         write(&mut world, &master, PER_REVOLUTION, 4, 64);
         write(&mut world, &master, OPERATING, 2, SCALING);
         wait(&mut world, 10);
@@ -116,13 +116,13 @@ fn a_fast_shaft_is_followed_both_ways_across_the_wrap() {
         assert!((i32::from(speed) - expected).abs() <= expected.abs() / 100, "{speed} instead of {expected}");
         let summary = run(&mut world, Time::from_millis(1));
         assert!(summary.nodes[0].incidents.is_empty() && summary.nodes[0].unmodelled.is_empty(), "{summary}");
-        // The first and the last start may be a lock late, a microsecond in the seconds between them.
+        // A lock may delay the first and the last start: a microsecond in the seconds between them.
         assert!((summary.nodes[0].sampling.rate - 1000.0).abs() < 1e-3, "{summary}");
         println!("{summary}");
     }
 }
 
-/// Without an index nothing tells where the zero of a turn is.
+/// Without an index, the zero of a revolution is unknown.
 #[test]
 fn an_index_that_does_not_come_is_missed() {
     let (mut world, master) = start("--shaft rpm:600 --fault missing-index@0..2");
@@ -132,7 +132,7 @@ fn an_index_that_does_not_come_is_missed() {
     assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
 }
 
-/// Tells the node that its sensor is absolute.
+/// Configures the sensor of the node as absolute.
 pub(crate) fn start_absolute(flags: &str) -> (World, Master) {
     let (mut world, master) = start(flags);
     write(&mut world, &master, SENSOR_TYPE, 1, MULTI_TURN);
@@ -148,7 +148,7 @@ fn the_absolute_encoder_tells_where_the_shaft_is() {
     assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
 }
 
-/// A word is started with one sample and taken with the next one: its position is up to two milliseconds old.
+/// A word is started with one sample and read with the next one: its position is up to two milliseconds old.
 #[test]
 fn the_absolute_encoder_follows_a_fast_shaft_both_ways_over_its_zero() {
     for rpm in [6000, -6000] {
@@ -170,7 +170,7 @@ fn the_absolute_encoder_follows_a_fast_shaft_both_ways_over_its_zero() {
 fn faults_of_the_absolute_encoder_are_told() {
     let (mut world, master) =
         start_absolute("--shaft const:2.25 --fault open-ssi@2..3 --fault wrong-code@4..5");
-    // Half a revolution takes four seconds then, and is implausible for so long.
+    // Half a revolution then takes four seconds, and is implausible for that time.
     write(&mut world, &master, FASTEST, 4, 1);
     let (open, wrong) = (NO_SIGNAL | POSITION_ERROR, IMPLAUSIBLE | POSITION_ERROR);
     for (at, state) in [(1500, 0), (2500, open), (3500, 0), (4500, wrong), (5500, 0)] {

@@ -1,27 +1,28 @@
-//! What must never happen, made to happen: the node comes back and says why.
+//! Faults that must never happen, provoked: the node recovers and reports the cause.
 
 use crate::chip_faults::{peek, poke};
 use crate::support::{Master, SECOND, comes_back, read, run, running};
 use canbus::Time;
 
-/// The first word of RAM, below which the stack must not grow, and a place that no image uses.
+/// The first word of RAM, below which the stack must not grow, and an address that no image uses.
 const RAM: u32 = 0x2000_0000;
 const UNUSED: u32 = RAM + 0x1_0000;
-/// The start of what the bootloader looks at: the application's vector table (memory.x).
+/// The start of the area that the bootloader checks: the application's vector table (memory.x).
 const APPLICATION: u32 = 0x0802_0200;
 const VECTORS: usize = 512;
 /// Control register 1 of the timer that starts the conversions.
 const TIM3_CR1: u32 = 0x4000_0400;
-/// Clock enables of APB1 with the bit of the timer that starts the conversions: without a clock it takes no writes (RM0390, 6.3.13).
+/// Clock enables of APB1 with the bit of the timer that starts the conversions: without a clock the timer ignores
+/// writes (RM0390, 6.3.13).
 const RCC_APB1ENR: u32 = 0x4002_3840;
 const TIM3EN: u32 = 1 << 1;
-/// An interrupt that the node has no use for, its bit in word 1 of the NVIC, and that word of the registers that enable an
-/// interrupt and that set it pending (RM0390, table 38; PM0214, 4.3).
+/// An interrupt that the node does not use, its bit in word 1 of the NVIC, and that word of the set-enable and
+/// set-pending registers (RM0390, table 38; PM0214, 4.3).
 const CAN2_TX: u32 = 63;
 const CAN2_TX_BIT: u32 = 1 << (CAN2_TX - 32);
 const NVIC_ISER1: u32 = 0xE000_E104;
 const NVIC_ISPR1: u32 = 0xE000_E204;
-/// EMCY code for a reset that nobody asked for (object 3000h:3, bit 6).
+/// EMCY code for an unexpected reset (object 3000h:3, bit 6).
 const UNEXPECTED_RESET: u16 = 0x6101;
 /// Stack pointer and program counter.
 const SP: u8 = 13;
@@ -45,7 +46,7 @@ fn a_wild_jump_ends_in_a_recorded_reset_with_its_address() {
     assert!(log.contains("fault at 0x30000000"), "{log}");
 }
 
-/// The program enables an interrupt for which it has no handler, and the interrupt comes.
+/// The program enables an interrupt without a handler, and the interrupt comes.
 #[test]
 fn an_interrupt_that_nobody_serves_ends_in_a_recorded_reset() {
     /// STR r2, \[r0\]; STR r2, \[r1\]; B to itself.
@@ -74,12 +75,12 @@ fn a_crash_is_told_once() {
     assert!(log.contains("reset by power on"), "{log}");
 }
 
-/// The timer stands still and takes no more orders.
+/// The timer stops and can no longer be written.
 #[test]
 fn the_watchdog_restarts_a_node_that_no_longer_samples() {
     let mut world = running();
     let clocks = peek(&mut world, RCC_APB1ENR);
-    // The firmware meets a timer without its clock.
+    // The firmware accesses the timer without its clock, which breaks a rule.
     world.enforce_rules(false);
     poke(&mut world, TIM3_CR1, 0);
     poke(&mut world, RCC_APB1ENR, clocks & !TIM3EN);
@@ -88,7 +89,7 @@ fn the_watchdog_restarts_a_node_that_no_longer_samples() {
     assert_eq!(world.traffic().node(1).last_emcy, Some(UNEXPECTED_RESET), "{log}");
 }
 
-/// Every frame is destroyed for a while: the node goes bus-off, comes back without a reset and reports it.
+/// Every frame is destroyed for a while: the node becomes bus-off, recovers without a reset and reports the bus-off.
 #[test]
 fn a_node_recovers_from_bus_off() {
     let mut world = running();
@@ -104,7 +105,7 @@ fn a_node_recovers_from_bus_off() {
     assert!(node.incidents.is_empty(), "{after}");
 }
 
-/// A line that destroys every frame sees less and less of the node: it waits twice as long each time, up to 3.2 s.
+/// On a line that destroys every frame, the node tries less and less often: each wait is twice as long, up to 3.2 s.
 #[test]
 fn a_node_on_a_broken_line_tries_less_and_less_often() {
     let mut world = running();
@@ -113,14 +114,14 @@ fn a_node_on_a_broken_line_tries_less_and_less_often() {
     let before = run(&mut world, SECOND * 19).bus.errors;
     let last = run(&mut world, SECOND * 10).bus.errors - before;
     println!("{first} error frames in the first second, {last} in ten seconds later on");
-    // Each try ends after 32 errors of the transmitter.
+    // Each try ends with bus-off, after 32 transmit errors.
     assert!(first > 64 && last <= 4 * 33, "{first}, {last}");
     world.bus().faults.quiet();
     let after = run(&mut world, SECOND * 6);
     assert_eq!(after.nodes[0].heard.last_emcy, Some(0), "it is back and well: {after}");
 }
 
-/// Without an application the bootloader stays where it is instead of jumping into erased flash.
+/// Without an application the bootloader keeps running instead of jumping into erased flash.
 #[test]
 fn the_bootloader_does_not_start_an_erased_application() {
     let mut world = running();
@@ -132,7 +133,7 @@ fn the_bootloader_does_not_start_an_erased_application() {
     let after = run(&mut world, SECOND);
     assert_eq!(after.nodes[0].heard.boot_ups, boot_ups + 1);
     assert!(after.nodes[0].incidents.is_empty(), "{after}");
-    // What has booted at the node-ID of the board is the bootloader.
+    // The bootloader, not the application, has booted with the node-ID of the board.
     let master = Master::join(&mut world);
     assert_eq!(read(&mut world, &master, (0x1000, 0)), u32::from_be_bytes(*b"BOOT"));
 }

@@ -1,4 +1,4 @@
-//! What `cargo xtask flash` writes into a board on a bench, beside the flash of the emulated board.
+//! The image that `cargo xtask flash` writes into a board on a bench, compared with the flash of the emulated board.
 
 use std::ops::Range;
 

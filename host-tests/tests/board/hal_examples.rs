@@ -1,5 +1,5 @@
-//! Examples of the stm32f4xx-hal package, from its published source, do on the emulated board what their comments promise.
-//! Nobody has written them for it, nor it for them.
+//! Examples of the stm32f4xx-hal package, built from its published source, behave on the emulated board as their
+//! comments promise. Neither the examples nor the board were written for each other.
 
 use canbus::Time;
 use chip::{Board, Stm32f4, Variant};
@@ -7,15 +7,15 @@ use emulator::{Machine, Model};
 
 use crate::support::images;
 
-/// How finely outputs are looked at.
+/// Period at which outputs are sampled.
 const STEP: Time = Time::from_millis(1);
 
-/// A chip that runs an example, on a board with a crystal of so many hertz.
+/// A chip that runs an example, on a board with a crystal of `hse` hertz.
 fn start(example: &str, hse: Option<u64>) -> Machine<Stm32f4> {
     start_program(&format!("hal-{example}"), hse)
 }
 
-/// A chip that runs a program alone.
+/// A chip that runs a program without the bootloader.
 pub(crate) fn start_program(name: &str, hse: Option<u64>) -> Machine<Stm32f4> {
     let elf = std::fs::read(images().join(name)).unwrap();
     let chip = Stm32f4::new(Variant::F446, Board { hse, ..Board::default() });
@@ -25,7 +25,7 @@ pub(crate) fn start_program(name: &str, hse: Option<u64>) -> Machine<Stm32f4> {
     machine
 }
 
-/// Runs until `end` and looks at the chip after each step.
+/// Runs until `end` and calls `look` after each step.
 pub(crate) fn run(machine: &mut Machine<Stm32f4>, end: Time, mut look: impl FnMut(&mut Machine<Stm32f4>)) {
     while machine.now() < end {
         let until = machine.now() + STEP;
@@ -39,7 +39,7 @@ fn now(machine: &Machine<Stm32f4>) -> u64 {
     machine.now().as_micros() / 1000
 }
 
-/// When an output has changed, in milliseconds, and to what, until `end`.
+/// The edges of an output until `end`: the time in milliseconds and the new level.
 fn edges(machine: &mut Machine<Stm32f4>, (port, pin): (char, u32), end: Time) -> Vec<(u64, bool)> {
     let mut edges = Vec::new();
     let mut level = None;
@@ -53,13 +53,13 @@ fn edges(machine: &mut Machine<Stm32f4>, (port, pin): (char, u32), end: Time) ->
     edges
 }
 
-/// The times between edges from the first one on that switches the output on.
+/// The times between edges, from the first rising edge on.
 fn spans_from_on(edges: &[(u64, bool)]) -> Vec<(bool, u64)> {
     let on = edges.iter().position(|(_, level)| *level).unwrap_or(edges.len());
     spans(&edges[on..])
 }
 
-/// The times between edges, in milliseconds, with the level that each edge brings.
+/// The times between edges in milliseconds, each with the level in that time.
 fn spans(edges: &[(u64, bool)]) -> Vec<(bool, u64)> {
     edges.windows(2).map(|pair| (pair[0].1, pair[1].0 - pair[0].0)).collect()
 }

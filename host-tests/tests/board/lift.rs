@@ -1,4 +1,5 @@
-//! A lift node on the emulated board: as delivered; from the button's contact to a frame, and from a frame to the lamp's pin.
+//! A lift node on the emulated board: as delivered, from the button's contact to a frame, and from a frame to the
+//! lamp's pin.
 
 use std::ops::Range;
 
@@ -17,7 +18,7 @@ const OUTPUT: u16 = 0x400;
 /// Pins of the lamps at port C.
 const LAMPS: [u32; 2] = [0, 1];
 
-/// A word that ends in this byte.
+/// A word with this last byte.
 fn word(last: u8) -> [u8; 6] {
     [last, 0, 0, 0, 0, 1]
 }
@@ -27,7 +28,7 @@ fn choose(world: &mut World, master: &Master, node: u8, devices: u8) {
     assert_eq!(master.ask(world, node, &[0x2F, 0x05, 0x23, 0, devices, 0, 0, 0])[0], 0x60);
 }
 
-/// Writes a word, which needs a segmented transfer.
+/// Writes a word by segmented transfer.
 fn write(world: &mut World, master: &Master, index: u16, sub: u8, last: u8) {
     let [low, high] = index.to_le_bytes();
     assert_eq!(master.ask(world, 1, &[0x21, low, high, sub, 6, 0, 0, 0])[0], 0x60);
@@ -39,7 +40,7 @@ fn lamps(world: &mut World) -> [bool; 2] {
     LAMPS.map(|pin| world.machine(0).peripherals().output('C', pin) == Some(true))
 }
 
-/// What is sent of the buttons when one of them moves, and when: milliseconds after the push.
+/// Pushes or releases a button; returns the frames that follow, each with its time in milliseconds after the push.
 fn push(world: &mut World, master: &Master, spec: &str) -> Vec<(u64, Vec<u8>)> {
     world.take_frames();
     let pushed = world.now();
@@ -53,7 +54,7 @@ fn push(world: &mut World, master: &Master, spec: &str) -> Vec<(u64, Vec<u8>)> {
 
 #[test]
 fn buttons_are_virtual_inputs_and_lamps_follow_virtual_outputs() {
-    // Held from power-on.
+    // The button is held from power-on.
     let mut world = world("--bitrate 1000 --node 1:lift --button 2:down");
     let master = Master::join(&mut world);
     world.run_until(SECOND);
@@ -71,7 +72,7 @@ fn buttons_are_virtual_inputs_and_lamps_follow_virtual_outputs() {
 
     for (spec, last) in [("1:down", 0x12), ("1:up", 0x11), ("2:up", 0x13), ("2:down", 0x14)] {
         let sent = push(&mut world, &master, spec);
-        // The contact bounces for 3 ms and is believed after 10 ms without.
+        // The contact bounces for 3 ms; the node accepts the state after 10 ms without a change.
         let [(at, bytes)] = &sent[..] else { panic!("{spec}: {sent:?}") };
         assert_eq!(*bytes, word(last), "{spec}");
         assert!((10..=15).contains(at), "{spec}: {at} ms");
@@ -91,7 +92,7 @@ fn buttons_are_virtual_inputs_and_lamps_follow_virtual_outputs() {
     }
 }
 
-/// Of a node that has no RPDO of its own here: its frames pass the filters of the controller.
+/// Also from a producer without an RPDO in this node: the acceptance filters must pass its frames.
 #[test]
 fn multiplexed_pdos_of_any_node_light_a_lamp() {
     let mut world = world("--bitrate 1000 --node 1:lift");
@@ -108,7 +109,7 @@ fn multiplexed_pdos_of_any_node_light_a_lamp() {
     }
 }
 
-/// The frames with these CAN-IDs, which have one producer in a lift.
+/// The numbers of frames with these CAN-IDs, which only one node in a lift may produce.
 fn fixed(world: &mut World, ids: [u16; 2]) -> [usize; 2] {
     let frames = world.take_frames();
     ids.map(|id| {
@@ -117,7 +118,7 @@ fn fixed(world: &mut World, ids: [u16; 2]) -> [usize; 2] {
     })
 }
 
-/// Two nodes out of the box, which measure different things, started together: neither knows what the other one is.
+/// Two nodes as delivered, with different measured values, start together without knowledge of each other.
 #[test]
 fn two_boards_as_delivered_do_not_disturb_each_other() {
     let mut world = world(
@@ -141,7 +142,7 @@ fn two_boards_as_delivered_do_not_disturb_each_other() {
     assert_eq!(world.summary(1.0, 0).bus.errors, 0);
 }
 
-/// An input panel unit with two buttons whose words have the public structure, and these times of its TPDO.
+/// An input panel unit with two buttons with words in the public structure, and these times of its TPDO.
 fn panel(world: &mut World, master: &Master, node: u8, inhibit: u16, event_timer: u16) {
     choose(world, master, node, 0x04);
     for button in 1..=2 {
@@ -157,7 +158,7 @@ fn panel(world: &mut World, master: &Master, node: u8, inhibit: u16, event_timer
     assert_eq!(master.ask(world, node, &[0x23, 0x81, 0x18, 1, input, 4, 0, 0x40])[0], 0x60);
 }
 
-/// What a panel says of its buttons in what the bus has carried.
+/// The button transitions that a panel has reported in these frames.
 fn told(frames: &[canbus::Stamped], node: u8) -> Vec<Transition> {
     let id = StandardId::new(0x480 + u16::from(node)).unwrap().into();
     let words = frames.iter().filter(|stamped| stamped.frame.id() == id);
@@ -170,12 +171,13 @@ fn told(frames: &[canbus::Stamped], node: u8) -> Vec<Transition> {
     words.map(word).collect()
 }
 
-/// Button 1 for true, 2 for false; and whether it is pressed.
+/// The number of each button, 1 or 2, and whether it is pressed.
 fn texts(told: &[Transition]) -> Vec<(usize, bool)> {
     told.iter().map(|word| (word.button + 1, word.is_pressed)).collect()
 }
 
-/// The sequences in which calls were lost: changes within the inhibit time, a press between two events of the timer.
+/// The sequences in which calls were lost in the past: changes within the inhibit time, and a press between two events
+/// of the timer.
 #[test]
 fn every_call_reaches_the_bus_whatever_the_times_of_the_pdo() {
     let mut world = world("--bitrate 250 --node 1:lift");
@@ -193,10 +195,10 @@ fn every_call_reaches_the_bus_whatever_the_times_of_the_pdo() {
         }
         world.run_until(begun + Time::from_millis(990));
         let mut told = texts(&told(&world.take_frames(), 1));
-        // The timer may have repeated the word of before.
+        // The event timer may have repeated the previous word.
         told.drain(..told.iter().take_while(|word| **word == (2, false)).count());
         let expected = [(1, true), (2, true), (1, false), (2, false)];
-        // With a timer the last word is repeated.
+        // With an event timer the last word is repeated.
         assert_eq!(told[..4], expected, "{inhibit}, {event_timer}: {told:?}");
         assert!(told[4..].iter().all(|word| *word == expected[3]), "{told:?}");
         master.send(&mut world, 0, &[0x80, 0]);
@@ -204,8 +206,9 @@ fn every_call_reaches_the_bus_whatever_the_times_of_the_pdo() {
     }
 }
 
-/// Without what the bus repeats: a transmitter that reads the last bit of its frame wrongly sends the frame again, although others have
-/// received it (ISO 11898-1). That takes noise, and two buttons never make the same word twice in a row.
+/// Removes the frames that the bus has repeated: a transmitter that reads the last bit of its frame wrongly sends the
+/// frame again, although other nodes have received it (ISO 11898-1). This happens only in noise. Without a repetition,
+/// two equal words never follow each other.
 fn once(words: Vec<Transition>, noise: &[Range<u64>]) -> Vec<Transition> {
     let mut last: Option<Transition> = None;
     let is_new = |word: &Transition| {
@@ -218,8 +221,8 @@ fn once(words: Vec<Transition>, noise: &[Range<u64>]) -> Vec<Transition> {
     words.into_iter().filter(is_new).collect()
 }
 
-/// Two panels, four buttons, a bus that is never idle, an inhibit time of 200 ms, and noise that takes both off the bus now and
-/// then: every transition arrives once and in its order, or is covered by a full state after it.
+/// Two panels, four buttons, a bus that is never idle, an inhibit time of 200 ms, and noise that sometimes makes both
+/// nodes bus-off: every transition arrives once and in order, or is covered by a later full state.
 #[test]
 fn random_presses_on_a_full_bus_with_bus_off_in_between() {
     const NODES: [u8; 2] = [1, 2];
@@ -236,7 +239,7 @@ fn random_presses_on_a_full_bus_with_bus_off_in_between() {
     let mut pressed = [[false; 2]; 2];
     let mut noise = vec![];
     while happened.iter().map(Vec::len).sum::<usize>() < 8 * presses {
-        // Each button moves at most every 30 ms, so that its contact is believed in between.
+        // Each button moves at most every 30 ms, so that the node accepts each state.
         for _ in 0..rng.u32(1..40) {
             let pause = if rng.bool() { 30..60 } else { 100..800 };
             for (place, node) in NODES.iter().enumerate() {
@@ -251,12 +254,13 @@ fn random_presses_on_a_full_bus_with_bus_off_in_between() {
             world.run_until(world.now() + Time::from_millis(rng.u64(pause)));
             frames.extend(world.take_frames());
         }
-        // Off the bus, and started again when both are back, at most 3.2 s later: an error had led them to Pre-operational.
+        // Both nodes are bus-off and recover at most 3.2 s later. They are then started again, because the error had
+        // led them to Pre-operational.
         let from = world.now();
         world.bus().faults.noise(rng.u64(..), 1.0);
         world.run_until(from + Time::from_millis(300));
         world.bus().faults.quiet();
-        // A frame that has begun in the noise ends at most 2 ms after it.
+        // A frame that has begun in the noise ends at most 2 ms later.
         noise.push(from.as_micros()..world.now().as_micros() + 2000);
         world.run_until(world.now() + SECOND * 4);
         master.send(&mut world, START_ALL.0, &START_ALL.1);

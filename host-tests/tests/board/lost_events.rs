@@ -1,5 +1,5 @@
-//! One lost event is never for ever: the chip loses what the program waits for, and the node heals by itself, without a reset,
-//! and counts it (2001h).
+//! One lost event has no lasting effect: the chip loses an event that the program waits for, and the node recovers
+//! without a reset and counts the loss (2001h).
 
 use canbus::Time;
 use chip::Loss;
@@ -24,8 +24,8 @@ const ALARMS: u8 = 6;
 const BACKUP_WRITES: u8 = 7;
 const FLASH: u8 = 8;
 
-/// Data register of SPI2; control registers of the streams of the count, the absolute encoder, the index and the ADC (RM0390, 26.7.4 and
-/// 9.5.5), of the converter and of the timer that starts it.
+/// Data register of SPI2; control registers of the DMA streams of the count, the absolute encoder, the index and the
+/// ADC (RM0390, 26.7.4 and 9.5.5), of the converter, and of the timer that starts the conversions.
 const SPI2_DR: u32 = 0x4000_380C;
 const DMA1_S5CR: u32 = 0x4002_6088;
 const DMA1_S2CR: u32 = 0x4002_6040;
@@ -40,7 +40,7 @@ const ENABLED: u32 = 1;
 const SAMPLING_TASK: Exception = Exception::irq(56);
 
 const RPM: u32 = 6000;
-/// TPDO 2 of the encoder comes with every SYNC.
+/// TPDO 2 of the encoder, sent with every SYNC.
 const TPDO2: u16 = 0x281;
 /// EMCY of a sensor that does not answer.
 const SENSOR_BREAK: u16 = 0x5006;
@@ -49,13 +49,13 @@ fn lose(world: &mut World, loss: Loss, times: usize) {
     world.machine(0).peripherals_mut().lose(loss, times);
 }
 
-/// How many events of a kind the node has counted; it shows them every 20 ms.
+/// The node's count of events of this kind; the node updates the object every 20 ms.
 fn counted(world: &mut World, master: &Master, kind: u8) -> u32 {
     wait(world, 25);
     read(world, master, (0x2001, kind))
 }
 
-/// Nothing was reset, and nothing was told.
+/// Checks that the node has neither reset nor sent an EMCY.
 fn assert_silent(world: &mut World) {
     let summary = run(world, Time::ZERO);
     let node = &summary.nodes[0];
@@ -73,7 +73,7 @@ fn turning(absolute: bool) -> (World, Master) {
     (world, master)
 }
 
-/// How old the positions of the next second are at most, in microseconds.
+/// The greatest age of the positions in the next second, in microseconds.
 fn oldest(world: &mut World, master: &Master, absolute: bool) -> f64 {
     let (steps, range) = if absolute { (STEPS, 1 << 25) } else { (COUNTS, 1 << 24) };
     master.heard(world, TPDO2);
@@ -82,12 +82,12 @@ fn oldest(world: &mut World, master: &Master, absolute: bool) -> f64 {
     most
 }
 
-/// A word of which a byte is missing is one reading less: the position is a millisecond older, once.
+/// A word without one of its bytes is a missing reading: the position is a millisecond older, once.
 #[test]
 fn a_lost_byte_of_the_absolute_encoder_costs_one_reading() {
     let (mut world, master) = turning(true);
     for number in 1..=20 {
-        // At each place of the word, at each phase of the millisecond.
+        // At each byte of the word, at each phase of the millisecond.
         world.run_until(world.now() + Time::from_micros(10_137));
         lose(&mut world, Loss::SpiByte, 1);
         assert_eq!(counted(&mut world, &master, SSI_WORDS), number);
@@ -100,7 +100,7 @@ fn a_lost_byte_of_the_absolute_encoder_costs_one_reading() {
     assert_silent(&mut world);
 }
 
-/// A byte too many: it would be taken for the first one of the next word.
+/// A surplus byte, which could be taken for the first byte of the next word.
 #[test]
 fn a_byte_that_is_left_over_is_not_taken_for_the_next_word() {
     let (mut world, master) = turning(true);
@@ -111,7 +111,8 @@ fn a_byte_that_is_left_over_is_not_taken_for_the_next_word() {
     assert_silent(&mut world);
 }
 
-/// When bytes are lost again and again it is told, as a line that is open is; and it is over when it is over.
+/// If bytes are lost again and again, the node reports a missing signal, as for an open line; the report ends with the
+/// loss.
 #[test]
 fn bytes_that_are_lost_for_long_are_told() {
     let (mut world, master) = start_absolute("--shaft const:2.25");
@@ -126,7 +127,8 @@ fn bytes_that_are_lost_for_long_are_told() {
     assert_eq!(world.traffic().node(1).last_emcy, Some(0));
 }
 
-/// The copies of the count are a scan behind the conversions: each position would be that of two milliseconds before.
+/// After a lost copy, the copies of the count lag one scan behind the conversions: each position would be two
+/// milliseconds old.
 #[test]
 fn a_lost_copy_of_the_count_is_noticed() {
     let (mut world, master) = turning(false);
@@ -140,12 +142,12 @@ fn a_lost_copy_of_the_count_is_noticed() {
     assert_silent(&mut world);
 }
 
-/// What stands still is started again within milliseconds; the counter of the encoder counts on.
+/// A stopped sampling is restarted within milliseconds; the counter of the encoder goes on.
 #[test]
 fn a_sampling_that_stands_still_is_started_again() {
     let (mut world, master) = turning(false);
     let breaks: [fn(&mut World); 5] = [
-        // The ADC has an overrun, and asks for nothing more.
+        // The ADC has an overrun, and makes no more DMA requests.
         |world| lose(world, Loss::DmaRequest { controller: 2, stream: 0 }, 1),
         |world| poke(world, DMA2_S0CR, 0),
         |world| poke(world, DMA1_S2CR, 0),
@@ -173,8 +175,8 @@ fn an_index_capture_that_is_switched_off_is_switched_on_again() {
     assert_silent(&mut world);
 }
 
-/// The compare match of the services is lost: without it they would sleep for 71 minutes. A match
-/// that is lost just before the look of a millisecond is not counted, because that look is in time: one of these ten may be such a one.
+/// The compare match of the services is lost: without a remedy they would sleep for 71 minutes. A match that is lost
+/// just before the check of a millisecond is not counted, because the check is in time: this may happen once in ten.
 #[test]
 fn a_lost_alarm_is_noticed_by_the_time() {
     let mut world = running();
@@ -191,7 +193,7 @@ fn a_lost_alarm_is_noticed_by_the_time() {
     assert_silent(&mut world);
 }
 
-/// The time base goes through its half and its end without the interrupts that tell it.
+/// The time base passes its half and its end without the interrupts for them.
 #[test]
 fn the_time_goes_on_without_the_interrupt_of_its_wrap() {
     let mut world = running();
@@ -206,7 +208,7 @@ fn the_time_goes_on_without_the_interrupt_of_its_wrap() {
     }
 }
 
-/// The interrupt at the end of a transmission is lost, each time: what waits is sent all the same, a millisecond later.
+/// Every interrupt at the end of a transmission is lost: the waiting frames are sent a millisecond later.
 #[test]
 fn a_lost_end_of_a_transmission_holds_nothing_up() {
     const REQUESTS: usize = 100;
@@ -231,8 +233,8 @@ fn a_lost_end_of_a_transmission_holds_nothing_up() {
     assert_silent(&mut world);
 }
 
-/// A frame is to make way for more urgent ones, and its transmission begins at that very moment. The frame is sent once, whether
-/// this transmission was good or not.
+/// A frame is to be replaced by more urgent ones, but its transmission begins at that very moment. The frame is sent
+/// once, whether or not this transmission succeeds.
 #[test]
 fn a_frame_that_makes_way_too_late_is_sent_once() {
     const MORE_URGENT: u16 = 0x001;
@@ -242,13 +244,15 @@ fn a_frame_that_makes_way_too_late_is_sent_once() {
     for (seed, noise) in [(1, 0.0), (1, 0.4), (2, 0.4), (3, 0.4), (4, 0.4)] {
         let (mut world, master) = start("");
         write(&mut world, &master, EVENT_TIMER, 2, 1700);
-        // The period begins with the write: two heartbeats become due on the full bus, and none in the half second after it.
+        // The heartbeat period begins with the write: two heartbeats become due on the full bus, and none in the half
+        // second after it.
         write(&mut world, &master, HEARTBEAT_TIME, 2, 1000);
         master.send(&mut world, START_ALL.0, &START_ALL.1);
         wait(&mut world, 50);
         lose(&mut world, Loss::Abort, 1);
         world.take_frames();
-        // No gap for two seconds, in which heartbeat, SDO response, TPDO 2 and TPDO 1 come to wait, each more urgent than those before.
+        // No gap for two seconds. Meanwhile heartbeat, SDO response, TPDO 2 and TPDO 1 are queued, each more urgent
+        // than the ones before.
         for step in 0..20 {
             (0..if step == 0 { 1000 } else { 900 })
                 .for_each(|_| master.send(&mut world, MORE_URGENT, &[0x55; 8]));
@@ -272,14 +276,14 @@ fn a_frame_that_makes_way_too_late_is_sent_once() {
         wait(&mut world, 20);
         let told = world.take_frames();
         assert_eq!((of(&told, SDO_RESPONSE), of(&told, TPDO2)), (1, 1));
-        // The one in the mailbox and the newest.
+        // The heartbeat in the mailbox and the newest one.
         assert_eq!(of(&told, HEARTBEAT), 2, "noise {seed} {noise}");
         let summary = run(&mut world, Time::ZERO);
         assert!(summary.nodes[0].incidents.is_empty(), "{summary}");
     }
 }
 
-/// Stores into the memory behind the battery do not arrive: the next millisecond makes up for it.
+/// Stores into the backup memory are lost: the next millisecond repeats them.
 #[test]
 fn a_lost_write_to_the_backup_memory_is_made_good() {
     let (mut world, master) = start("--shaft rpm:600");
@@ -295,7 +299,7 @@ fn a_lost_write_to_the_backup_memory_is_made_good() {
     assert_eq!(read(&mut world, &master, POSITION), expected);
 }
 
-/// The controller of the flash says for a second that it is busy: a save in that time is refused, and the next one is done.
+/// The flash controller is busy for a second: a save in that time is refused, and the next save succeeds.
 #[test]
 fn a_flash_that_hangs_refuses_a_save_and_takes_the_next() {
     const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
@@ -314,7 +318,7 @@ fn a_flash_that_hangs_refuses_a_save_and_takes_the_next() {
     assert_silent(&mut world);
 }
 
-/// Lets the sampling task begin once more.
+/// Runs until the sampling task starts again.
 fn to_the_next_sample(world: &mut World) {
     let before = world.machine(0).stats().of(SAMPLING_TASK).entries;
     while world.machine(0).stats().of(SAMPLING_TASK).entries == before {
@@ -322,13 +326,13 @@ fn to_the_next_sample(world: &mut World) {
     }
 }
 
-/// One of the two streams of the absolute encoder stops in the middle of a word; without the one that receives, the SPI has an
-/// overrun.
+/// One of the two DMA streams of the absolute encoder stops in the middle of a word; without the receiving stream, the
+/// SPI has an overrun.
 #[test]
 fn a_stream_of_the_absolute_encoder_that_stops_is_started_again() {
     let (mut world, master) = turning(true);
     for (number, stream) in (1..).zip([DMA1_S3CR, DMA1_S4CR, DMA1_S3CR, DMA1_S4CR]) {
-        // Some way into a word, which lasts 57 us.
+        // In the middle of a word, which lasts 57 us.
         to_the_next_sample(&mut world);
         world.run_until(world.now() + Time::from_micros(20));
         poke(&mut world, stream, 0);
@@ -339,7 +343,7 @@ fn a_stream_of_the_absolute_encoder_that_stops_is_started_again() {
     assert_silent(&mut world);
 }
 
-/// The interrupts of the sampling do not come for two milliseconds: the newer of the two that are there counts.
+/// The sampling interrupts are blocked for two milliseconds: of the two waiting samples, the newer one counts.
 #[test]
 fn milliseconds_that_nobody_collects_are_counted() {
     const INTERRUPTS: u32 = 0x18;
@@ -356,7 +360,7 @@ fn milliseconds_that_nobody_collects_are_counted() {
     assert_silent(&mut world);
 }
 
-/// Nobody tells of the bus-off: the state is looked at every 20 ms as well.
+/// The interrupt for bus-off is lost: the node also polls the state every 20 ms.
 #[test]
 fn a_bus_off_without_its_interrupt_is_noticed() {
     const CAN1_IER: u32 = 0x4000_6414;

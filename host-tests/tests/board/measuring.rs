@@ -1,4 +1,4 @@
-//! What the sensors see arrives on the bus, and how old it is then.
+//! Measured values on the bus: their accuracy and their age.
 
 use canbus::Time;
 use sim::stimuli::Stimulus;
@@ -6,11 +6,12 @@ use sim::world::World;
 
 use crate::support::{Master, SECOND, START_ALL, SYNC, TPDO1, read, world, write};
 
-/// A value is the mean of one millisecond, published at its end, and the next SYNC comes within another: so the pressure
-/// that it tells was there at some moment of the two milliseconds before the SYNC.
+/// A value is the mean of one millisecond, published at the end of that millisecond, and the next SYNC comes within
+/// another one. So the reported pressure occurred at some instant of the two milliseconds before the SYNC.
 const WINDOW: Time = Time::from_micros(2_050);
-/// A signal that stands still gives 16 equal conversions, so a sum is no finer than one of them: one step of 12 bits for the
-/// output of the transducer, which gives 80 % of its supply over 1 MPa, and a fifth more for that of the supply.
+/// A constant signal gives 16 equal conversions, so the sum has the resolution of one conversion: one step of 12 bits
+/// for the output of the transducer, which gives 80 % of its supply over 1 MPa. The measurement of the supply adds a
+/// fifth.
 const RESOLUTION: f64 = 1.2 * 1_000_000.0 / 0.8 / 4096.0;
 
 /// A node whose TPDO 1 answers every SYNC.
@@ -24,7 +25,8 @@ fn synchronous(flags: &str) -> (World, Master) {
     (world, master)
 }
 
-/// One SYNC; the pressure in Pa that answers it, and what the sensor saw at that time: least and most.
+/// Sends one SYNC; returns the pressure in the answer in Pa, and the least and the greatest true pressure in the
+/// window.
 fn ask(world: &mut World, master: &Master) -> (f64, f64, f64) {
     master.heard(world, TPDO1);
     let sync = world.now();
@@ -38,7 +40,7 @@ fn ask(world: &mut World, master: &Master) -> (f64, f64, f64) {
     (f64::from(bar) * 100_000.0, least, most)
 }
 
-/// The widest miss of what was seen, over so many SYNCs, in Pa; and how far the signal moved within one window at most.
+/// The greatest error over `syncs` SYNCs in Pa, and the greatest change of the signal within one window.
 fn worst(flags: &str, syncs: usize) -> (f64, f64) {
     let (mut world, master) = synchronous(flags);
     (0..syncs).map(|_| ask(&mut world, &master)).fold((0.0, 0.0), |(miss, moved), (told, least, most)| {
@@ -66,7 +68,7 @@ const FLAGS: (u16, u8) = (0x3000, 1);
 const THERMOMETER: (u16, u8) = (0x2201, 1);
 const LOCK: (u16, u8) = (0x2203, 0);
 
-/// The chip is at 300 K, the thermistor somewhere else: what is measured is that which the parameter selects.
+/// The chip is at 300 K, the thermistor has another temperature: the node measures the one that the parameter selects.
 #[test]
 fn a_parameter_selects_the_sensor_of_the_chip_or_the_thermistor() {
     let mut world = world("--bitrate 1000 --temperature const:300 --thermistor const:350");
@@ -104,7 +106,7 @@ fn a_broken_thermistor_is_told() {
             master.heard(&mut world, EMCY).iter().map(|frame| frame.bytes()[..2].to_vec()).collect();
         let expected: &[[u8; 2]] = match (millis, is_broken) {
             (1500, _) => &[],
-            // 8001h, and 0000h for a fault that has gone.
+            // EMCY code 8001h, or 0000h after the end of the fault.
             (_, true) => &[[0x01, 0x80]],
             (_, false) => &[[0, 0]],
         };

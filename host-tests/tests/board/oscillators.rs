@@ -1,9 +1,9 @@
-//! Boards whose oscillators are off: within what docs/board.md promises they understand each other.
+//! Boards with wrong oscillators: within the limits of docs/board.md the boards understand each other.
 
 use crate::support::{SECOND, run, world};
 
-/// Errors on the bus and boot-up messages: two boards at a bit rate, their oscillators so many ppm off in opposite directions, on a bus
-/// that is half full.
+/// Numbers of errors on the bus and of boot-up messages for two boards at a bit rate, with their oscillators `ppm` off
+/// in opposite directions, on a bus with 50 % load.
 fn heard(bit_rate: u16, ppm: i32) -> (u64, u64) {
     let flags = format!(
         "--bitrate {bit_rate} --load 50 --node 1:pressure --node 2:encoder --oscillator 1={ppm} --oscillator 2=-{ppm}"

@@ -1,4 +1,4 @@
-//! The images for the other chips, each on a board of that chip: its clocks, its sectors, what it does not have.
+//! The images for the other chips, each on a board with that chip: clocks, sectors, missing peripherals.
 
 use sign::product;
 use sim::world::World;
@@ -34,7 +34,7 @@ fn a_node_is_updated_on_another_chip() {
     }
 }
 
-/// DCKCFGR, with which the image halves the clock of the timers, is not in the other chip.
+/// The image halves the clock of the timers with DCKCFGR, which the other chip lacks.
 #[test]
 #[ignore = "the images come with `cargo xtask test --thorough`"]
 fn an_image_for_one_chip_is_seen_on_another() {

@@ -1,4 +1,4 @@
-//! A position that is not right says so: as an alarm, as an EMCY, and with the NMT state that 1029h:2 asks for.
+//! A wrong position is reported: as an alarm, as an EMCY, and by the NMT state that 1029h:2 selects.
 
 use sim::world::World;
 
@@ -14,20 +14,20 @@ const ON_DEVICE_ERROR: (u16, u8) = (0x1029, 2);
 const RESOLUTION: (u16, u8) = (0x2101, 1);
 const OFFSET: (u16, u8) = (0x6509, 0);
 const DIAGNOSTIC: (u16, u8) = (0x210C, 1);
-/// The car position unit is chosen.
+/// The choice of virtual devices: the car position unit.
 const DEVICES: (u16, u8) = (0x2305, 0);
 const EMCY: u16 = 0x081;
-/// EMCY of a position that is not right: that of a broken sensor, the generic bit of the error register, and 2 in the detail.
+/// EMCY of a wrong position: the code of a broken sensor, the generic bit of the error register, and 2 in the detail.
 const WRONG: [u8; 8] = [0x06, 0x50, 1, 2, 0, 0, 0, 0];
 
 const INDEX: u32 = 1 << 4;
 
-/// What the EMCYs since the last call said.
+/// The EMCY messages since the last call.
 fn emcys(world: &mut World, master: &Master) -> Vec<Vec<u8>> {
     master.heard(world, EMCY).iter().map(|frame| frame.bytes().to_vec()).collect()
 }
 
-/// Whether the node is operational: only then does a SYNC sample a TPDO.
+/// Whether the node is Operational: only then does a SYNC sample a TPDO.
 fn is_operational(world: &mut World, master: &Master) -> bool {
     master.heard(world, TPDO2);
     master.send(world, SYNC, &[]);
@@ -41,7 +41,7 @@ fn go_operational(world: &mut World, master: &Master) {
     assert!(is_operational(world, master));
 }
 
-/// The position is wrong from now on: it is told in every way there is.
+/// Checks that a wrong position is reported in every way.
 fn assert_told(world: &mut World, master: &Master, state: u32, stays_operational: bool) {
     assert_eq!(emcys(world, master), [WRONG]);
     assert_eq!(read(world, master, SENSOR_STATE), state | POSITION_ERROR);
@@ -49,7 +49,7 @@ fn assert_told(world: &mut World, master: &Master, state: u32, stays_operational
     assert_eq!(is_operational(world, master), stays_operational, "1029h:2");
 }
 
-/// It is right again: the alarm waits for somebody who has seen it.
+/// Checks that the position is right again; the alarm stays until it is read.
 fn assert_well(world: &mut World, master: &Master) {
     let all = emcys(world, master);
     assert_eq!(all.last().map(|bytes| bytes[..3].to_vec()), Some(vec![0, 0, 0]), "{all:x?}");
@@ -69,7 +69,7 @@ fn an_index_that_is_lost_after_it_was_seen_is_told_every_time() {
             go_operational(&mut world, &master);
             assert_eq!(read(&mut world, &master, SENSOR_STATE), 0);
             emcys(&mut world, &master);
-            // A turn and a quarter takes 125 ms.
+            // The fault is detected after a turn and a quarter, which takes 125 ms.
             world.run_until(canbus::Time::from_millis(second * 1000 + 300));
             assert_told(&mut world, &master, INDEX, behaviour == 1);
             world.run_until(canbus::Time::from_millis(second * 1000 + 1500));
@@ -78,7 +78,7 @@ fn an_index_that_is_lost_after_it_was_seen_is_told_every_time() {
     }
 }
 
-/// A turn of the shaft has 4096 steps and the parameters say 4000, so that each index is 96 steps off.
+/// The shaft has 4096 steps per revolution, but the parameter says 4000, so each index is 96 steps off.
 #[test]
 fn an_index_in_the_wrong_place_is_told() {
     let (mut world, master) = start("");
@@ -92,7 +92,7 @@ fn an_index_in_the_wrong_place_is_told() {
     assert_eq!(emcys(&mut world, &master), [[0_u8; 8]; 0], "once, as long as it lasts");
 }
 
-/// With the parameters as delivered. The position is the last one that was right, for as long as the code is wrong.
+/// With the parameters as delivered. While the code is wrong, the position stays at its last right value.
 #[test]
 fn a_jump_of_an_absolute_encoder_is_told_and_not_taken_over() {
     let (mut world, master) = start("--shaft rpm:60 --fault wrong-code@3..6");
@@ -124,7 +124,7 @@ fn the_diagnostic_at_rest_sees_a_jump_with_the_parameters_as_delivered() {
     assert_eq!(read(&mut world, &master, DIAGNOSTIC), 0x81);
 }
 
-/// A preset is "calculated and stored" (CiA 406, 7.2.4): without 1010h, and without a battery.
+/// A preset is "calculated and stored" (CiA 406, 7.2.4) without a command to 1010h and without a battery.
 #[test]
 fn a_preset_is_stored_by_itself() {
     let (mut world, master) = start("--shaft const:10.5 --fault battery-empty@0");
@@ -140,7 +140,7 @@ fn a_preset_is_stored_by_itself() {
     }
 }
 
-/// What only a memory knows is lost with the memory: it is told until somebody says where the sensor is.
+/// A position that only the memory holds is lost with the memory; the node reports this until the position is preset.
 #[test]
 fn a_count_that_was_lost_with_the_memory_is_told_until_the_position_is_preset() {
     let (mut world, master) = start("--fault battery-empty@0");
@@ -152,7 +152,7 @@ fn a_count_that_was_lost_with_the_memory_is_told_until_the_position_is_preset() 
     emcys(&mut world, &master);
     cycle_power(&mut world);
     assert_told(&mut world, &master, UNREFERENCED, false);
-    // A reset of the node does not find it.
+    // A reset of the node does not restore the position.
     master.send(&mut world, 0, &[0x81, 1]);
     wait(&mut world, 1000);
     emcys(&mut world, &master);
@@ -164,7 +164,7 @@ fn a_count_that_was_lost_with_the_memory_is_told_until_the_position_is_preset() 
     assert_eq!(read(&mut world, &master, SENSOR_STATE), UNREFERENCED, "the index comes with the next turn");
 }
 
-/// The lift's position unit says the same in 2303h (bit 4), and keeps its preset without 1010h.
+/// The lift's position unit reports the same in 2303h (bit 4), and keeps its preset without a command to 1010h.
 #[test]
 fn a_position_unit_of_a_lift_keeps_its_preset_and_says_when_its_count_is_lost() {
     const STATE: (u16, u8) = (0x2303, 1);
@@ -196,7 +196,7 @@ fn a_position_unit_of_a_lift_keeps_its_preset_and_says_when_its_count_is_lost() 
     }
 }
 
-/// The code of a lift's sensor jumps: the car is where it was, and a preset at the new place is believed.
+/// The code of a lift's sensor jumps: the position stays, and a preset at the new place is accepted.
 #[test]
 fn a_jump_of_a_lift_s_sensor_is_told_and_not_taken_over() {
     const STATE: (u16, u8) = (0x2303, 1);
@@ -217,13 +217,14 @@ fn a_jump_of_a_lift_s_sensor_is_told_and_not_taken_over() {
     assert_eq!((read(&mut world, &master, (0x6383, 1)), read(&mut world, &master, STATE)), (700, 0));
 }
 
-/// 6301h and 6302h by RPDO (CiA 406, table of objects: PDO mapping optional); 6506h claims what is measured; 6507h is 100Ah.
+/// 6301h and 6302h by RPDO (CiA 406, table of objects: PDO mapping optional); 6506h states what is supported; 6507h is
+/// 100Ah.
 #[test]
 fn cams_are_switched_by_rpdo_and_objects_say_what_the_board_can_do() {
     let (mut world, master) = start("--shaft const:0.5");
     write(&mut world, &master, PRESET, 4, 2000);
     write(&mut world, &master, (0x6320, 1), 4, 3000);
-    // One that is switched on by SDO works.
+    // A cam enabled by SDO works.
     write(&mut world, &master, (0x6301, 1), 1, 1);
     wait(&mut world, 25);
     assert_eq!(read(&mut world, &master, (0x6300, 1)), 1);
@@ -240,7 +241,7 @@ fn cams_are_switched_by_rpdo_and_objects_say_what_the_board_can_do() {
         assert_eq!(read(&mut world, &master, (0x6301, 1)), u32::from(data[0]));
         assert_eq!(read(&mut world, &master, POSITION), 2000);
         assert_eq!(read(&mut world, &master, (0x6302, 1)), u32::from(data[1]));
-        // Cam 2 is not at 0, and is shown inverted.
+        // Cam 2 is not at 0, and its inverted state is shown.
         assert_eq!(read(&mut world, &master, (0x6300, 1)), cams, "{data:x?}");
     }
     assert_eq!(read(&mut world, &master, (0x6506, 0)), 0x2D, "neither light nor battery");

@@ -1,4 +1,4 @@
-//! The power fails at random moments, also while the node starts, and the battery keeps the position.
+//! The power fails at random instants, also during the start of the node, and the battery keeps the position.
 
 use canbus::Time;
 use fastrand::Rng;
@@ -14,7 +14,7 @@ use crate::support::{Master, SECOND, read, run, write};
 const PRESET_VALUE: u32 = 1000;
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
 
-/// Cycles of each kind of encoder.
+/// Number of power cycles for each kind of encoder.
 fn cycles() -> usize {
     thorough::either(25, 500)
 }
@@ -24,7 +24,7 @@ fn revolutions(world: &mut World) -> f64 {
     world.machine(0).peripherals().plant().revolutions(now)
 }
 
-/// The power fails now and comes back after a random time. Now and then it fails again while the node starts.
+/// The power fails now and returns after a random time. Sometimes it fails again during the start.
 fn fail(world: &mut World, rng: &mut Rng) {
     loop {
         world.machine(0).power_off();
@@ -42,8 +42,8 @@ fn fail(world: &mut World, rng: &mut Rng) {
     wait(world, 30);
 }
 
-/// Fails the power of an absolute encoder that has been preset where the shaft is now, and that turns meanwhile: after each start the
-/// position is the one of the preset and of the way since.
+/// The power of a node with an absolute encoder fails while the encoder turns. After each start the position is the
+/// preset position plus the way since the preset.
 fn assert_preset_lasts(world: &mut World, master: &Master, rng: &mut Rng) {
     let zero = revolutions(world) * STEPS - f64::from(PRESET_VALUE);
     for cycle in 0..cycles() {
@@ -59,7 +59,7 @@ fn assert_preset_lasts(world: &mut World, master: &Master, rng: &mut Rng) {
     }
 }
 
-/// The absolute encoder turns while the power fails and while it is off: its position is preset and offset by what was kept.
+/// The absolute encoder turns while the power fails and while it is off. The preset must hold after each start.
 #[test]
 fn an_absolute_encoder_keeps_its_preset_through_power_that_fails_at_any_moment() {
     let mut rng = Rng::with_seed(14);
@@ -69,7 +69,7 @@ fn an_absolute_encoder_keeps_its_preset_through_power_that_fails_at_any_moment()
     assert_preset_lasts(&mut world, &master, &mut rng);
 }
 
-/// An incremental encoder that stands while the power is off has its position again, and is still referenced.
+/// An incremental encoder at rest has its position again after the power-off, and is still referenced.
 #[test]
 fn an_incremental_encoder_at_rest_keeps_its_position_through_power_that_fails_at_any_moment() {
     let mut rng = Rng::with_seed(406);
@@ -81,12 +81,12 @@ fn an_incremental_encoder_at_rest_keeps_its_position_through_power_that_fails_at
         let from = revolutions(&mut world);
         let rest = (from * COUNTS + f64::from(rng.i32(-20_000..20_000))).floor() / COUNTS;
         stimulate(&mut world, "shaft", &format!("ramp:{from},{rest},0.2"));
-        // At rest for two milliseconds and more: the memory is written each millisecond.
+        // At rest for at least two milliseconds: the memory is written each millisecond.
         wait(&mut world, 202);
         world.run_until(world.now() + Time::from_micros(rng.u64(1..5_000)));
         let at_rest = ((rest * COUNTS) as i64 + turns.unwrap_or_default()) as u32 & 0xFF_FFFF;
         if turns.is_none() {
-            // Which turn is the first depends on where the shaft was when the node began to count.
+            // The number of the first revolution depends on the position of the shaft when the node began to count.
             let ahead = i64::from(read(&mut world, &master, POSITION).wrapping_sub(at_rest).cast_signed());
             let whole = (ahead as f64 / COUNTS).round() as i64 * COUNTS as i64;
             assert!(ahead.abs_diff(whole) <= 1, "the index has referenced the position: {ahead}");
@@ -100,7 +100,7 @@ fn an_incremental_encoder_at_rest_keeps_its_position_through_power_that_fails_at
     }
 }
 
-/// Without a battery the position of an absolute encoder is found again from its offset.
+/// Without a battery, the position of an absolute encoder follows from the stored offset.
 #[test]
 fn an_absolute_encoder_without_a_battery_keeps_its_preset() {
     let mut rng = Rng::with_seed(24);
@@ -109,7 +109,7 @@ fn an_absolute_encoder_without_a_battery_keeps_its_preset() {
     assert_preset_lasts(&mut world, &master, &mut rng);
 }
 
-/// Without a battery no start knows where a counted position is: each one says so, until the position is preset.
+/// Without a battery, no start knows the counted position: each start reports this, until the position is preset.
 #[test]
 fn an_incremental_encoder_without_a_battery_never_shows_a_wrong_position_as_right() {
     let mut rng = Rng::with_seed(25);
@@ -120,7 +120,7 @@ fn an_incremental_encoder_without_a_battery_never_shows_a_wrong_position_as_righ
         fail(&mut world, &mut rng);
         let (state, alarms) = (read(&mut world, &master, SENSOR_STATE), read(&mut world, &master, ALARMS));
         assert_eq!((state & POSITION_ERROR, alarms), (POSITION_ERROR, 1), "cycle {cycle}");
-        // The index says where the shaft is in its turn, and not in which turn.
+        // The index gives the position within the revolution, but not the number of the revolution.
         wait(&mut world, rng.u64(0..250));
         assert_ne!(read(&mut world, &master, SENSOR_STATE) & POSITION_ERROR, 0, "cycle {cycle}");
         if rng.bool() {
@@ -131,7 +131,7 @@ fn an_incremental_encoder_without_a_battery_never_shows_a_wrong_position_as_righ
     }
 }
 
-/// The next start knows that the memory was lost, and the one after it that it was not.
+/// The first start reports that the memory was lost, and the next one reports that it was kept.
 #[test]
 fn a_start_tells_whether_the_battery_has_kept_the_memory() {
     for (flags, said) in [("", "the battery has kept"), ("--fault battery-empty@0", "no battery has kept")] {

@@ -1,8 +1,10 @@
-//! The firmware with interrupts between any two of its instructions: what several priorities share is free of races.
+//! The firmware with interrupts between any two of its instructions: data that several priorities share is free of
+//! races.
 //!
-//! Each seed is another course of the same second: waits of a few cycles in one of eight instructions. What a race would break is
-//! asserted: every frame is received and answered once and in order (receive and transmit queues), every sample is whole and
-//! in time (latest value), the watchdog is fed (supervision), and what reset and battery keep is valid (retained memory, backup SRAM).
+//! Each seed is another interleaving of the same second: one in eight instructions waits for a few cycles. The tests
+//! check what a race would break: every frame is received and answered once and in order (receive and transmit queues),
+//! every sample is consistent and in time (latest value), the watchdog is fed (supervision), and the data kept over
+//! resets and by the battery is valid (retained memory, backup SRAM).
 
 use canbus::Time;
 use host_tests::thorough::either;
@@ -11,7 +13,7 @@ use sim::world::World;
 
 use crate::support::{Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, SYNC, frame, read, world, write};
 
-/// Seeds that are tried.
+/// The seeds to try.
 fn seeds() -> std::ops::Range<u64> {
     0..either(2, 50)
 }
@@ -26,7 +28,7 @@ fn interleaved(seed: u64, flags: &str) -> World {
     world
 }
 
-/// Requests of everything at once, at the pace of the bus: SDO, SYNC, NMT and foreign traffic.
+/// Requests of all kinds, as fast as the bus allows: SDO, SYNC, NMT and foreign traffic.
 #[test]
 fn queues_lose_and_double_nothing() {
     for seed in seeds() {
@@ -58,7 +60,8 @@ fn queues_lose_and_double_nothing() {
     }
 }
 
-/// A snapshot is taken while the next is published: both of its values are of one sample, which a step of both shows.
+/// A snapshot is taken while the next one is published: both values must belong to one sample, which a step of both
+/// inputs shows.
 #[test]
 fn a_sample_is_whole_and_in_time() {
     for seed in seeds() {
@@ -81,8 +84,8 @@ fn a_sample_is_whole_and_in_time() {
     }
 }
 
-/// The battery keeps the position through a power cut at any instant of the millisecond in which it is written: at three of eight
-/// instants without `--thorough`.
+/// The battery keeps the position if the power is cut at any instant of the millisecond in which the position is
+/// written: at three of eight instants without `--thorough`.
 #[test]
 fn what_a_battery_keeps_is_valid_after_a_cut_at_any_instant() {
     const POSITION: (u16, u8) = (0x6004, 0);
@@ -106,7 +109,7 @@ fn what_a_battery_keeps_is_valid_after_a_cut_at_any_instant() {
     }
 }
 
-/// A frame of every length still is what was sent.
+/// A frame of every length arrives unchanged.
 #[test]
 fn the_log_is_the_same_for_the_same_seed() {
     let log = |seed| {

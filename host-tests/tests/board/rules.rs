@@ -1,4 +1,5 @@
-//! A rule of the chip that is broken fails the run, with its place in the source. All other tests of the board run with all rules on.
+//! A broken rule of the chip fails the run and names the place in the source. All other board tests run with all rules
+//! on.
 
 use chip::Peripherals;
 
@@ -7,7 +8,7 @@ use crate::support::{SECOND, world};
 /// FLASH_ACR, RM0390 section 3.8.1.
 const FLASH_ACR: u32 = 0x4002_3C00;
 
-/// As if the firmware had forgotten the wait states.
+/// A firmware without wait states.
 fn without_wait_states() -> sim::world::World {
     let mut world = world("--bitrate 1000");
     world.run_until(SECOND);

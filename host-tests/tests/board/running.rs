@@ -1,4 +1,4 @@
-//! Nodes that run undisturbed, and what they cost.
+//! Undisturbed nodes, and their cost.
 
 use canbus::Time;
 use sim::board::Programs;
@@ -11,7 +11,7 @@ use crate::support::{
     Master, SDO_REQUEST, SDO_RESPONSE, SECOND, START_ALL, SYNC, TPDO1, frame, read, run, world,
 };
 
-/// Nothing happened that must not happen.
+/// Checks that the run had no errors and no incidents.
 fn assert_clean(summary: &Summary) {
     assert_eq!(summary.bus.errors, 0);
     for node in &summary.nodes {
@@ -32,7 +32,8 @@ fn a_node_alone_boots_and_sends_heartbeats_and_tpdos() {
     assert!((8..=11).contains(&node.heard.tpdos), "{summary}");
 }
 
-/// Also a node that is started the moment it boots sends a measured value, not one from before its first sample.
+/// Even a node that is started immediately after its boot-up sends a measured value, not one from before its first
+/// sample.
 #[test]
 fn the_first_tpdo_carries_a_sample() {
     let mut world = world("--pressure const:250000");
@@ -43,9 +44,9 @@ fn the_first_tpdo_carries_a_sample() {
     assert!((bar - 2.5).abs() < 0.004, "{bar} bar for 250000 Pa");
 }
 
-/// A full bus of foreign frames at 1 Mbit/s, a thousand SYNCs a second, and SDO requests as fast as they are answered:
-/// sampling keeps its pace, and nothing that is meant for the node is lost. The client's beat differs from that of the
-/// samples, so that its frames come at every phase of the millisecond.
+/// A full bus of foreign frames at 1 Mbit/s, a thousand SYNCs a second, and SDO requests as fast as they are answered.
+/// Sampling keeps its pace, and no frame for the node is lost. The client's period differs from that of the samples, so
+/// that its frames come at every phase of the millisecond.
 #[test]
 fn sampling_keeps_its_pace_on_a_full_bus() {
     const SYNCS: u64 = 2000;
@@ -86,7 +87,7 @@ fn sampling_keeps_its_pace_on_a_full_bus() {
     println!("{after}");
     assert_clean(&after);
     assert!(after.bus.load > 0.99);
-    // The first and the last start may be a lock late, a microsecond in the seconds between them.
+    // A lock may delay the first and the last start: a microsecond in the seconds between them.
     assert!((sampling.rate - 1000.0).abs() < 1e-3, "{} samples a second", sampling.rate);
     assert!(sampling.worst_jitter < 20.0, "{} us", sampling.worst_jitter);
     assert_eq!(responses, requests, "every SDO request is answered");
@@ -117,7 +118,7 @@ fn a_disturbed_bus_loses_nothing() {
     assert_eq!((summary.nodes[0].heard.emcys, summary.nodes[0].receiving.lost), (0, 0), "{summary}");
 }
 
-/// What a node costs. Instructions are exact; the ratio depends on the host and is only printed.
+/// The cost of a node. Instructions are exact; the ratio depends on the host and is only printed.
 #[test]
 fn a_node_is_cheap() {
     let mut world = world("--bitrate 1000 --pressure sine:250000,100000,2");
@@ -141,8 +142,8 @@ fn a_node_is_cheap() {
     assert!(node.memory.ram > 0 && node.memory.stack > 0 && node.memory.stack < 20 * 1024, "{summary}");
 }
 
-/// The same run twice gives the same bus log, bit for bit, with two nodes, noise, foreign traffic and a client. Other
-/// noise gives another one: the log would show a difference.
+/// Two equal runs give the same bus log, bit for bit, with two nodes, noise, foreign traffic and a client. Another seed
+/// of the noise gives another log, which shows that the log is sensitive to differences.
 #[test]
 fn the_same_run_gives_the_same_bus_log() {
     let log = |seed: u32| {
@@ -163,8 +164,8 @@ fn the_same_run_gives_the_same_bus_log() {
     assert!(first != log(8), "noise does not reach the bus");
 }
 
-/// A flash that is kept is not written again: what an update or a tamperer has left in it is what runs. The images come back
-/// with --reflash, and parameters stay either way.
+/// A kept flash is not written again: it may hold an update or a manipulated program, which then runs. --reflash writes
+/// the images again. The parameters stay in both cases.
 #[test]
 fn a_kept_flash_is_not_written_without_being_asked() {
     let dir = std::env::temp_dir().join(format!("board-kept-{}", std::process::id()));
@@ -186,7 +187,7 @@ fn a_kept_flash_is_not_written_without_being_asked() {
     std::fs::remove_dir_all(dir).unwrap();
 }
 
-/// A stimulus for a board that is not there is refused, not forgotten.
+/// A stimulus for a board that does not exist is refused, not ignored.
 #[test]
 fn a_stimulus_for_nobody_is_refused() {
     let mut world = world("--node 1");
@@ -194,7 +195,7 @@ fn a_stimulus_for_nobody_is_refused() {
     assert_eq!(refused.to_string(), "there is no node 5 here");
 }
 
-/// A board whose flash is kept comes up as it was left, whatever the command line says.
+/// A board with a kept flash starts as it was left; the personality and node-ID on the command line are ignored.
 #[test]
 fn a_kept_flash_keeps_the_node_id() {
     let dir = std::env::temp_dir().join(format!("board-flash-{}", std::process::id()));

@@ -1,5 +1,5 @@
-//! Saves while an absolute encoder turns: the flash stops the core for 16 us with every word, longer than a byte of the
-//! encoder lasts, and no reading may be lost to that.
+//! Saves while an absolute encoder turns. The flash stops the core for 16 us with every word, longer than a byte of the
+//! encoder lasts, but no reading may be lost.
 
 use canbus::{Stamped, Time};
 use host_tests::thorough;
@@ -10,20 +10,20 @@ use crate::support::{Master, SECOND, START_ALL, SYNC, frame, read, run, world, w
 
 const BIT_RATES: [u16; 8] = [1000, 800, 500, 250, 125, 50, 20, 10];
 const RPM: f64 = 6000.0;
-/// Steps in the range of the encoder.
+/// Number of steps in the range of the encoder.
 const RANGE: i64 = 1 << 25;
 
-/// Words of the absolute encoder that did not come whole.
+/// The count of incomplete words from the absolute encoder.
 const LOST_WORDS: (u16, u8) = (0x2001, 4);
-/// A value that is saved and changes nothing: the limit of the operating time.
+/// A value without effect on the measurement: the limit of the operating time.
 const SAVED: (u16, u8) = (0x2106, 5);
 /// 1010h:3, save the application parameters.
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 3, b's', b'a', b'v', b'e'];
 const DONE: u8 = 0x60;
-/// Saves after which the node is restarted: a start makes a page free for the next ones.
+/// Number of saves before the node is restarted: a start frees a page for the next saves.
 const SAVES_A_START: u32 = 20;
 
-/// A node with a multi-turn encoder that turns, operational.
+/// An operational node with a turning multi-turn encoder.
 fn start(bit_rate: u16) -> (World, Master) {
     let mut world = world(&format!("--node 1:encoder --bitrate {bit_rate} --shaft rpm:{RPM}"));
     let master = Master::join_at(&mut world, u32::from(bit_rate) * 1000);
@@ -35,7 +35,7 @@ fn start(bit_rate: u16) -> (World, Master) {
     (world, master)
 }
 
-/// The greatest and the least age of the positions that came, each with the SYNC before it, in microseconds.
+/// The greatest and the least age of the received positions, each at the SYNC before it, in microseconds.
 fn ages(world: &mut World, frames: &[Stamped]) -> Vec<f64> {
     let (sync, tpdo) = (frame(SYNC, &[]).id(), frame(TPDO2, &[]).id());
     let mut sampled = None;
@@ -54,14 +54,14 @@ fn ages(world: &mut World, frames: &[Stamped]) -> Vec<f64> {
     ages
 }
 
-/// Saves once, with SYNCs as fast as the bus takes them until the save is answered and some time after it. Gives the ages of the
+/// Saves once. SYNCs are sent as fast as the bus allows, until some time after the answer. Returns the ages of the
 /// positions.
 fn save(world: &mut World, master: &Master, bit_rate: u16, value: u32) -> Vec<f64> {
     write(world, master, SAVED, 4, value);
     world.take_frames();
     master.heard(world, 0x581);
     master.send(world, 0x601, &SAVE);
-    // SYNC, a TPDO of eight bytes and what else there is: 300 bits.
+    // A SYNC, a TPDO of eight bytes and other frames: 300 bits.
     let beat = Time::from_micros(300_000 / u64::from(bit_rate)).max(Time::from_micros(997));
     let mut answer = None;
     let mut after = 0;
@@ -76,8 +76,8 @@ fn save(world: &mut World, master: &Master, bit_rate: u16, value: u32) -> Vec<f6
     ages(world, &frames)
 }
 
-/// A word is started with one sample and taken with the next one, and the next one after that takes its place: no position is
-/// older than two milliseconds and what the core stood still for.
+/// A word is started with one sample and read with the next one, and the following word then replaces it: no position
+/// is older than two milliseconds plus the time for which the core was stopped.
 #[test]
 fn saves_cost_no_reading_of_the_absolute_encoder() {
     let saves = thorough::either(25, 200);
@@ -104,7 +104,7 @@ fn saves_cost_no_reading_of_the_absolute_encoder() {
     }
 }
 
-/// Resets the node, which then has what was saved, and starts it again.
+/// Resets the node, which then has the saved values, and starts it again.
 fn restart(world: &mut World, master: &Master) {
     master.send(world, 0x000, &[0x81, 1]);
     world.run_until(world.now() + SECOND);

@@ -1,4 +1,4 @@
-//! What a node is put through, and what is noticed: nothing of one that is as it should be.
+//! A scenario for one node, and the deviations that an observer notices: none for a correct node.
 
 use canbus::Time;
 use sim::summary::Summary;
@@ -6,16 +6,16 @@ use sim::world::World;
 
 use crate::support::{Master, START_ALL, SYNC, frame};
 
-/// What the node measures.
+/// The node of the scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Node {
-    /// 4 bar.
+    /// A pressure node at 4 bar.
     Pressure,
-    /// The same, and saves its parameters.
+    /// A pressure node that also saves its parameters.
     Saving,
-    /// The same; interrupts come between any two instructions, and faults of alignment are seen.
+    /// A pressure node; interrupts come between any two instructions, and alignment faults are detected.
     Interleaved,
-    /// The same, on a chip whose receive FIFOs take long to give a mailbox back.
+    /// A pressure node on a chip whose receive FIFOs release a mailbox slowly.
     SlowFifo,
     /// An incremental encoder that turns.
     Encoder,
@@ -23,10 +23,10 @@ pub(crate) enum Node {
     Absolute,
 }
 
-/// Steps of a revolution: of the incremental encoder, and of the absolute one.
+/// Steps per revolution of the incremental and of the absolute encoder.
 const COUNTS: f64 = 4096.0;
 const STEPS: u32 = 8192;
-/// Counts in the time that an answer takes.
+/// Tolerance of the position in counts: the movement during an answer.
 const LATENCY: f64 = 60.0;
 /// Device type, heartbeat time, kind of the encoder and its position.
 const DEVICE_TYPE: (u16, u8) = (0x1000, 0);
@@ -37,14 +37,14 @@ const POSITION: (u16, u8) = (0x6004, 0);
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
 /// A heartbeat time in milliseconds that is not the default.
 const PERIOD: u32 = 100;
-/// Cycles of PCLK1 that a slow FIFO takes, 17 us: more than a third of the shortest frame at 1 Mbit/s, and less than a sample may be late,
-/// as a sample waits for who waits for the FIFO.
+/// Cycles of PCLK1 that a slow FIFO takes to release a mailbox, 17 us. This is more than a third of the shortest frame
+/// at 1 Mbit/s, and less than the tolerance for late samples: a task that waits for the FIFO delays a sample.
 const SLOW: u32 = 600;
-/// When the application runs.
+/// The instant at which the application is running.
 const STARTED: Time = Time::from_millis(500);
 
 impl Node {
-    /// The flags of the simulator for it.
+    /// The flags of the simulator for this node.
     pub(crate) fn flags(self) -> &'static str {
         match self {
             Node::Pressure | Node::Saving | Node::SlowFifo => "--bitrate 1000 --pressure const:400000",
@@ -55,8 +55,8 @@ impl Node {
     }
 }
 
-/// Starts the only node of a world and speaks with it: with a bug from the start, or with one that it gets while it runs. All that is not
-/// as it should be, a line each.
+/// Starts the only node of a world and communicates with it. `before` can seed a bug before the start, `running` while
+/// the program runs. Returns the deviations, one line each.
 pub(crate) fn observe(
     mut world: World,
     node: Node,
@@ -84,7 +84,7 @@ pub(crate) fn observe(
     said
 }
 
-/// An object of the node, as far as the node answers.
+/// The value of an object, if the node answers.
 fn read(world: &mut World, master: &Master, (index, sub): (u16, u8)) -> Option<u32> {
     let [low, high] = index.to_le_bytes();
     let answer = ask(world, master, &[0x40, low, high, sub, 0, 0, 0, 0])?;
@@ -97,7 +97,7 @@ fn write(world: &mut World, master: &Master, (index, sub): (u16, u8), size: u8, 
     answer.is_some_and(|answer| answer[0] == 0x60)
 }
 
-/// One exchange; nothing when there is no answer for a quarter of a second.
+/// One SDO exchange; `None` when no answer comes within a quarter of a second.
 fn ask(world: &mut World, master: &Master, request: &[u8; 8]) -> Option<Vec<u8>> {
     master.heard(world, 0x581);
     master.send(world, 0x601, request);
@@ -120,7 +120,7 @@ fn answers(world: &mut World, master: &Master, node: Node, said: &mut Vec<String
     }
 }
 
-/// Half a second of heartbeats.
+/// Checks half a second of heartbeats.
 fn keeps_time(world: &mut World, master: &Master, said: &mut Vec<String>) {
     write(world, master, HEARTBEAT, 2, PERIOD);
     let before = world.summary(1.0, 0).nodes[0].heard.heartbeats;
@@ -131,7 +131,7 @@ fn keeps_time(world: &mut World, master: &Master, said: &mut Vec<String>) {
     }
 }
 
-/// Thirty frames in a row for the process data, more than a FIFO holds.
+/// Thirty frames in a row for FIFO 0, more than a FIFO holds.
 fn flood(world: &mut World, master: &Master) {
     let now = world.now();
     (0..30).for_each(|_| world.port(master.port).send(frame(SYNC, &[]), now));
@@ -156,7 +156,7 @@ fn measures(world: &mut World, master: &Master, node: Node, said: &mut Vec<Strin
     }
 }
 
-/// The position of the node moves as the shaft does, over more than a revolution.
+/// Checks that the position of the node follows the shaft, over more than a revolution.
 fn follows(world: &mut World, master: &Master, said: &mut Vec<String>) {
     let mut look = || {
         let now = world.now();
@@ -171,7 +171,7 @@ fn follows(world: &mut World, master: &Master, said: &mut Vec<String>) {
     }
 }
 
-/// What was saved is there after a power cycle.
+/// Checks that saved values are present after a power cycle.
 fn saves(world: &mut World, master: &Master, said: &mut Vec<String>) {
     let is_saved = ask(world, master, &SAVE).is_some_and(|answer| answer[0] == 0x60);
     if !is_saved {
@@ -187,7 +187,7 @@ fn saves(world: &mut World, master: &Master, said: &mut Vec<String>) {
     }
 }
 
-/// What the summary of the run has.
+/// The deviations in the summary of the run.
 fn told(summary: &Summary, said: &mut Vec<String>) {
     if summary.bus.errors > 0 {
         said.push(format!("{} errors on the bus", summary.bus.errors));

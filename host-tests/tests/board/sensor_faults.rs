@@ -1,4 +1,4 @@
-//! A fault of the pressure sensor comes and ends: no value and no load that is wrong says that it is right.
+//! A fault of the pressure sensor begins and ends: no wrong value and no wrong load is ever marked as valid.
 
 use canbus::Time;
 use sim::stimuli::Stimulus;
@@ -14,7 +14,7 @@ const OVERLOAD: u8 = 1 << 3;
 /// Bit 0 of 6150h.
 const INVALID: u8 = 1;
 
-/// 10 bar are 1000 kg.
+/// The pressure for a load in kg: 10 bar are 1000 kg.
 fn pascal(kg: u32) -> u32 {
     kg * 1000
 }
@@ -27,10 +27,11 @@ fn write(world: &mut World, master: &Master, (index, sub): (u16, u8), bytes: &[u
     assert_eq!(master.ask(world, 1, &request)[0], 0x60, "{index:x}h:{sub}");
 }
 
-/// Runs into the fault, which begins so long from now and lasts 1.4 s, and past its end; what came with this identifier.
+/// Runs through a fault that begins `from` from now and lasts 1.4 s, and past its end; returns the frames with this
+/// identifier.
 fn through_the_fault(world: &mut World, master: &Master, fault: &str, id: u16) -> Vec<Vec<u8>> {
     let from = world.now() + Time::from_millis(300);
-    // Not on the border of a millisecond: the mean of the last one is half fault and half signal.
+    // Not on the border of a millisecond: the mean of one millisecond is then half fault and half signal.
     let spec = format!("{fault}@{:.4}..{:.4}", seconds(from) + 0.000_3, seconds(from) + 1.400_4);
     world.apply(&Stimulus::parse("fault", &spec).unwrap()).unwrap();
     master.heard(world, id);
@@ -68,7 +69,7 @@ fn after_a_fault_the_first_load_that_is_sent_as_valid_is_right() {
     }
 }
 
-/// TPDO 1 has the status beside the value; with a filter and without one.
+/// TPDO 1 has the status beside the value; with and without a filter.
 #[test]
 fn after_a_fault_the_first_pressure_that_is_valid_is_right() {
     for (fault, filter, constant) in [
@@ -83,7 +84,7 @@ fn after_a_fault_the_first_pressure_that_is_valid_is_right() {
         world.run_until(SECOND);
         write(&mut world, &master, (0x61A1, 1), &[constant]);
         write(&mut world, &master, (0x61A0, 1), &[filter]);
-        // A node that goes on sending with an error.
+        // A node that stays Operational despite an error.
         write(&mut world, &master, (0x1029, 2), &[1]);
         for (object, bytes) in [
             ((0x1800, 1), &0x8000_0181_u32.to_le_bytes()[..]),

@@ -1,4 +1,4 @@
-//! How deep the stack got where the images do most, beside the bound that follows from their code.
+//! The deepest stack of the images under full load, compared with the bound derived from their code.
 
 use callgraph::stack_bound;
 use emulator::Estimate;
@@ -7,7 +7,7 @@ use sim::world::World;
 use crate::support::images;
 use crate::timing::busy_run;
 
-/// The deepest since power-on is within the bound of one of these images, which have run in turn.
+/// The deepest stack since power-on is within the bound of one of these images, which have run one after the other.
 pub(crate) fn assert_bound(world: &World, ran: &[&str]) {
     let measured = world.summary(1.0, 0).nodes[0].memory.stack;
     let bounds = ran.iter().map(|name| stack_bound(&images(), name).unwrap());

@@ -1,4 +1,4 @@
-//! How long a start takes: from power-on to the boot-up message.
+//! The duration of a start: from power-on to the boot-up message.
 //!
 //! `cargo test --profile sim -p host-tests --features board --test board -- start_up --nocapture` prints the times.
 
@@ -12,7 +12,7 @@ use crate::support::{Master, SECOND, world};
 const PAGES: u32 = 0x0800_8000;
 const SIZE: usize = 0x8000;
 
-/// Switches the power off and on, and gives the time until the boot-up message is on the bus.
+/// Switches the power off and on, and returns the time until the boot-up message is on the bus.
 fn boot_up(world: &mut World) -> Time {
     let now = world.now();
     world.machine(0).power_off();
@@ -28,23 +28,23 @@ fn until_boot_up(world: &mut World, start: Time) -> Time {
     first.expect("a boot-up message").at.since(start)
 }
 
-/// NMT reset node: the power stays, and what was proven of the application.
+/// NMT reset node: the power stays on, so the earlier check of the application is still valid.
 fn reset(world: &mut World, master: &Master) -> Time {
     let now = world.now();
     master.send(world, 0, &[0x81, 1]);
     until_boot_up(world, now)
 }
 
-/// Changes a bit of the last record that is stored.
+/// Changes a bit of the last stored record.
 fn damage(world: &mut World) {
     let mut pages = vec![0; SIZE];
     world.machine(0).read(PAGES, &mut pages).unwrap();
-    // Behind the last record are the commit word and the closing mark.
+    // The commit word and the closing mark follow the last record.
     let at = pages.iter().rposition(|&byte| byte != 0xFF).unwrap() - 8;
     world.machine(0).write(PAGES + u32::try_from(at).unwrap(), &[pages[at] ^ 1]).unwrap();
 }
 
-/// Prints the times of a start, and holds them to their limits.
+/// Prints the times of a start, and checks them against their limits.
 fn start(personality: &str, rate: u32, estimate: Estimate) -> (World, Master) {
     let mut world = world(&format!("--bitrate {rate} --node 1:{personality} --cycles {estimate}"));
     let master = Master::join_at(&mut world, rate * 1000);
@@ -55,7 +55,7 @@ fn start(personality: &str, rate: u32, estimate: Estimate) -> (World, Master) {
     println!(
         "{personality} at {rate} kbit/s, {estimate}: boot-up {power_on:.1} ms after power-on, {again:.1} ms after a reset"
     );
-    // The signature of the application is checked, twice.
+    // The signature of the application is checked twice.
     let limit = if estimate == Estimate::Worst { 450 } else { 300 };
     assert!(after_power_on < Time::from_millis(limit), "{personality} at {rate} kbit/s: {after_power_on:?}");
     assert!(after_reset < Time::from_millis(100), "{personality} at {rate} kbit/s: {after_reset:?}");

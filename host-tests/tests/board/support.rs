@@ -1,4 +1,4 @@
-//! A world of emulated boards, as `cargo sim` has it, and a client in it.
+//! A world of emulated boards, as in `cargo sim`, and a client in this world.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ pub(crate) const LSS_REQUEST: u16 = 0x7E5;
 pub(crate) const LSS_RESPONSE: u16 = 0x7E4;
 pub(crate) const START_ALL: (u16, [u8; 2]) = (0x000, [1, 0]);
 
-/// Where the ELF files are: $NODE_IMAGES, or where cargo puts them.
+/// The directory of the ELF files: $NODE_IMAGES, or the default output of cargo.
 pub(crate) fn images() -> PathBuf {
     let target = std::env::var_os("CARGO_TARGET_DIR")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("target"), PathBuf::from);
@@ -41,12 +41,12 @@ pub(crate) fn firmware() -> Vec<u8> {
     std::fs::read(images().join("firmware")).unwrap()
 }
 
-/// A world as `cargo sim` with these flags has it, without its sockets.
+/// A world like that of `cargo sim` with these flags, but without sockets.
 pub(crate) fn world(flags: &str) -> World {
     world_of("bootloader", flags)
 }
 
-/// The same with another bootloader than the one of a development board, and with the application beside it.
+/// Like [`world`], with another bootloader than that of a development board; the application is in the same directory.
 pub(crate) fn world_of(bootloader: &str, flags: &str) -> World {
     let bootloader = images().join(bootloader);
     let firmware = bootloader.with_file_name("firmware");
@@ -60,12 +60,13 @@ pub(crate) fn world_of(bootloader: &str, flags: &str) -> World {
     world
 }
 
-/// By what a test counts cycles that does not say it: `CYCLES=worst` in the environment shows that all of them hold then, too.
+/// The cycle estimate of tests that do not choose one. With `CYCLES=worst` in the environment all these tests must pass
+/// as well.
 fn estimate() -> String {
     std::env::var("CYCLES").unwrap_or_else(|_| "modelled".into())
 }
 
-/// A node that has run for a second, its log taken.
+/// A node that has run for a second; its log is already taken.
 pub(crate) fn running() -> World {
     let mut world = world("--bitrate 1000");
     world.run_until(SECOND);
@@ -73,7 +74,7 @@ pub(crate) fn running() -> World {
     world
 }
 
-/// What the node says when it runs on for a second, in which it must boot once more and measure again.
+/// The log of the node in the next second, in which the node must boot once more and measure again.
 pub(crate) fn comes_back(world: &mut World) -> String {
     let before = world.summary(1.0, 0);
     let after = run(world, SECOND);
@@ -96,7 +97,7 @@ fn request(command: u8, (index, sub): (u16, u8), value: u32) -> [u8; 8] {
     [command, low, high, sub, a, b, c, d]
 }
 
-/// A client on the bus, at 1 Mbit/s unless it says otherwise.
+/// A client on the bus, at 1 Mbit/s by default.
 pub(crate) struct Master {
     pub(crate) port: PortId,
 }
@@ -106,7 +107,7 @@ impl Master {
         Master::join_at(world, 1_000_000)
     }
 
-    /// At a bit rate in bit/s.
+    /// A client at a bit rate in bit/s.
     pub(crate) fn join_at(world: &mut World, bit_rate: u32) -> Master {
         let port = world.open_port();
         world.port(port).attach(Some(Adapter { bit_rate, silent: false }));
@@ -127,7 +128,7 @@ impl Master {
         panic!("no response to {request:x?}");
     }
 
-    /// An LSS request and what is answered to it in the next milliseconds.
+    /// An LSS request; returns the answers in the next milliseconds.
     pub(crate) fn lss(&self, world: &mut World, request: &[u8; 8]) -> Vec<Vec<u8>> {
         self.heard(world, LSS_RESPONSE);
         self.send(world, LSS_REQUEST, request);
@@ -140,7 +141,7 @@ impl Master {
         world.port(self.port).send(frame(id, bytes), now);
     }
 
-    /// What came with this identifier since the last call; the rest is dropped.
+    /// The frames with this identifier since the last call; other frames are dropped.
     pub(crate) fn heard(&self, world: &mut World, id: u16) -> Vec<Frame> {
         let port = world.port(self.port);
         let all = std::iter::from_fn(|| port.receive()).map(|stamped| stamped.frame);
@@ -162,7 +163,7 @@ pub(crate) fn write(world: &mut World, master: &Master, object: (u16, u8), size:
     assert_eq!(answer[0], 0x60, "{object:x?}: {answer:x?}");
 }
 
-/// Runs on for a time and sums up what happened since power-on.
+/// Runs for `span` and returns the summary since power-on.
 pub(crate) fn run(world: &mut World, span: Time) -> Summary {
     let started = std::time::Instant::now();
     world.run_until(world.now() + span);

@@ -1,10 +1,12 @@
-//! The response-time analysis of the tasks: what each took at worst on the emulated board, and how late it can end.
+//! The response-time analysis of the tasks: the worst measured execution time of each task on the emulated board, and
+//! its latest end.
 //!
 //! A task of priority p ends at the latest after R = B + C + sum over the tasks of higher priority of ceil(R / T) C,
-//! for the C and the least time between two activations T of each (Audsley and others, 1993). C is the worst that was
-//! measured in a busy run whose cycles are counted at worst. B is what a task of lower priority can hold it up: a word that the flash programs, at the
-//! longest that the data sheet allows, and the longest time from its interrupt to its first instruction in that run.
-//! In the latter are the locks of RTIC; tasks of higher priority are, too, and so count twice.
+//! where C is the worst execution time and T the least time between two activations of each task (Audsley and others,
+//! 1993). C is the worst time measured in a busy run, with the cycles counted at worst. B is the delay by tasks of
+//! lower priority: a word that the flash programs, at the longest time of the data sheet, and the longest time from the
+//! interrupt to its first instruction in that run. The latter contains the locks of RTIC. It also contains tasks of
+//! higher priority, which are therefore counted twice.
 
 use canbus::Time;
 use emulator::{Estimate, Exception};
@@ -14,26 +16,26 @@ use crate::support::{Master, SECOND, START_ALL, SYNC, world};
 
 /// HCLK in cycles per microsecond.
 const CYCLES: f64 = 144.0;
-/// The core stands still while the flash programs a word: the longest time of RM0390's data sheet, table 49, in us.
+/// The core stops while the flash programs a word: the longest time in table 49 of the data sheet, in us.
 const FLASH: f64 = 100.0;
-/// The shortest frame and the shortest of eight bytes at 1 Mbit/s, with the intermission, in us.
+/// The shortest frame, and the shortest frame of eight bytes, at 1 Mbit/s with the intermission, in us.
 const SHORTEST_FRAME: f64 = 47.0;
 const FULL_FRAME: f64 = 111.0;
 /// 1010h:1, save all parameters.
 const SAVE: [u8; 8] = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
-/// How long the busy run takes.
+/// Duration of the busy run.
 const SPAN: u64 = 3000;
 
-/// What is known of a task before it is measured.
+/// The known properties of a task.
 struct Task {
     name: &'static str,
     priority: u8,
     irqs: &'static [u8],
     /// Least time between two activations, in us.
     period: f64,
-    /// When it must have ended after it was asked for, in us.
+    /// Latest end after the activation, in us.
     deadline: f64,
-    /// What the deadline is.
+    /// The reason for the deadline.
     reason: &'static str,
 }
 
@@ -89,7 +91,7 @@ const TASKS: [Task; 6] = [
     },
 ];
 
-/// What was measured of a task, in us and instructions.
+/// The measured properties of a task, in us and instructions.
 struct Measured {
     entries: u64,
     instructions: u64,
@@ -109,7 +111,7 @@ fn measure(world: &mut World, task: &Task) -> Measured {
     }
 }
 
-/// R of the task at this place, or `None` when it has no end before the deadline.
+/// R of the task at this place, or `None` when R exceeds the deadline.
 fn response(tasks: &[(Task, Measured)], place: usize) -> Option<f64> {
     let (task, own) = &tasks[place];
     let blocking = FLASH + own.latency;
@@ -128,7 +130,8 @@ fn response(tasks: &[(Task, Measured)], place: usize) -> Option<f64> {
     }
 }
 
-/// As much as the bus can carry: every TPDO with every SYNC, RPDOs, SDO transfers, a save, and frames of others.
+/// The highest load that the bus can carry: every TPDO with every SYNC, RPDOs, SDO transfers, a save, and foreign
+/// frames.
 pub(crate) fn busy_run(estimate: Estimate) -> World {
     let mut world = world(&format!("--node 1:combined --bitrate 1000 --load 100 --cycles {estimate}"));
     let master = Master::join(&mut world);
@@ -157,7 +160,7 @@ pub(crate) fn busy_run(estimate: Estimate) -> World {
     world
 }
 
-/// What the tasks took in a busy run.
+/// The times of the tasks in a busy run.
 fn measured(estimate: Estimate) -> [Measured; TASKS.len()] {
     let mut world = busy_run(estimate);
     TASKS.map(|task| measure(&mut world, &task))

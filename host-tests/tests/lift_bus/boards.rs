@@ -1,5 +1,5 @@
-//! The same lift with both nodes as emulated boards: their sensors are the plants of the boards, and the virtual devices
-//! are clients of the simulated bus.
+//! The same lift with both nodes as emulated boards. The nodes' sensors are the plants of the boards, and the virtual
+//! devices are clients of the simulated bus.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -22,14 +22,14 @@ use crate::support::{self, Master, SECOND};
 use crate::table::{LOAD, POSITION};
 use crate::world::World;
 
-/// Way of the tape in a revolution of the plant's shaft, in mm: 4096 marks of 0.1 mm.
+/// Length of the tape for one revolution of the plant's shaft, in mm: 4096 marks of 0.1 mm.
 const TAPE: f64 = 409.6;
 const TICK: Time = Time::from_millis(1);
-/// Places of the boards.
+/// Numbers of the boards.
 const POSITION_BOARD: usize = 0;
 const LOAD_BOARD: usize = 1;
 
-/// A virtual device at its place on the bus.
+/// A virtual device with its client on the bus.
 struct Seat {
     client: Master,
     device: VirtualDevice,
@@ -48,7 +48,7 @@ impl Seat {
         self.send(out, world);
     }
 
-    /// Takes what has arrived and does what is due.
+    /// Processes the received frames and the work that is due.
     fn run(&mut self, world: &mut sim::world::World) {
         let (now, mut out) = (instant(world.now()), Queue::default());
         while let Some(received) = world.port(self.client.port).receive() {
@@ -88,7 +88,7 @@ pub(crate) struct Boards {
 }
 
 impl Boards {
-    /// A car at the lowest landing with open doors, all devices in Pre-operational.
+    /// A lift with the car at the lowest landing and open doors; all devices are Pre-operational.
     pub(crate) fn new() -> Boards {
         let flags = format!("--bitrate 1000 --node {POSITION}:lift --node {LOAD}:lift");
         let mut boards = support::world(&flags);
@@ -105,14 +105,14 @@ impl Boards {
         lift
     }
 
-    /// Lets time pass and keeps what is on the bus.
+    /// Runs for `millis` milliseconds and keeps the frames on the bus.
     pub(crate) fn run(&mut self, millis: u64) {
         for _ in 0..millis {
             self.tick();
         }
     }
 
-    /// A millisecond: the devices act, and the car goes on evenly to where the drive has brought it.
+    /// Advances by a millisecond: the devices act, and the car moves evenly to the position that the drive has reached.
     fn tick(&mut self) {
         let from = self.world.borrow().car;
         self.seats.iter_mut().for_each(|seat| seat.run(&mut self.boards));
@@ -127,7 +127,7 @@ impl Boards {
         self.log.extend(self.boards.take_frames());
     }
 
-    /// Lets time pass until something is the case.
+    /// Runs until the condition `is_so` holds.
     pub(crate) fn run_until(&mut self, limit: u64, mut is_so: impl FnMut(&mut Boards) -> bool) {
         for _ in 0..limit / 10 {
             if is_so(self) {
@@ -143,7 +143,7 @@ impl Boards {
         self.boards.apply(&parse("pressure", &format!("{LOAD}=const:{pascal}"))).unwrap();
     }
 
-    /// Button 1 is pressed for a moment.
+    /// Presses button 1 for a moment.
     pub(crate) fn press_button(&mut self) {
         for what in ["down", "up"] {
             self.boards.apply(&parse("button", &format!("{LOAD}=1:{what}"))).unwrap();
@@ -151,7 +151,7 @@ impl Boards {
         }
     }
 
-    /// Lamp 1, at the pin of the board.
+    /// Whether lamp 1 is lit, at the pin of the board.
     pub(crate) fn is_lit(&mut self) -> bool {
         self.boards.machine(LOAD_BOARD).peripherals().output('C', 0) == Some(true)
     }
@@ -169,7 +169,7 @@ impl Boards {
         self.world.borrow().doors == [width; 2]
     }
 
-    /// Where the car was, in mm.
+    /// The position of the car at an instant, in mm.
     pub(crate) fn car(&self, at: Instant) -> f64 {
         let world = self.world.borrow();
         let next = world.measured.partition_point(|(time, _)| *time <= at);
@@ -185,14 +185,14 @@ impl Site for Boards {
         assert_eq!(result, Ok(()), "{node}: {index:X}h:{sub}");
     }
 
-    /// A board that is reset needs half a second where a page of its parameters has to be erased.
+    /// Waits half a second after a reset, because the board may have to erase a page of its parameters.
     fn nmt(&mut self, command: u8, node: u8) {
         self.master.send(&mut self.boards, 0, &[command, node]);
         self.run(if command == 1 { 5 } else { SECOND.as_micros() / 1000 });
     }
 }
 
-/// The way from the master to one SDO server.
+/// The SDO channel from the master to one server.
 struct Link<'a> {
     lift: &'a mut Boards,
     node: u8,
@@ -225,7 +225,7 @@ fn instant(time: Time) -> Instant {
     Instant(time.as_micros())
 }
 
-/// Of a position PDO: the instant at which it was on the bus, and what it says.
+/// The position PDOs: the instant of each frame and its position.
 pub(crate) fn positions(log: &[Stamped]) -> impl Iterator<Item = (Instant, f64)> {
     log.iter().filter_map(|stamped| {
         let frame: Frame = from_bus(&stamped.frame).filter(|frame| frame.id() == 0x18C)?;
@@ -234,5 +234,6 @@ pub(crate) fn positions(log: &[Stamped]) -> impl Iterator<Item = (Instant, f64)>
     })
 }
 
-/// A position is at most this old when its frame has ended: the way of a sample to the dictionary, and the wait for the bus.
+/// The greatest age of a position at the end of its frame: the time from the sample to the dictionary, and the wait for
+/// the bus.
 pub(crate) const OLDEST: Duration = Duration(800);

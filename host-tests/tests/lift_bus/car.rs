@@ -1,5 +1,5 @@
-//! Virtual devices at the car: drive, door units, light barriers, a display. The bits of control and status words are the
-//! test's own; what it is about is how they travel.
+//! Virtual devices at the car: drive, door units, light barriers, a display. The bits of control and status words are
+//! made up for the test, which is only about their transmission.
 
 use crate::device::{Behaviour, Values};
 use crate::world::World;
@@ -13,11 +13,11 @@ pub(crate) const OPEN: u64 = 1;
 pub(crate) const CLOSE: u64 = 2;
 /// Width of a door in mm.
 pub(crate) const WIDTH: f64 = 900.0;
-/// What the drive and the doors can, in mm/s and mm, a millisecond.
+/// Limits of the drive in mm/s per millisecond, and of the doors in mm per millisecond.
 const ACCELERATION: i32 = 2;
 const DOOR_SPEED: f64 = 1.5;
 
-/// Moves the car at the velocity that it is told, in mm/s.
+/// Moves the car at the commanded velocity in mm/s.
 #[derive(Default)]
 pub(crate) struct Drive {
     velocity: i32,
@@ -57,7 +57,7 @@ impl Behaviour for Door {
     }
 }
 
-/// Sees who stands in one door.
+/// The light barrier of one door.
 pub(crate) struct Barrier(pub(crate) u8);
 
 impl Behaviour for Barrier {
@@ -66,7 +66,7 @@ impl Behaviour for Barrier {
     }
 }
 
-/// Says something of its own now and then.
+/// Sends a value of its own now and then.
 #[derive(Default)]
 pub(crate) struct Display {
     millis: u64,

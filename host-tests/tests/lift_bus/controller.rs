@@ -1,5 +1,5 @@
-//! The call controller: it takes a call, closes the doors, drives, opens the doors. It knows of the world what the bus
-//! tells it.
+//! The call controller: accepts a call, closes the doors, drives, opens the doors. It knows only the values that the
+//! bus carries.
 
 use profiles::lift::load::OVERLOAD;
 
@@ -12,10 +12,10 @@ pub(crate) const LANDINGS: [u32; 5] = [10_000, 12_500, 15_000, 17_500, 20_000];
 /// Speed of the car in mm/s.
 pub(crate) const FAST: i32 = 2500;
 const SLOW: i32 = 30;
-/// Less than what the drive can, in mm/s2, so that the car comes to a landing slowly.
+/// A deceleration below the limit of the drive, in mm/s2, so that the car reaches a landing slowly.
 const DECELERATION: f64 = 1500.0;
 
-/// The words of the panel's calls and of its lamp: what they say is the installer's affair.
+/// The words of the panel's calls and of its lamp; the installer defines their meaning.
 pub(crate) const fn call(landing: u8) -> u64 {
     0x0100_0000_00CA | (landing as u64) << 24
 }
@@ -35,7 +35,7 @@ enum State {
 #[derive(Default)]
 pub(crate) struct Controller {
     state: State,
-    /// The landing that it goes to.
+    /// The landing to drive to.
     target: u32,
     last_input: u64,
 }
@@ -74,7 +74,7 @@ impl Controller {
         State::Waiting
     }
 
-    /// What the car may go from here to stop at the landing, in mm/s; 0 where it is there.
+    /// The highest velocity that still lets the car stop at the landing, in mm/s; 0 at the landing.
     #[allow(clippy::cast_possible_truncation)]
     fn velocity(&self, values: &Values) -> i32 {
         let way = i64::from(self.target) - values.get(0x6383, 1).cast_signed();

@@ -11,13 +11,13 @@ use host_tests::network::Unit;
 
 use crate::world::World;
 
-/// Enough for any of the dictionaries.
+/// Sizes that suffice for any of the dictionaries.
 const ROOM: Sizes = Sizes { image: 512, tpdos: 8, rpdos: 8, watches: 4, scanned: 48 };
 pub(crate) const TICK: Duration = Duration::from_millis(1);
 
-/// What a device does besides CANopen.
+/// The behaviour of a device apart from CANopen.
 pub(crate) trait Behaviour {
-    /// A millisecond has passed.
+    /// Called every millisecond.
     fn tick(&mut self, values: &mut Values, world: &mut World);
 }
 
@@ -76,7 +76,7 @@ impl VirtualDevice {
         }
     }
 
-    /// A value of one of its objects.
+    /// The value of an object of the device.
     pub(crate) fn value(&self, index: u16, sub: u8) -> u64 {
         number(self.dictionary.field(index, sub).get(self.device.image()))
     }
@@ -127,7 +127,7 @@ impl Unit for VirtualDevice {
     }
 }
 
-/// The number in a value.
+/// A value as a number.
 fn number(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
 }

@@ -1,5 +1,5 @@
-//! What the installer of the lift does, over SDO: each node is told which virtual devices it is, and described; then both are
-//! saved and reset.
+//! The work of the lift's installer over SDO: each node gets its virtual devices and their description; then both nodes
+//! are saved and reset.
 
 use profiles::lift::devices::Devices;
 
@@ -10,10 +10,10 @@ use crate::table::{LOAD, POSITION};
 pub(crate) trait Site {
     /// Writes an object of a node.
     fn write(&mut self, node: u8, index: u16, sub: u8, bytes: &[u8]);
-    /// Sends an NMT command, and waits until it is done.
+    /// Sends an NMT command, and waits for its effect.
     fn nmt(&mut self, command: u8, node: u8);
 
-    /// The node at the tape in the shaft: 0.1 mm a mark, no index.
+    /// Describes the position unit at the tape in the shaft: 0.1 mm per mark, no index.
     fn describe_position_unit(&mut self) {
         self.write(POSITION, 0x2305, 0, &[Devices::POSITION.0]);
         self.write(POSITION, 0x2100, 1, &[6]);
@@ -23,12 +23,13 @@ pub(crate) trait Site {
         self.write(POSITION, 0x63B4, 1, &9_900_i32.to_le_bytes());
     }
 
-    /// The car is at the lowest landing. The description must have reached the measurement.
+    /// Presets the position of the car, which is at the lowest landing. The measurement must have taken the description
+    /// before.
     fn preset(&mut self) {
         self.write(POSITION, 0x6382, 1, &LANDINGS[0].to_le_bytes());
     }
 
-    /// The node at the cylinder and the panel.
+    /// Describes the node at the cylinder and the panel.
     fn describe_load_and_panel(&mut self) {
         let panel = Devices::INPUT_PANEL.0 | Devices::OUTPUT_PANEL.0;
         self.write(LOAD, 0x2305, 0, &[Devices::LOAD.0 | panel]);
@@ -43,7 +44,7 @@ pub(crate) trait Site {
         self.write(LOAD, 0x2321, 2, &LAMP_ON.to_le_bytes()[..6]);
     }
 
-    /// All of it is there after a reset.
+    /// Saves the configuration, which must survive a reset.
     fn save(&mut self) {
         for node in [POSITION, LOAD] {
             self.write(node, 0x1010, 1, b"save");

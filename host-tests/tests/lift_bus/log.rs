@@ -1,4 +1,4 @@
-//! What was on the bus.
+//! Analysis of the frames on the bus.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use profiles::lift::catalogue::{Content, by_cob_id};
 
 use crate::table::{BARRIERS, CONTROLLER, DISPLAY, DOORS, DRIVE, LOAD, POSITION};
 
-/// The last value of an object that a PDO with this identifier carried.
+/// The last value of an object in a PDO with this identifier.
 pub(crate) fn last(log: &[Stamped], id: u32, object: usize) -> u64 {
     let field = by_cob_id(id).unwrap().fields().nth(object).unwrap();
     let mut frames = log.iter().rev().filter_map(|stamped| from_bus(&stamped.frame));
@@ -17,7 +17,8 @@ pub(crate) fn last(log: &[Stamped], id: u32, object: usize) -> u64 {
     field.value(frame.data()).unwrap()
 }
 
-/// Every frame is one of the catalogue, of its length, or one of CiA 301's services to or from a device that is there.
+/// Checks that every frame is one of the catalogue, with the right length, or belongs to a CiA 301 service of an
+/// existing device.
 pub(crate) fn every_frame_is_known(log: &[Stamped]) {
     let mut counts = BTreeMap::<u16, usize>::new();
     for frame in log.iter().filter_map(|stamped| from_bus(&stamped.frame)) {
@@ -48,7 +49,7 @@ pub(crate) fn every_frame_is_known(log: &[Stamped]) {
     assert_eq!(pdos, expected, "each device sends its own and nobody sends another's");
 }
 
-/// NMT commands, boot-up and heartbeats, and SDO responses that nobody waited for any longer: none of an error.
+/// NMT commands, boot-up and heartbeats, and SDO responses after a time-out; no EMCY.
 fn is_service(id: u16) -> bool {
     if id == 0 {
         return true;

@@ -1,7 +1,7 @@
-//! A small lift on one bus: two nodes in personality lift as car position unit and load measuring unit with a panel, and
-//! call controller, drive, doors, light barriers and a display as virtual devices of the host. All of them run the same
-//! CANopen device with dictionaries from the same catalogue. With feature `board` there is a second lift, whose nodes are
-//! emulated boards that run the firmware.
+//! A small lift on one bus. Two nodes in personality lift are the car position unit and the load measuring unit with a
+//! panel. Call controller, drive, doors, light barriers and a display are virtual devices of the host. All of them run
+//! the same CANopen device, with dictionaries from the same catalogue. With feature `board` there is a second lift,
+//! with emulated boards that run the firmware as its nodes.
 
 #[cfg(feature = "board")]
 mod boards;
@@ -14,7 +14,7 @@ mod node;
 mod small_lift;
 #[cfg(feature = "board")]
 #[path = "../board/support.rs"]
-#[allow(dead_code)] // The tests of single boards use the rest of it.
+#[allow(dead_code)] // The tests of single boards use the other functions.
 mod support;
 mod table;
 mod world;
@@ -62,7 +62,7 @@ fn a_small_lift() {
     assert_eq!(lift.network.traffic().errors, 0);
 }
 
-/// With 700 kg in the car it does not leave, though it is called.
+/// With 700 kg in the car it does not leave, although it is called.
 fn too_many_people(lift: &mut SmallLift) {
     lift.load(700.0);
     let signals = u64::from(HALF_LOAD | FULL_LOAD | OVERLOAD);
@@ -74,7 +74,7 @@ fn too_many_people(lift: &mut SmallLift) {
     assert_eq!(lift.position(), u64::from(LANDINGS[0]));
 }
 
-/// One leaves, which takes time: the doors open again.
+/// A person leaves the car slowly: the doors open again.
 fn somebody_in_the_door(lift: &mut SmallLift) {
     lift.load(640.0);
     assert_eq!(lift.last(0x188, 0) & u64::from(OVERLOAD), 0);
@@ -86,7 +86,7 @@ fn somebody_in_the_door(lift: &mut SmallLift) {
     lift.run_until(1000, |lift| lift.doors_are(0.0));
 }
 
-/// Four floors up at full speed, three down.
+/// Drives four floors up at full speed, and three down.
 fn up_and_down(lift: &mut SmallLift) {
     for (landing, position) in [(4, LANDINGS[4]), (1, LANDINGS[1])] {
         lift.run_until(12_000, |lift| !lift.is_lit());
@@ -102,14 +102,14 @@ fn up_and_down(lift: &mut SmallLift) {
     assert_eq!((slowest, fastest), (-FAST, FAST));
 }
 
-/// The actual velocity in a frame that carries it.
+/// The actual velocity, if the frame carries it.
 fn velocity(frame: &Frame) -> Option<i32> {
     let field = by_cob_id(frame.id().into()).filter(|_| frame.id() == 0x183)?.fields().nth(3)?;
     let word = u32::try_from(field.value(frame.data())?).ok()?;
     Some(word.cast_signed())
 }
 
-/// A position on the bus is that of the car when it was measured, to one step, and is at most a millisecond old.
+/// Every position on the bus is that of the car when it was measured, to one step, and at most a millisecond old.
 fn every_position_is_that_of_the_car(lift: &SmallLift) {
     let world = lift.world.borrow();
     let (mut frames, mut worst) = (0, 0.0_f64);
@@ -119,7 +119,7 @@ fn every_position_is_that_of_the_car(lift: &SmallLift) {
         let at = stamped.at.as_micros();
         let count = world.measured.partition_point(|(time, _)| time.0 < at);
         let (measured, car) = world.measured[count - 1];
-        // The car was at 3 m from the end of the tape when the preset made that 10 m.
+        // The preset made 10 m of a position 3 m from the end of the tape.
         let error = position - (car + 7_000.0);
         assert!(error.abs() <= 1.0, "{position} at {at} us, when the car was at {car}");
         assert!(at - measured.0 <= 1000);
@@ -129,10 +129,11 @@ fn every_position_is_that_of_the_car(lift: &SmallLift) {
     assert!(frames > 7_000, "one a millisecond while it drives: {frames}");
 }
 
-/// It has the state of the position unit from that unit's multiplexed PDO, and ignores the rest of them.
+/// The display takes the state of the position unit from that unit's multiplexed PDO, and ignores the unit's other
+/// objects.
 fn the_display_knows_what_concerns_it(lift: &mut SmallLift) {
     assert_eq!(lift.shown(0x2303, 1), 0, "within its limits");
-    // Ten metres a second: a car that is suddenly elsewhere would be a fault of the encoder.
+    // Ten metres a second: a jump of the car would be a fault of the encoder.
     for _ in 0..270 {
         lift.world.borrow_mut().car -= 10.0;
         lift.run(1);
@@ -141,7 +142,7 @@ fn the_display_knows_what_concerns_it(lift: &mut SmallLift) {
     assert_eq!(lift.shown(0x2303, 1), u64::from(UNDERFLOW), "below them");
 }
 
-/// From the call controller, to all nodes.
+/// A multiplexed PDO from the call controller to all nodes lights the lamp.
 fn the_lamp_can_be_lit_by_a_multiplexed_pdo(lift: &mut SmallLift) {
     assert!(!lift.is_lit());
     let lamp = Mpdo {
@@ -154,7 +155,7 @@ fn the_lamp_can_be_lit_by_a_multiplexed_pdo(lift: &mut SmallLift) {
     assert!(lift.is_lit());
 }
 
-/// With the firmware on emulated boards: called with an overload, then up two floors at full speed.
+/// The firmware on emulated boards: a call with an overload, then two floors up at full speed.
 #[cfg(feature = "board")]
 #[test]
 fn a_small_lift_of_boards() {
@@ -193,14 +194,15 @@ fn a_small_lift_of_boards() {
     assert_eq!(velocities.max(), Some(FAST));
 }
 
-/// To one measuring step. At full speed the car is ahead by what it goes between the sample and the end of the frame: that
-/// is less than a sample, and the same each time to one step.
+/// Every position on the bus is one that the car has just had, to one measuring step. At full speed the car is ahead by
+/// its way between the sample and the end of the frame. This way is shorter than that of one sample period, and the
+/// same each time to one step.
 #[cfg(feature = "board")]
 fn every_position_is_one_that_the_car_has_just_had(lift: &boards::Boards) {
     let (mut frames, mut ahead) = (0, vec![]);
     for (at, position) in boards::positions(&lift.log) {
         let before = canopen::Instant(at.0 - boards::OLDEST.0);
-        // The car was at 3 m from the end of the tape when the preset made that 10 m.
+        // The preset made 10 m of a position 3 m from the end of the tape.
         let [oldest, newest] = [before, at].map(|at| lift.car(at) + 7_000.0);
         let (low, high) = (oldest.min(newest) - 1.0, oldest.max(newest) + 1.0);
         assert!((low..=high).contains(&position), "{position} at {at:?}, not {low} to {high}");

@@ -1,4 +1,4 @@
-//! A node in personality lift, and what its sensors read of the world.
+//! A node in personality lift, and the readings of its sensors in the simulated world.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -15,7 +15,7 @@ use crate::world::World;
 /// The node.
 pub(crate) type LiftNode = Station<Sight>;
 
-/// What a node sees of the world.
+/// The sensors of a node, which read the world.
 pub(crate) struct Sight {
     node_id: u8,
     world: Rc<RefCell<World>>,

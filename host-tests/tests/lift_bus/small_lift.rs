@@ -1,4 +1,4 @@
-//! The lift as a whole: its devices on one bus, and its shaft.
+//! The complete lift: its devices on one bus, and its shaft.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -24,7 +24,7 @@ pub(crate) enum Any {
     Virtual(Box<VirtualDevice>),
 }
 
-/// The same call for whichever it is.
+/// Calls the same method of any kind of device.
 macro_rules! either {
     ($self:ident, $unit:ident => $call:expr) => {
         match $self {
@@ -68,19 +68,19 @@ impl Unit for Any {
     }
 }
 
-/// The lift: its bus, its shaft, and all frames.
+/// The lift: its bus, its world, and all frames.
 pub(crate) struct SmallLift {
     pub(crate) network: Network<Any>,
     pub(crate) world: Rc<RefCell<World>>,
     pub(crate) log: Vec<Stamped>,
 }
 
-/// Places of the devices in the network.
+/// Numbers of the devices in the network.
 const LOAD_NODE: usize = 1;
 const DISPLAY_DEVICE: usize = 8;
 
 impl SmallLift {
-    /// A car at the lowest landing with open doors, all devices in Pre-operational.
+    /// A lift with the car at the lowest landing and open doors; all devices are Pre-operational.
     pub(crate) fn new() -> SmallLift {
         let world = World { car: 3_000.0, doors: [WIDTH; 2], ..World::default() };
         let world = Rc::new(RefCell::new(world));
@@ -91,13 +91,13 @@ impl SmallLift {
         SmallLift { network, world, log: vec![] }
     }
 
-    /// Lets time pass and keeps what is on the bus.
+    /// Runs for `millis` milliseconds and keeps the frames on the bus.
     pub(crate) fn run(&mut self, millis: u64) {
         self.network.run(Duration::from_millis(millis));
         self.log.extend(std::iter::from_fn(|| self.network.hear()));
     }
 
-    /// Lets time pass until something is the case.
+    /// Runs until the condition `is_so` holds.
     pub(crate) fn run_until(&mut self, limit: u64, mut is_so: impl FnMut(&mut SmallLift) -> bool) {
         for _ in 0..limit / 10 {
             if is_so(self) {
@@ -125,7 +125,7 @@ impl SmallLift {
         self.run(250);
     }
 
-    /// The last value of an object that a PDO with this identifier carried.
+    /// The last value of an object in a PDO with this identifier.
     pub(crate) fn last(&self, id: u32, object: usize) -> u64 {
         last(&self.log, id, object)
     }
@@ -138,7 +138,7 @@ impl SmallLift {
         matches!(&self.network.stations[LOAD_NODE].unit, Any::Node(node) if node.protocol.outputs().digital[0])
     }
 
-    /// A value that the display has.
+    /// A value in the display.
     pub(crate) fn shown(&mut self, index: u16, sub: u8) -> u64 {
         match &mut self.network.stations[DISPLAY_DEVICE].unit {
             Any::Virtual(display) => display.value(index, sub),
@@ -163,7 +163,7 @@ impl Site for SmallLift {
     }
 }
 
-/// The devices that the test has made itself.
+/// The virtual devices of the test.
 pub(crate) fn virtual_devices(world: &Rc<RefCell<World>>) -> [VirtualDevice; 7] {
     let [door_1, door_2] = DOORS;
     let [barrier_1, barrier_2] = BARRIERS;

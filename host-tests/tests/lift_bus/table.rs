@@ -1,5 +1,5 @@
-//! The dictionaries of all devices of the small lift: a device has the PDOs that it produces and consumes and the objects
-//! that they map, as the catalogue says.
+//! The dictionaries of all devices of the small lift: the PDOs that a device produces and consumes, and their mapped
+//! objects, as in the catalogue.
 
 use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Type};
 use profiles::lift::objects::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, tpdo_mapping};
@@ -27,12 +27,12 @@ const fn array(index: u16, highest: u8) -> Object {
     Object::highest(index, highest, "")
 }
 
-/// What the device produces.
+/// An object that the device produces.
 const fn out(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadOnly).mappable(Mapping::Tpdo)
 }
 
-/// What it consumes.
+/// An object that the device consumes.
 const fn take(index: u16, sub: u8, kind: Type) -> Object {
     Object::new(index, sub, "", kind, Access::ReadWrite).mappable(Mapping::Rpdo)
 }
@@ -129,7 +129,7 @@ dictionary!(
     ]
 );
 
-/// A door unit: it knows all four control words, as they come in one PDO.
+/// A door unit, with all four control words, because they come in one PDO.
 macro_rules! door {
     ($name:ident, $number:literal, $pdo:literal) => {
         dictionary!(
@@ -174,7 +174,7 @@ macro_rules! barrier {
 barrier!(BARRIER_1, 1, 268);
 barrier!(BARRIER_2, 2, 270);
 
-// Shows the state of the position unit, which it hears of by that unit's multiplexed PDO, and sends its own.
+// Shows the state of the position unit, which it receives by the unit's multiplexed PDO, and sends its own state.
 dictionary!(
     DISPLAY_UNIT,
     &[
@@ -186,7 +186,7 @@ dictionary!(
         &[
             array(0x2303, 1),
             take(0x2303, 1, Type::Unsigned8),
-            // Of another maker: nobody else on the bus has it.
+            // A manufacturer-specific object, which no other device has.
             out(0x5000, 0, Type::Unsigned16),
         ],
     ]

@@ -1,5 +1,5 @@
-//! How far the oscillators of two boards may be apart at each bit rate: by the formulas for oscillator tolerance, and by trying on the bus.
-//! The table is in docs/board.md; `UPDATE_TABLE=1` writes it anew.
+//! Oscillator tolerance between two boards at each bit rate: computed with the formulas, and tried on the bus. The
+//! table is in docs/board.md; `UPDATE_TABLE=1` writes the table.
 
 use std::path::Path;
 
@@ -9,10 +9,10 @@ use canbus::{BitTiming, Bus, Controller, Event, Fault, Frame, HostNode, Position
 const BIT_RATES: [u16; 8] = [1000, 800, 500, 250, 125, 50, 20, 10];
 /// Frames in each direction; every tenth is disturbed.
 const FRAMES: u16 = 60;
-/// Of a quantum: a millionth of it is one part per million.
+/// Units of a quantum: one unit is one part per million.
 const QUANTUM: u64 = 1_000_000;
 
-/// Segments and jump width as the register of the controller has them.
+/// Segments and jump width in quanta.
 #[derive(Clone, Copy, Debug)]
 struct Segments {
     first: u64,
@@ -21,7 +21,7 @@ struct Segments {
 }
 
 impl Segments {
-    /// Those of the firmware at a bit rate (RM0390, CAN_BTR).
+    /// The segments of the firmware at a bit rate (RM0390, CAN_BTR).
     fn of(kbit: u16) -> Segments {
         let btr = u64::from(Node::of(kbit).expect("a bit rate of CiA 301").btr());
         Segments { first: (btr >> 16 & 15) + 1, second: (btr >> 20 & 7) + 1, jump: (btr >> 24 & 3) + 1 }
@@ -35,8 +35,8 @@ impl Segments {
         1000 * (1 + self.first) / self.quanta()
     }
 
-    /// What each of two oscillators may be off, in ppm: a bit of ten without an edge, and thirteen behind an error flag
-    /// (F. Hartwich, A. Bassemir: The Configuration of the CAN Bit Timing, 1999).
+    /// The tolerance of each oscillator in ppm: ten bits without an edge, and thirteen bits after an error flag (F.
+    /// Hartwich, A. Bassemir: The Configuration of the CAN Bit Timing, 1999).
     fn tolerance(self) -> u64 {
         let ten_bits = 1_000_000 * self.jump / (20 * self.quanta());
         let thirteen_bits =
@@ -44,7 +44,7 @@ impl Segments {
         ten_bits.min(thirteen_bits)
     }
 
-    /// The timing with an oscillator that is so many ppm slow.
+    /// The timing with an oscillator that is slow by `ppm`.
     fn slow_by(self, ppm: i64) -> BitTiming {
         let quantum = QUANTUM.checked_add_signed(ppm).expect("less than a quantum");
         let part = |quanta: u64| u8::try_from(quanta).expect("at most 16");
@@ -52,14 +52,15 @@ impl Segments {
     }
 }
 
-/// Long runs of equal bits, short ones, and none.
+/// Frames with long and short runs of equal bits.
 fn frame(number: u16) -> Frame {
     let bytes = [[0x00; 8], [0xFF; 8], [0x55; 8], [0x0F; 8], [0xF8; 8], [0x83; 8]];
     let id = StandardId::new(number * 37 % 0x800).expect("eleven bits");
     Frame::data(id, &bytes[usize::from(number) % bytes.len()]).expect("eight bytes")
 }
 
-/// Whether two nodes, one of them `ppm` off, understand all that either says, but for the frames that are disturbed on purpose.
+/// Whether two nodes, one of them `ppm` off, receive all frames of each other without errors other than the injected
+/// ones.
 fn understand_each_other(segments: Segments, ppm: i64) -> bool {
     let (exact, off) = (segments.slow_by(0), segments.slow_by(ppm));
     let mut nodes =
@@ -83,7 +84,7 @@ fn understand_each_other(segments: Segments, ppm: i64) -> bool {
     errors == FRAMES / 5 && received == usize::from(2 * FRAMES)
 }
 
-/// The most that the two may be apart in either direction, in ppm, to within 10.
+/// The greatest difference that works in both directions, in ppm, to within 10.
 fn measured(segments: Segments) -> i64 {
     let most = |sign: i64| {
         let (mut good, mut bad) = (0, 40_000);
@@ -127,7 +128,8 @@ fn the_table_of_bit_timings_is_what_the_bus_shows() {
     assert!(page == wanted, "docs/board.md is out of date: UPDATE_TABLE=1 writes\n{table}");
 }
 
-/// Ten times what two crystals of 50 ppm are apart is left at every bit rate, and the formulas promise no more than the bus shows.
+/// Each oscillator may have ten times the error of a crystal of 50 ppm at every bit rate, and the measured tolerance is
+/// not below the computed one.
 #[test]
 fn every_bit_rate_bears_ten_times_the_error_of_a_crystal() {
     for kbit in BIT_RATES {
@@ -141,7 +143,7 @@ fn every_bit_rate_bears_ten_times_the_error_of_a_crystal() {
     }
 }
 
-/// The same segments without room behind the sample point, and with the sample point too early, are noticed.
+/// A smaller jump width tolerates a smaller difference, and 1.5 % is too much at 1 Mbit/s.
 #[test]
 fn a_bit_with_a_short_second_segment_bears_less() {
     let [wide, narrow] = [2, 1].map(|jump| measured(Segments { first: 10, second: 5, jump }));

@@ -1,4 +1,4 @@
-//! The calibration of a transmitter by SDO: locked, checked, at work from the next sample on, and kept by itself.
+//! The calibration of a transmitter by SDO: locked, checked, in force from the next sample on, and stored.
 
 use host_tests::bench::{Bench, raw};
 use node::Personality;
@@ -86,7 +86,7 @@ fn what_is_no_calibration_is_refused_and_leaves_the_old_one() {
         assert_eq!(write_real(&mut bench, index, sub, value), Err(PARAMETER), "{index:X}h:{sub} {value}");
         assert_eq!(bench.read(index, sub), before);
     }
-    // As for every REAL32.
+    // NaN and infinity are invalid for every REAL32.
     assert_eq!(write_real(&mut bench, 0x2200, 6, f32::NAN), Err(INVALID_VALUE));
     assert_eq!(write_real(&mut bench, 0x2201, 3, f32::INFINITY), Err(INVALID_VALUE));
     assert_eq!(bench.write(0x2201, 1, &[2]), Err(TOO_HIGH));
@@ -96,14 +96,14 @@ fn what_is_no_calibration_is_refused_and_leaves_the_old_one() {
 #[test]
 fn a_calibration_acts_from_the_next_sample_on() {
     let mut bench = unlocked(Personality::Pressure);
-    // 10 % to 90 % are now -1 to 24 bar, and the span shrinks by 0.05 % a kelvin from 25 degC on.
+    // 10 % to 90 % are now -1 to 24 bar, and the span decreases by 0.05 % per kelvin from 25 degC on.
     for (sub, value) in [(1, -100_000.0), (2, 2_400_000.0), (7, -4e-4)] {
         write_real(&mut bench, 0x2200, sub, value).unwrap();
     }
     for (kelvin, shrunk) in [(298.15, 1.0_f32), (338.15, 0.98), (278.15, 1.01)] {
         let expected = -100_000.0 + 2_500_000.0 * 0.5 / shrunk;
         let got = measured(&mut bench, &raw(500_000.0, kelvin), 1);
-        // A step of the temperature is 19 mK, one of the pressure 49 Pa.
+        // A step is 19 mK of the temperature, and 49 Pa of the pressure.
         assert!(is_close(got, expected, 60.0), "{got} for {expected} at {kelvin} K");
     }
     write_real(&mut bench, 0x2201, 3, -1.5).unwrap();
@@ -116,7 +116,7 @@ fn a_parameter_selects_the_thermistor() {
     let warm = RawSample { thermistor: 16 * 1024, ..raw(0.0, 250.0) };
     assert!(is_close(measured(&mut bench, &warm, 2), 250.0, 0.02));
     bench.write(0x2201, 1, &[1]).unwrap();
-    // A quarter of the supply: a third of 10 kohm, with beta 3950 K at 1/(1/298.15 - ln 3 / 3950) K.
+    // A quarter of the supply means a third of 10 kohm, which with beta 3950 K is 1/(1/298.15 - ln 3 / 3950) K.
     assert!(is_close(measured(&mut bench, &warm, 2), 325.109, 0.001), "{}", real(&mut bench, 0x6100, 2));
     for thermistor in [0, 16 * 30, 16 * 4070, 16 * 4095] {
         let broken = RawSample { thermistor, ..warm };

@@ -1,4 +1,4 @@
-//! The measurement chain against golden values that golden/cia404_chain.py has computed in decimal arithmetic.
+//! The measurement chain compared with golden values, which golden/cia404_chain.py has computed in decimal arithmetic.
 
 use profiles::pressure::{Channel, ChannelParameters, Filter, STATUS_INVALID, Span, Unit};
 
@@ -45,7 +45,7 @@ fn filters() {
         let mut filter = Filter::new(number(cells[0]), number(cells[1]));
         for (input, output) in cells[2].split(' ').zip(cells[3].split(' ')) {
             let (got, expected): (f32, f64) = (filter.next(number(input)), number(output));
-            // Rounded once, from a state in double precision.
+            // The result is rounded once, from a state in double precision.
             let error = (f64::from(got) - expected).abs();
             assert!(error <= expected.abs() * f64::from(f32::EPSILON) / 2.0 * 1.001, "{line}: {got}");
         }

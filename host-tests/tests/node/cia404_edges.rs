@@ -1,5 +1,5 @@
-//! Filters, units, digit shifts and status against golden values that golden/cia404_edges.py has computed in decimal
-//! arithmetic.
+//! Filters, units, digit shifts and status compared with golden values, which golden/cia404_edges.py has computed in
+//! decimal arithmetic.
 
 use profiles::pressure::{Channel, ChannelParameters, ChannelValues, Filter, Span, Unit};
 
@@ -14,7 +14,7 @@ fn number<T: std::str::FromStr<Err: std::fmt::Debug>>(text: &str) -> T {
     text.parse().unwrap()
 }
 
-/// The rows of a table in cells.
+/// The rows of a table, split into cells.
 fn rows<const N: usize>(table: &'static str) -> impl Iterator<Item = [&'static str; N]> {
     let cells = |line: &'static str| line.split(',').collect::<Vec<_>>().try_into().unwrap();
     table.lines().skip(1).map(cells)
@@ -47,7 +47,7 @@ fn filters_answer_a_step_and_an_impulse_until_they_have_settled() {
         for [.., sample, expected] in response {
             let (_, got) = outputs.find(|(at, _)| *at == number::<usize>(sample)).unwrap();
             let expected: f64 = number(expected);
-            // Rounded once, from a state in double precision.
+            // The result is rounded once, from a state in double precision.
             let error = (f64::from(got) - expected).abs();
             let tolerance = expected.abs() * f64::from(f32::EPSILON) / 2.0 * 1.001;
             assert!(error <= tolerance, "{kind} {constant} {stimulus} {sample}: {got} for {expected}");

@@ -1,4 +1,4 @@
-//! The encoder against golden values that golden/cia406_chain.py has computed on integers without bounds.
+//! The encoder compared with golden values, which golden/cia406_chain.py has computed with unbounded integers.
 
 use profiles::board::{RawEncoder, SsiFrame};
 use profiles::profile::Chain;
@@ -87,7 +87,7 @@ fn positions() {
     }
 }
 
-/// After a second the speed is right to 1 % or to the unit.
+/// After a second the speed is right to 1 % or to one unit.
 #[test]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn speeds() {

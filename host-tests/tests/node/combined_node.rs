@@ -16,7 +16,7 @@ fn measure(bench: &mut Bench) {
     bench.sample(&raw(250_000.0, 298.15));
 }
 
-/// What was sent, by the number of the TPDO.
+/// The sent TPDOs by number.
 fn sent(bench: &mut Bench) -> Vec<(u16, Vec<u8>)> {
     let own = u16::from(ID);
     bench.take().into_iter().map(|(id, data)| ((id - own - 0x80) >> 8, data)).collect()
@@ -38,14 +38,14 @@ fn each_device_sends_its_values_by_event_and_with_sync() {
 #[test]
 fn the_parameters_of_each_device_act_on_its_own_values() {
     let mut bench = booted();
-    // kPa, one decimal digit; the other direction.
+    // Unit kPa with one decimal digit, and the opposite counting direction.
     bench.write(0x6931, 1, &0x0322_0000_u32.to_le_bytes()).unwrap();
     bench.write(0x6932, 1, &[1]).unwrap();
     bench.write(0x6000, 0, &[1, 0]).unwrap();
     measure(&mut bench);
     let kilopascal = i32::from_le_bytes(bench.read(0x9930, 1).unwrap().try_into().unwrap());
     assert!((kilopascal - 2500).abs() <= 1, "{kilopascal}");
-    // Counted the other way, the first step is the last one.
+    // In the opposite direction the first step has the highest position.
     assert_eq!(bench.read(0x6004, 0), Ok((4096_u32 * 4096 - 1 - 300).to_le_bytes().to_vec()));
     assert_eq!(bench.write(0x6925, 1, b"zero"), Ok(()));
     measure(&mut bench);
@@ -71,7 +71,7 @@ fn a_broken_sensor_of_each_device_has_its_own_flag() {
     broken.pressure = 100;
     bench.sample(&broken);
     assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 5, 0, 0, 0]));
-    // An SSI encoder of which nothing is read.
+    // An SSI encoder without readings.
     bench.write(0x2100, 1, &[2]).unwrap();
     (0..5).for_each(|_| bench.sample(&broken));
     assert_eq!(bench.read(0x3000, 1), Ok(vec![1 << 5, 1, 0, 0]));

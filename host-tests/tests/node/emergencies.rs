@@ -1,5 +1,6 @@
-//! Every row of tables/emcy.csv on the running node: the fault, its EMCY message, 1003h, 1001h and its flag in 3000h. The
-//! node is the combined one, which has them all. Codes without a fault are never sent; the table says why.
+//! Every row of tables/emcy.csv on the running node: the fault, its EMCY message, 1003h, 1001h and its flag in 3000h.
+//! The node is the combined one, which has all faults. Codes without a fault are never sent; the table gives the
+//! reason.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +11,7 @@ use node::{BusEvent, FAULTS, Fault, Personality};
 use profiles::board::{Board, RawSample};
 
 const TABLE: &str = include_str!("../../tables/emcy.csv");
-/// A number of mapped objects that makes it a multiplexed PDO with a destination.
+/// The number of mapped objects that selects a multiplexed PDO with a destination.
 const MULTIPLEXED: u8 = 255;
 const EMCY: u16 = 0x080 + ID as u16;
 
@@ -33,7 +34,7 @@ fn rows() -> impl Iterator<Item = Row> {
     })
 }
 
-/// A fault of the node or of communication, by the name that the table has for it.
+/// A fault of the node or of communication, by its name in the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Any {
     Node(Fault),
@@ -93,7 +94,7 @@ fn intact() -> RawSample {
     raw(100_000.0, 298.15)
 }
 
-/// A node that measures with everything in order.
+/// A measuring node without faults.
 fn measuring() -> Bench {
     let mut bench = Bench::booted_as(Personality::Combined);
     bench.encoder.board = Board { supply: Some(5000), current: Some(100), ..Board::default() };
@@ -103,7 +104,7 @@ fn measuring() -> Bench {
     bench
 }
 
-/// Brings the fault about from outside, where the bench has the means; otherwise as the firmware does that has found it.
+/// Causes the fault from outside, if the bench can; otherwise reports it like the firmware.
 fn provoke(bench: &mut Bench, fault: Any) {
     match fault {
         Any::Node(fault) => provoke_in_node(bench, fault),
@@ -118,7 +119,7 @@ fn provoke_in_node(bench: &mut Bench, fault: Fault) {
         "PressureRail" => sample.pressure = 0,
         "TemperatureRail" => sample.temperature = 0,
         "EncoderBreak" => bench.write(0x2100, 1, &[2]).unwrap(),
-        // Further in a millisecond than any encoder can turn.
+        // More counts in a millisecond than any encoder can make.
         "EncoderPosition" => bench.encoder.counter = 20_000,
         "InputCurrent" => bench.encoder.board.current = Some(1000),
         "InputVoltage" => bench.encoder.board.supply = Some(0),
@@ -165,7 +166,7 @@ fn provoke_on_bus(bench: &mut Bench, fault: canopen::Fault) {
     (0..1000).for_each(|_| bench.sample(&intact()));
 }
 
-/// Stores a group with a value that it has not had.
+/// Stores a group with a new value.
 fn store(bench: &mut Bench, group: Group, value: u8) {
     let (index, sub) = match group {
         Group::Communication => {
@@ -185,8 +186,8 @@ fn store(bench: &mut Bench, group: Group, value: u8) {
     bench.write(index, sub, b"save").unwrap();
 }
 
-/// Stores a group, and starts with one bit of it changed. The first save of all says something of every group, so it is one of
-/// another group.
+/// Stores a group, and starts with one bit of the record changed. The very first save writes records of all groups, so
+/// another group is saved before.
 fn lose_stored(bench: &mut Bench, group: Group) {
     store(bench, if group == Group::Application { Group::Communication } else { Group::Application }, 3);
     store(bench, group, 7);
@@ -195,7 +196,7 @@ fn lose_stored(bench: &mut Bench, group: Group) {
     (0..20).for_each(|_| bench.sample(&intact()));
 }
 
-/// RPDO 1 with this many objects, the first of them a byte that nobody takes (CiA 301, 7.4.7.1), and its data.
+/// Sends RPDO 1 with `objects` mapped objects, the first of which is a dummy byte (CiA 301, 7.4.7.1), and this data.
 fn receive_pdo(bench: &mut Bench, objects: u8, data: &[u8]) {
     let id = 0x200 + u16::from(ID);
     bench.write(0x1600, 1, &0x0005_0008_u32.to_le_bytes()).unwrap();
@@ -204,7 +205,7 @@ fn receive_pdo(bench: &mut Bench, objects: u8, data: &[u8]) {
     bench.receive(&Frame::new(id, data).unwrap());
 }
 
-/// EMCY messages sent since the last look.
+/// EMCY messages sent since the last call.
 fn emergencies(bench: &mut Bench) -> Vec<[u8; 8]> {
     let messages = bench.take().into_iter().filter(|(id, _)| *id == EMCY);
     messages.map(|(_, data)| data.try_into().unwrap()).collect()

@@ -1,5 +1,5 @@
-//! The encoder node as a whole: from what the timer counts to frames, commands and parameters back into the chain, faults,
-//! and what a loss of power leaves.
+//! The complete encoder node: from the count of the timer to frames, the effect of commands and parameters, faults, and
+//! the state after a loss of power.
 
 use canopen::Frame;
 use host_tests::bench::{Bench, ID, raw};
@@ -10,7 +10,7 @@ const TPDO1: u16 = 0x180 + ID as u16;
 const TPDO2: u16 = 0x280 + ID as u16;
 const EMCY: u16 = 0x080 + ID as u16;
 
-/// Its shaft goes in leaps, as 2104h allows.
+/// A node that allows jumps of the shaft, by 2104h.
 fn booted() -> Bench {
     let mut bench = Bench::booted_as(Personality::Encoder);
     bench.write(0x2104, 1, &[0; 4]).unwrap();
@@ -25,7 +25,7 @@ fn operational() -> Bench {
     bench
 }
 
-/// A millisecond later the timer stands at `counter`.
+/// Passes a millisecond, with the timer at `counter`.
 fn turn_to(bench: &mut Bench, counter: u16) {
     bench.encoder.counter = counter;
     bench.sample(&raw(0.0, 298.15));
@@ -42,13 +42,13 @@ fn number(bench: &mut Bench, index: u16, sub: u8) -> u32 {
     u32::from_le_bytes(bytes.try_into().unwrap())
 }
 
-/// The positions that this TPDO has sent since the last look.
+/// The positions in this TPDO since the last call.
 fn positions(bench: &mut Bench, id: u16) -> Vec<u32> {
     let frames = bench.take().into_iter().filter(|(sent, _)| *sent == id);
     frames.map(|(_, data)| u32::from_le_bytes(data.try_into().unwrap())).collect()
 }
 
-/// EMCY messages sent since the last look, as code, error register and the first byte of the detail.
+/// EMCY messages sent since the last call, as code, error register and the first byte of the detail.
 fn emergencies(bench: &mut Bench) -> Vec<(u16, u8, u8)> {
     let messages = bench.take().into_iter().filter(|(id, _)| *id == EMCY);
     messages.map(|(_, data)| (u16::from_le_bytes([data[0], data[1]]), data[2], data[3])).collect()
@@ -89,7 +89,7 @@ fn a_node_that_starts_by_itself_sends_no_position_that_it_has_not_measured() {
 #[test]
 fn a_shaft_that_turns_is_seen_in_the_same_millisecond_in_both_directions() {
     let mut bench = operational();
-    // Sent with every change.
+    // The TPDO is sent with every change.
     bench.write(0x1800, 2, &[255]).unwrap();
     bench.take();
     let revolution = 4096 * 4096;
@@ -119,7 +119,7 @@ fn the_cyclic_timer_is_the_event_timer_in_both_directions() {
     turn_to(&mut bench, 0);
     bench.nmt(1);
     bench.take();
-    // The timer alone sends: 1 of 10 changes.
+    // Only the timer sends: 1 of 10 changes.
     (1..=30).for_each(|counter| turn_to(&mut bench, counter));
     assert_eq!(positions(&mut bench, TPDO1), [10, 20, 30]);
     bench.write(0x1800, 5, &5_u16.to_le_bytes()).unwrap();
@@ -152,10 +152,11 @@ fn a_preset_is_the_next_position_and_outlives_a_loss_of_power() {
     wait(&mut bench, 1);
     assert_eq!(positions(&mut bench, TPDO1), [77]);
     assert_eq!(number(&mut bench, 0x6509, 0).cast_signed(), 77 - 1000);
-    // The bench stores a preset before the sample that finds its offset; the board tests have the order of the firmware.
+    // The bench stores a preset before the sample that computes its offset; on the board the order is that of the
+    // firmware.
     bench.write(0x1010, 3, b"save").unwrap();
     turn_to(&mut bench, 1001);
-    // The shaft stands still while there is no power, and the timer begins at 0 again.
+    // The shaft stands still while the power is off, and the timer starts at 0 again.
     let mut bench = bench.power_cycled();
     turn_to(&mut bench, 0);
     turn_to(&mut bench, 2);
@@ -176,7 +177,7 @@ fn scaling_is_saved_and_acts_after_a_loss_of_power() {
     assert_eq!(number(&mut bench, 0x6500, 0), 6);
 }
 
-/// The defaults are one incremental encoder.
+/// The default is one incremental encoder.
 #[test]
 fn the_device_type_and_the_mapping_follow_the_sensors_at_the_next_reset() {
     let mut bench = booted();

@@ -1,4 +1,4 @@
-//! As many nodes as CANopen allows on one bus: found and numbered by LSS, started together, then all of them sending.
+//! The maximum number of nodes on one bus: found and numbered by LSS, started together, all sending.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ use node::{Measurement, Personality, Protocol, StoreJob};
 use product::{REVISION, VENDOR_ID};
 
 const NODES: u8 = 127;
-/// Event timer of TPDO 1, in ms: 127 frames of eight bytes fill some 16 of them.
+/// Event timer of TPDO 1, in ms: 127 frames of eight bytes take some 16 ms.
 const PERIOD: u16 = 20;
 const SECONDS: u64 = 2;
 
-/// Serial numbers that have nothing to do with the node-IDs.
+/// Serial numbers without a relation to the node-IDs.
 fn serial_number(number: u8) -> u32 {
     u32::from(number).wrapping_mul(0x9E37_79B1)
 }
@@ -38,7 +38,7 @@ fn unconfigured() -> Network<PressureNode> {
     network
 }
 
-/// Finds the nodes one by one. Each boots with the next free node-ID; gives their serial numbers in this order.
+/// Finds the nodes one by one; each boots with the next free node-ID. Returns the serial numbers in this order.
 fn number_all(network: &mut Network<PressureNode>) -> Vec<u32> {
     let mut serial_numbers = vec![];
     while let Some(identity) = Master::new(network).fastscan() {
@@ -65,7 +65,7 @@ fn read_serial(network: &mut Network<PressureNode>, node_id: u8) -> u32 {
     u32::from_le_bytes(bytes.try_into().unwrap())
 }
 
-/// Everything that the master has heard, by identifier.
+/// All frames that the master has received, by identifier.
 fn hear_all(network: &mut Network<PressureNode>) -> BTreeMap<u16, Vec<Vec<u8>>> {
     let mut heard = BTreeMap::<u16, Vec<Vec<u8>>>::new();
     while let Some(stamped) = network.hear() {
@@ -109,7 +109,7 @@ fn a_full_bus() {
 
     let periods = SECONDS * 1000 / u64::from(PERIOD);
     for (node_id, serial) in (1..=u16::from(NODES)).zip(serial_numbers.iter()) {
-        // The first one at the start, the last one perhaps behind those of the nodes with lower identifiers.
+        // The first TPDO is sent at the start; the last one may still wait for nodes with lower identifiers.
         let tpdos = &heard[&(0x180 + node_id)];
         assert!((periods..=periods + 1).contains(&(tpdos.len() as u64)), "{node_id}: {}", tpdos.len());
         let number = (1..=NODES).find(|&number| serial_number(number) == *serial).unwrap();
@@ -117,7 +117,7 @@ fn a_full_bus() {
         assert!((f64::from(bar) - pascal(number) / 1.0e5).abs() < 1e-3, "{node_id}: {bar}");
         let heartbeats = &heard[&(0x700 + node_id)];
         assert!(SECONDS.abs_diff(heartbeats.len() as u64) <= 1, "their phase comes from the boot-up");
-        // The first one may have been waiting for the bus when the start came.
+        // The first heartbeat may have waited for the bus when the start command came.
         assert!(heartbeats.iter().skip(1).all(|data| data == &[5]));
     }
     assert_eq!(heard.len(), 2 * usize::from(NODES), "nothing but TPDOs and heartbeats: no EMCY");
@@ -128,8 +128,8 @@ fn a_full_bus() {
     assert_eq!(found, expected);
 }
 
-/// Every station has heard every frame of the others, and no frame had to be sent twice. Equal frames of several nodes
-/// at the same instant (answers to the master of LSS) are one on the bus.
+/// Checks that every station has received every frame of the others, and that no frame was sent twice. Equal frames of
+/// several nodes at the same instant (answers to the LSS master) are one frame on the bus.
 fn assert_no_frame_is_lost(network: &Network<PressureNode>) {
     let traffic = network.traffic();
     assert_eq!(traffic.errors, 0);

@@ -1,6 +1,6 @@
-//! Calls under load: two panels with two buttons each, random presses, a bus that is full of more urgent frames for
-//! seconds, an inhibit time, and bus-off in between. Every transition of a button reaches the bus once and in its order, or is
-//! covered by a full state that is sent after it.
+//! Calls under load: two panels with two buttons each, random presses, an inhibit time, a bus that more urgent frames
+//! occupy for seconds, and bus-off in between. Every transition of a button reaches the bus once and in order, or is
+//! covered by a later full state.
 
 use bsp::transmit_queue::{Mailboxes, Offer, TransmitQueue};
 use canopen::{Duration, Frame, Instant};
@@ -14,13 +14,13 @@ use profiles::lift::devices::Devices;
 
 const MS: Duration = Duration::from_millis(1);
 const INPUT: u16 = 0x480 + ID as u16;
-/// Presses of each button; there are four.
+/// Number of presses of each of the four buttons.
 const PRESSES: usize = 2500;
 
-/// Milliseconds between two changes of a button, on average: mostly as people press, sometimes as children play.
+/// Mean milliseconds between two changes of a button: mostly as by adults, sometimes as by playing children.
 const PACES: [u32; 6] = [60, 800, 1500, 3000, 3000, 3000];
 
-/// Three mailboxes that behave as those of bxCAN under the driver.
+/// Three mailboxes that behave like those of bxCAN with the driver.
 #[derive(Default)]
 struct Boxes(Vec<Frame>);
 
@@ -38,20 +38,20 @@ impl Mailboxes for Boxes {
     }
 }
 
-/// What the bus does for a while.
+/// A phase of the bus.
 #[derive(Clone, Copy, PartialEq)]
 enum Phase {
-    /// It leaves room.
+    /// The bus leaves room for the node's frames.
     Open,
-    /// More urgent frames leave room for one frame in so many milliseconds.
+    /// More urgent frames leave room for one frame in this number of milliseconds.
     Crowded(u64),
-    /// They leave none.
+    /// More urgent frames leave no room.
     Full,
     /// The node is off the bus.
     Off,
 }
 
-/// A panel with its queue.
+/// A panel with its transmit queue.
 struct Panel {
     protocol: Protocol,
     measurement: Measurement,
@@ -64,7 +64,7 @@ struct Panel {
 }
 
 impl Panel {
-    /// An input panel unit whose inhibit time is 200 ms.
+    /// An input panel unit with an inhibit time of 200 ms.
     fn new() -> Panel {
         let mut bench = Bench::booted_as(Personality::Lift);
         bench.write(0x2305, 0, &[Devices::INPUT_PANEL.0]).unwrap();
@@ -90,7 +90,7 @@ impl Panel {
         self.happened.push(Transition { at: self.now.0, button, is_pressed: self.pressed[button] });
     }
 
-    /// A millisecond of the node and of the bus.
+    /// Advances node and bus by a millisecond.
     fn pass(&mut self, phase: Phase) {
         self.now = self.now + MS;
         let (analogue, position) = (raw(0.0, 298.15), RawEncoder::default());
@@ -109,14 +109,14 @@ impl Panel {
         }
     }
 
-    /// What a frame says of a button.
+    /// The state of a button in a frame.
     fn word(&self, frame: &Frame) -> Option<Transition> {
         let [5, button, 1, 0, 1, state] = *frame.data() else { return None };
         let (button, is_pressed) = (usize::from(button) - 1, state == 1);
         (frame.id() == INPUT).then_some(Transition { at: self.now.0, button, is_pressed })
     }
 
-    /// Runs until each button was pressed so often. Returns the number of starts.
+    /// Runs until each button was pressed `presses` times. Returns the number of starts.
     fn run(&mut self, presses: usize, rng: &mut Rng, phase: impl Fn(&mut Rng) -> Phase) -> usize {
         let (mut starts, mut now, mut left) = (1, Phase::Open, 0_u32);
         let mut quiet = [0_u32; 2];
@@ -131,7 +131,7 @@ impl Panel {
             left -= 1;
             for (button, quiet) in quiet.iter_mut().enumerate() {
                 *quiet = quiet.saturating_sub(1);
-                // A contact is believed after 10 ms.
+                // The node accepts a contact after 10 ms without a change.
                 if *quiet == 0 && rng.u32(..pace) == 0 {
                     self.push(button);
                     *quiet = 10;
@@ -144,7 +144,7 @@ impl Panel {
         starts
     }
 
-    /// The bus changes: 1 if the node had to be started again.
+    /// Changes the phase of the bus; returns 1 if the node had to be started again.
     fn change(&mut self, before: Phase, now: Phase) -> usize {
         let was_off = before == Phase::Off && now != Phase::Off;
         if now == Phase::Off && before != Phase::Off {
@@ -157,7 +157,7 @@ impl Panel {
         usize::from(was_off)
     }
 
-    /// A word waits for the bus as long as the bus is full.
+    /// Checks the log with a long lag, because a word may wait as long as the bus is full.
     fn verdict(&self) -> Verdict {
         verify(&self.happened, &self.log, 60_000_000).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -181,7 +181,7 @@ fn every_press_reaches_a_full_bus_or_is_covered_by_a_full_state() {
     }
 }
 
-/// Where the queue is long enough, every transition is told on its own: the only full state is that of the start.
+/// While the queue is long enough, every transition is reported individually: the only full state is that of the start.
 #[test]
 fn presses_that_the_queue_can_hold_are_all_told() {
     let (mut panel, mut rng) = (Panel::new(), Rng::with_seed(3));

@@ -1,5 +1,5 @@
-//! The catalogue of pre-defined lift PDOs against its table, both ways. The table lists each of the 290 PDOs of
-//! CiA 417-3-1 in the corrected reading.
+//! The catalogue of pre-defined lift PDOs compared with its table, in both directions. The table lists each of the 290
+//! PDOs of CiA 417-3-1 in the corrected reading.
 
 use std::collections::BTreeSet;
 

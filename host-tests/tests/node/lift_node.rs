@@ -1,4 +1,4 @@
-//! The node in personality lift, by what it says on the bus.
+//! The node in personality lift: its behaviour on the bus.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +20,7 @@ fn lift() -> Bench {
     Bench::booted_as(Personality::Lift)
 }
 
-/// In Operational as all virtual devices, with a first sample and nothing left of what it has sent on the way.
+/// An operational node as all virtual devices, after its first sample; the frames sent so far are dropped.
 fn operational() -> Bench {
     let mut bench = lift();
     bench.write(0x2305, 0, &[Devices::ALL.0]).unwrap();
@@ -31,7 +31,7 @@ fn operational() -> Bench {
     bench
 }
 
-/// 0 kg by the default calibration.
+/// The reading of 0 kg with the default calibration.
 fn empty_car() -> RawSample {
     raw(0.0, 298.15)
 }
@@ -47,7 +47,8 @@ fn position(bench: &mut Bench, counter: u16) -> Vec<(u16, Vec<u8>)> {
     bench.take().into_iter().filter(|(id, _)| *id == 0x18C).collect()
 }
 
-/// All 290 rows. What the node has of them is as the table says; what it has not is not there under another number either.
+/// All 290 rows. A PDO of the node is as in the table; a PDO that the node lacks does not exist under another number
+/// either.
 #[test]
 fn every_pdo_of_the_table_is_in_the_node_or_is_not_there() {
     let mut bench = lift();
@@ -71,7 +72,7 @@ fn every_pdo_of_the_table_is_in_the_node_or_is_not_there() {
     assert_eq!(count, 7 + 8);
 }
 
-/// The profile's CAN-IDs lie inside the pre-defined connection set of CiA 301, so the node has nothing of that set.
+/// The profile's CAN-IDs lie within the pre-defined connection set of CiA 301, so the node has no PDO of that set.
 #[test]
 fn there_is_no_other_pdo() {
     let known: BTreeSet<u16> = pdos().flat_map(|pdo| [pdo.communication, pdo.mapping]).collect();
@@ -92,8 +93,8 @@ fn can_ids_do_not_change_but_flags_do() {
     }
 }
 
-/// Each of them in its TPDO, and what is in none in a multiplexed one. A TPDO that is off keeps what is its, and a unit that
-/// is not there has nothing to send.
+/// Each mapped object is sent in its TPDO, and an object without a TPDO in a multiplexed PDO. The objects of a disabled
+/// TPDO are not sent, and neither are those of a unit that the node is not.
 #[test]
 fn every_object_that_can_be_mapped_is_sent_on_entering_operational() {
     let mut bench = lift();
@@ -121,7 +122,7 @@ fn every_object_that_can_be_mapped_is_sent_on_entering_operational() {
     assert_eq!(sent, expected);
 }
 
-/// The rule of the profile for type 255.
+/// The rule of the profile for transmission type 255.
 #[test]
 fn a_change_is_sent_at_once_or_with_the_event_timer_only() {
     let mut bench = operational();
@@ -133,7 +134,7 @@ fn a_change_is_sent_at_once_or_with_the_event_timer_only() {
     assert_eq!(frames.len(), 5, "100 changes in 100 ms");
 }
 
-/// 5006h is told, and the PDO with it: the node stays in Operational.
+/// The node sends EMCY 5006h and the PDO, and stays Operational.
 #[test]
 fn a_broken_load_sensor_is_an_overload_that_is_sent() {
     let mut bench = operational();
@@ -190,7 +191,8 @@ fn lamps_follow_the_virtual_output_a_multiplexed_pdo_and_a_client() {
     assert_eq!(bench.protocol.outputs().digital, [true, false]);
 }
 
-/// Two of them can be on one bus: what has the same CAN-ID in both is not sent, whatever they measure.
+/// Two nodes as delivered may be on one bus: PDOs with a CAN-ID common to both are not sent, whatever the nodes
+/// measure.
 #[test]
 fn a_node_as_delivered_sends_no_pdo() {
     let mut bench = lift();
@@ -208,7 +210,7 @@ fn a_node_as_delivered_sends_no_pdo() {
     assert_eq!(number(&mut bench, 0x1000, 0), 0x1A1);
 }
 
-/// What is saved with the choice is there after the next start; the choice is in force at once.
+/// Values saved with the choice are present after the next start; the choice is in force at once.
 #[test]
 fn the_choice_of_virtual_devices_is_stored() {
     let mut bench = lift();
@@ -228,7 +230,7 @@ fn the_choice_of_virtual_devices_is_stored() {
     assert_eq!([0, 1].map(|sub| number(&mut bench, 0x6000, sub)), [1, 0x0600]);
 }
 
-/// Position 2 is not there, and its TPDO is switched on and off: nothing is sent for that.
+/// The TPDO of position 2, which does not exist, is enabled and disabled: no multiplexed PDO is sent for this.
 #[test]
 fn a_write_to_a_cob_id_sends_no_multiplexed_pdo() {
     let mut bench = operational();
@@ -253,7 +255,7 @@ fn a_lamp_follows_a_word_that_comes_again() {
     }
 }
 
-/// The sequences in which calls were lost, on a bus that is fast: buttons 1 and 2 with their words.
+/// The sequences in which calls were lost in the past, on a fast bus: buttons 1 and 2 with their words.
 fn panel(inhibit: u16, event_timer: u16) -> Bench {
     let mut bench = lift();
     bench.write(0x2305, 0, &[Devices::INPUT_PANEL.0]).unwrap();
@@ -268,7 +270,8 @@ fn panel(inhibit: u16, event_timer: u16) -> Bench {
     bench
 }
 
-/// Lets so many milliseconds pass with these buttons; what the panel says in them: basic function and state.
+/// Lets `millis` milliseconds pass with these buttons; returns the words that the panel sends: basic function and
+/// state.
 fn hold(bench: &mut Bench, buttons: [bool; 2], millis: u32) -> Vec<(u8, u8)> {
     bench.buttons = buttons;
     (0..millis).for_each(|_| bench.sample(&empty_car()));
@@ -316,7 +319,7 @@ fn the_call_controller_asks_for_all_inputs() {
     assert_eq!(hold(&mut bench, [true, false], 5), [(5, 1), (2, 0)]);
 }
 
-/// The multiplexed PDO with which this node sets an object of the others.
+/// The multiplexed PDO with which the node `producer` sets an object of other nodes.
 fn set(bench: &mut Bench, producer: u16, (index, sub): (u16, u8), value: u32) {
     let at = Multiplexer { index, sub };
     let mpdo = Mpdo { address: Address::Destination(None), at, data: value.to_le_bytes() };
@@ -337,7 +340,7 @@ fn multiplexed_pdos_of_all_nodes_are_taken() {
     }
 }
 
-/// Limits of the load, a preset: a controller need not ask by SDO.
+/// Limits of the load and a preset can be set without SDO.
 #[test]
 fn objects_of_the_profile_are_set_by_a_multiplexed_pdo() {
     let mut bench = operational();
@@ -363,7 +366,7 @@ fn a_position_outlives_a_power_cut_in_which_the_car_has_not_moved() {
     assert_eq!(number(&mut bench, 0x6383, 1), position);
 }
 
-/// What one has stored is the other's: it is that of the input.
+/// The lift shares the stored calibration of the input with the transmitter.
 #[test]
 fn the_calibration_is_that_of_the_transmitter() {
     let mut bench = lift();

@@ -1,5 +1,5 @@
-//! Each of the 290 PDOs of the table, produced and consumed by a device of the stack: at its number, with its CAN-ID, and
-//! laid out as the table says.
+//! Each of the 290 PDOs of the table, produced and consumed by a device of the stack: with its number and CAN-ID, and
+//! with the layout of the table.
 
 use canopen::dictionary::{self, Access, DefaultValue, Dictionary, Mapping, Object, Sizes, Tables, Type};
 use canopen::{Device, Duration, Frame, Instant, NodeId};
@@ -10,18 +10,18 @@ use profiles::lift::objects::pdos::{multiplexed_tpdo, rpdo, rpdo_mapping, tpdo, 
 
 /// Node-ID of the producer.
 const ID: u8 = 33;
-/// Rows of a dictionary: those of one PDO and its objects, and some that fill it up.
+/// Rows of a dictionary: those of one PDO and its objects, and filler rows.
 const ROWS: usize = 24;
 const SIZE: usize = 128;
-/// One PDO, or one object in a multiplexed one.
+/// A device with one PDO, or with one object in a multiplexed PDO.
 type Node = canopen::device!((), room: Sizes { image: SIZE, tpdos: 1, rpdos: 1, watches: 0, scanned: 8 });
 
-/// The objects; of a multiplexed PDO the one that it carries in these tests.
+/// The objects of a PDO; for a multiplexed PDO the one that it carries in these tests.
 fn carried(pdo: &Pdo) -> Vec<(u16, u8, u8)> {
     if pdo.objects.is_empty() { vec![MULTIPLEXED] } else { pdo.objects.clone() }
 }
 
-/// The frame with this byte in all objects: a multiplexed one is for all nodes.
+/// The frame with this byte in all objects; a multiplexed PDO is addressed to all nodes.
 fn frame(pdo: &Pdo, value: u8) -> Frame {
     let (index, sub, _) = MULTIPLEXED;
     let [low, high] = index.to_le_bytes();
@@ -32,10 +32,11 @@ fn frame(pdo: &Pdo, value: u8) -> Frame {
     Frame::new(pdo.cob_id(ID).try_into().unwrap(), &data).unwrap()
 }
 
-/// What a multiplexed PDO carries in these tests.
+/// The object that a multiplexed PDO carries in these tests.
 const MULTIPLEXED: (u16, u8, u8) = (0x5001, 2, 16);
 
-/// The rows that the stack makes of a number. The catalogue has the producer of an RPDO, the table has its number.
+/// The dictionary rows that the stack makes for a PDO. The catalogue gives the producer of an RPDO, the table its
+/// number.
 fn made(row: &Pdo) -> [Vec<Object>; 2] {
     let definition = by_cob_id(row.cob_id(ID)).unwrap();
     let (number, producer) = (definition.pdo.number, definition.producer.unwrap_or(1));
@@ -72,7 +73,7 @@ fn kind(bits: u8) -> Type {
     }
 }
 
-/// The objects of a PDO, and the dictionary of a device with nothing else.
+/// The dictionary and the device with only this PDO and its objects.
 fn device(row: &Pdo) -> (&'static Dictionary, Node) {
     let (access, mapping) =
         if row.is_produced { (Access::ReadOnly, Mapping::Tpdo) } else { (Access::ReadWrite, Mapping::Rpdo) };
@@ -93,7 +94,7 @@ fn device(row: &Pdo) -> (&'static Dictionary, Node) {
     (dictionary, Device::new(dictionary, NodeId::new(ID), ()))
 }
 
-/// A device in Operational, with what it has sent on the way there.
+/// A device in Operational, with the frames that it has sent so far.
 fn operational(row: &Pdo) -> (&'static Dictionary, Node, Vec<Frame>) {
     let (dictionary, mut device) = device(row);
     let mut out = Queue::default();

@@ -1,4 +1,4 @@
-//! A week of the protocol: every timer goes on, and the 32 bits of a timer of microseconds are no limit.
+//! A week of the protocol: every timer goes on, beyond the range of a 32-bit counter of microseconds.
 
 use canopen::{Duration, Instant};
 use host_tests::bench::{Bench, ID};
@@ -6,7 +6,7 @@ use host_tests::bench::{Bench, ID};
 const SECOND: u64 = 1_000_000;
 const WEEK: u64 = 7 * 24 * 3600;
 
-/// Runs from deadline to deadline, up to this instant, and gives the instants of the frames with this identifier.
+/// Runs from deadline to deadline until `end`, and returns the instants of the frames with this identifier.
 fn run(bench: &mut Bench, end: Instant, id: u16) -> Vec<u64> {
     let mut instants = vec![];
     loop {
@@ -35,7 +35,7 @@ fn a_heartbeat_a_second_for_a_week() {
 #[test]
 fn an_event_timer_and_a_heartbeat_consumer_past_the_wrap_of_32_bits() {
     let mut bench = Bench::booted();
-    // Node 5 is watched, with 2 s.
+    // The node monitors the heartbeat of node 5, with 2 s.
     bench.write(0x1016, 1, &0x0005_07D0_u32.to_le_bytes()).unwrap();
     bench.write(0x1800, 5, &700_u16.to_le_bytes()).unwrap();
     bench.nmt(1);

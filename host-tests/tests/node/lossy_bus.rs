@@ -6,9 +6,9 @@ use host_tests::domain::{CAPACITY, DOMAIN, DomainDevice, ID};
 use host_tests::network::{Disturbance, Network, Tally};
 use host_tests::sdo::Client;
 
-/// Each has four transfers.
+/// Rounds of four transfers each.
 const ROUNDS: u64 = 80;
-/// Between two transfers: what the bus repeats or holds up of one is over when the next one begins.
+/// The pause between two transfers: repeated or delayed frames of one transfer have arrived before the next one begins.
 const PAUSE: Duration = Duration::from_millis(10);
 
 fn bus(seed: u64, percent: u32) -> Network<DomainDevice> {
@@ -18,7 +18,7 @@ fn bus(seed: u64, percent: u32) -> Network<DomainDevice> {
     network
 }
 
-/// Down and up by both kinds of transfer, each time other data.
+/// Downloads and uploads by both kinds of transfer, each time with other data.
 fn round(network: &mut Network<DomainDevice>, rng: &mut Rng, len: usize) {
     let [first, second] = [0; 2].map(|_| (0..len).map(|_| rng.u8(..)).collect::<Vec<_>>());
     let block_size = rng.u8(2..=127);
@@ -81,8 +81,8 @@ fn the_same_seed_takes_the_same_course() {
     assert_ne!(course(7), course(8));
 }
 
-/// Three times as bad. At five times, with eight steps up for a frame that fails and one down for a frame that is sent, the
-/// error counters would end in bus-off.
+/// Three times the error rate. At five times the rate, the error counters would end in bus-off: they go up by eight for
+/// a failed frame and down by one for a sent frame.
 #[test]
 fn a_worse_bus_is_slower_and_no_less_exact() {
     for seed in 200..210 {

@@ -1,5 +1,5 @@
-//! The node, and the objects of all its personalities, in this process: no emulated board, no clock. One program, for the time that
-//! each program takes to link.
+//! Tests of the node and of the objects of all its personalities, in this process: without an emulated board and
+//! without a clock. All tests are in one program, to save the link time of several programs.
 
 mod bit_timing;
 mod calibration;

@@ -1,5 +1,5 @@
-//! memory.x against the sectors of the chip: a region that straddles a sector it does not own would be erased
-//! with its neighbour.
+//! memory.x compared with the sectors of the chip: a region that shares a sector with another region would be erased
+//! together with that region.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -62,7 +62,7 @@ fn every_part_of_flash_that_is_erased_on_its_own_is_made_of_whole_sectors() {
     }
 }
 
-/// Whatever is erased, the security counter is not in one sector with it.
+/// No erase of another area may affect the sector of the security counter.
 #[test]
 fn the_security_counter_has_a_sector_of_its_own() {
     let regions = regions();
@@ -96,7 +96,7 @@ fn staging_and_the_kept_image_have_room_for_any_image_of_the_application_area_be
     assert!(["STAGING", "KEPT"].iter().all(|name| regions[*name].len() >= image + 512));
 }
 
-/// What the bootloader erases is what memory.x says, sector by sector.
+/// The areas that the bootloader erases are those of memory.x, sector by sector.
 #[test]
 fn the_update_knows_the_areas_and_their_sectors() {
     let regions = regions();
@@ -128,7 +128,7 @@ fn the_application_starts_where_vtor_may_point() {
     assert_eq!(regions()["APPLICATION"].start % table, 0);
 }
 
-/// An overflow must leave RAM instead of reaching data.
+/// A stack overflow must leave RAM, which is a fault, instead of overwriting data.
 #[test]
 fn the_stack_is_at_the_very_start_of_ram() {
     let regions = regions();

@@ -1,5 +1,6 @@
-//! No two modules of different folders need each other, directly or by way of a third: who changes one knows which others
-//! can notice. Read from the `use` lines of every crate; what a folder hands on (`pub use`) is no need of its own.
+//! No two modules of different folders depend on each other, directly or through a third module, so that the effects of
+//! a change are known. The dependencies are read from the `use` lines of every crate; a re-export (`pub use`) of a
+//! folder is no dependency.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 const CRATES: [&str; 6] =
     ["crates/node", "crates/profiles", "crates/product", "crates/storage", "crates/update", "firmware"];
 
-/// Folders, or files that lie beside `lib.rs`, and what each of them uses.
+/// Folders, or files beside `lib.rs`, with the folders that each of them uses.
 type Graph = BTreeMap<String, BTreeSet<String>>;
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -22,7 +23,7 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The paths of a use tree, each with what stands before it.
+/// The paths of a use tree, each with its prefix.
 fn expand(tree: &str, before: &str, paths: &mut Vec<String>) {
     let Some((prefix, rest)) = tree.split_once('{') else {
         return paths.push(format!("{before}{}", tree.trim()));
@@ -46,7 +47,7 @@ fn expand(tree: &str, before: &str, paths: &mut Vec<String>) {
     }
 }
 
-/// What a file uses of its own crate, as paths from the root of the crate.
+/// The paths that a file uses from its own crate, from the root of the crate.
 fn used(text: &str, module: &[String]) -> Vec<Vec<String>> {
     let code = text.split("#[cfg(test)]").next().unwrap_or(text);
     let mut paths = Vec::new();
@@ -79,7 +80,7 @@ fn from_root(path: &str, module: &[String]) -> Option<Vec<String>> {
     Some(root)
 }
 
-/// The folder in which a module lies; a file beside `lib.rs` counts as one.
+/// The folder of a module; a file beside `lib.rs` counts as a folder.
 fn folder_of(path: &[String], source: &Path) -> Option<String> {
     let mut folder: Vec<&str> = Vec::new();
     for segment in path {
@@ -120,7 +121,7 @@ fn graph(source: &Path) -> Graph {
     graph
 }
 
-/// Everything that a folder needs, directly or by way of others.
+/// All folders that a folder depends on, directly or through others.
 fn needs<'a>(graph: &'a Graph, start: &'a str) -> BTreeSet<&'a str> {
     let (mut found, mut open) = (BTreeSet::new(), vec![start]);
     while let Some(here) = open.pop() {
@@ -133,7 +134,7 @@ fn needs<'a>(graph: &'a Graph, start: &'a str) -> BTreeSet<&'a str> {
     found
 }
 
-/// Two that need each other and do not lie side by side in one folder.
+/// Two folders that depend on each other and are not neighbours.
 fn cycle(graph: &Graph, are_neighbours: impl Fn(&str, &str) -> bool) -> Option<[String; 2]> {
     graph.keys().find_map(|one| {
         let others = needs(graph, one);

@@ -1,5 +1,5 @@
-//! Every row of the tables against the running node of each personality, by SDO. They are written from the documents; the
-//! node's own tables are others.
+//! Every row of the tables compared with the running node of each personality, by SDO. The tables are written from the
+//! documents, not derived from the node's own tables.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ fn rows() -> impl Iterator<Item = (Personality, Row)> {
     Personality::ALL.into_iter().flat_map(of)
 }
 
-/// A node whose PDO objects can all be written: steps 1 and 2 of the mapping procedure are done.
+/// A node with writable PDO objects: steps 1 and 2 of the mapping procedure are done.
 fn without_tpdos(personality: Personality) -> Bench {
     let mut bench = Bench::booted_as(personality);
     match personality {
@@ -55,7 +55,7 @@ fn reading_gives_the_default_in_the_size_of_the_type() {
         let expected = match (row.access, row.index) {
             ("wo", _) => Err(WRITE_ONLY),
             (_, 0x1003) if row.sub > 0 => Err(NO_DATA),
-            // Nothing was written to it yet.
+            // No value has been written yet.
             (_, 0x2F00) => Err(NO_DATA),
             _ => Ok(row.default(personality).unwrap_or_else(|| vec![0; row.size().unwrap()])),
         };
@@ -89,11 +89,11 @@ fn writing_is_refused_or_taken_as_the_access_says() {
             (0x2200..=0x2202, _) => Err(DEVICE_STATE),
             // There is no second encoder.
             (0x6010, 2) => Err(DEVICE_STATE),
-            // Nothing was measured yet.
+            // No value has been measured yet.
             (0x6382, _) => Err(DEVICE_STATE),
             // The program is not on trial.
             (0x2002, 2) => Err(DEVICE_STATE),
-            // The bootloader has no key that the response could be made with.
+            // The bootloader has no key, so no response can be valid.
             (0x2003, 3) => Err(DEVICE_STATE),
             _ => Ok(()),
         };
@@ -119,7 +119,7 @@ fn a_value_of_the_wrong_length_is_refused() {
 
 #[test]
 fn what_can_be_mapped_is_sent_and_the_rest_is_refused() {
-    // The mapping of a lift device is the profile's.
+    // The profile fixes the mapping of a lift device.
     for (personality, row) in rows().filter(|(personality, _)| *personality != Personality::Lift) {
         let mut bench = without_tpdos(personality);
         let mapped = bench.write(0x1A01, 1, &row.mapping_entry());

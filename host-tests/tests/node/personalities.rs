@@ -1,4 +1,4 @@
-//! Which device a node is: object 2000h, stored at once and taken at the next reset.
+//! The personality of a node: object 2000h, stored at once and in force after the next reset.
 
 use canopen::Instant;
 use canopen::lss::Request as LssRequest;
@@ -49,7 +49,7 @@ fn a_reset_of_the_communication_shows_what_is_stored() {
     assert_eq!((personality(&mut bench), device_type(&mut bench)), (1, 0x0002_0194));
 }
 
-/// What one has saved is nothing to another, neither its values nor a fault; and it is there again afterwards.
+/// Saved values and faults of one personality do not affect another one, and are present again after a return to it.
 #[test]
 fn each_personality_has_its_own_saved_parameters() {
     let mut bench = Bench::booted();
@@ -83,7 +83,7 @@ fn node_id_and_personality_are_stored_together_and_change_alone() {
 fn a_store_that_fails_is_told_and_changes_nothing() {
     let mut bench = Bench::booted();
     let now = Instant(1);
-    // Written without the bench, which would store it.
+    // Written without the bench, which would store the value.
     let frame = canopen::Frame::new(0x600 + u16::from(ID), &[0x2F, 0, 0x20, 0, 1, 0, 0, 0]).unwrap();
     let mut next = bench.protocol.on_service_frame(&frame, now, &mut bench.out);
     assert_eq!(bench.take(), [], "the answer waits");

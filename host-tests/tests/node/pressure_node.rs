@@ -1,4 +1,4 @@
-//! The pressure node as a whole: from converter readings to frames, parameters back into the chain, faults.
+//! The complete pressure node: from converter readings to frames, the effect of parameters, faults.
 
 use canopen::{Frame, Instant};
 use host_tests::bench::{Bench, ID, Queue, intact, raw, setup};
@@ -20,7 +20,7 @@ fn real(bench: &mut Bench, index: u16, sub: u8) -> f32 {
     f32::from_le_bytes(bench.read(index, sub).unwrap().try_into().unwrap())
 }
 
-/// EMCY messages sent since the last look, as code and error register.
+/// EMCY messages sent since the last call, as code and error register.
 fn emergencies(bench: &mut Bench) -> Vec<(u16, u8)> {
     let messages = bench.take().into_iter().filter(|(id, _)| *id == EMCY);
     messages.map(|(_, data)| (u16::from_le_bytes([data[0], data[1]]), data[2])).collect()
@@ -41,7 +41,7 @@ fn tpdo1_carries_the_live_pressure_and_temperature() {
         let [(_, data)] = &frames[..] else { panic!("{frames:?}") };
         let bar = f32::from_le_bytes(data[..4].try_into().unwrap());
         let celsius = f32::from_le_bytes(data[4..].try_into().unwrap());
-        // One step of the sum of 16 conversions.
+        // The tolerance is one step of the sum of 16 conversions.
         assert!(is_close(bar, pascal as f32 / 100_000.0, 10.0 / (0.8 * 64_000.0)), "{bar}");
         assert!(is_close(celsius, 25.0, 80.0 / (16.0 * 270.0)), "{celsius}");
     }
@@ -208,7 +208,7 @@ fn bus_off_applies_the_communication_error_behaviour_and_is_told_afterwards() {
     assert_eq!(emergencies(&mut bench), [(0x8140, 1), (0, 0)]);
 }
 
-/// The manual of the CMP 8271 has bit 0 alone; "overall error" of 1002h counts the communication in.
+/// The manual of the CMP 8271 has only bit 0; the "overall error" of 1002h includes communication.
 #[test]
 fn a_missing_heartbeat_sets_bit_0_of_the_error_register_only() {
     let mut bench = operational();

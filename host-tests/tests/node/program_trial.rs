@@ -1,4 +1,4 @@
-//! 2002h: what confirms a new program, what takes it back, and what the bus reads of it.
+//! 2002h: the confirmation and the withdrawal of a new program, and the values of the object.
 
 use canopen::Frame;
 use host_tests::bench::Bench;
@@ -13,7 +13,7 @@ const AUTOMATIC: u8 = 4;
 const DEVICE_STATE: Result<(), u32> = Err(0x0800_0022);
 const INVALID: Result<(), u32> = Err(0x0609_0030);
 
-/// A node whose program is on trial, and measures.
+/// A measuring node whose program is on trial.
 fn on_trial() -> Bench {
     let mut bench = Bench::booted();
     bench.protocol.set_trial(Trial::Open);
@@ -22,18 +22,18 @@ fn on_trial() -> Bench {
     bench
 }
 
-/// What the node makes of the trial so many seconds after its start.
+/// The verdict of the node on the trial, `seconds` after its start.
 fn verdict(bench: &mut Bench, seconds: f64) -> Option<Verdict> {
     bench.protocol.judge(at(seconds), true);
     bench.protocol.verdict()
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A few seconds.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A few seconds fit.
 fn at(seconds: f64) -> Instant {
     Instant((seconds * 1e6) as u64)
 }
 
-/// What a master says.
+/// A message of a master.
 type Speech = fn(&mut Bench);
 
 fn state(bench: &mut Bench) -> u8 {
@@ -44,13 +44,13 @@ fn time(bench: &mut Bench, sub: u8, seconds: u16) {
     bench.write(0x2002, sub, &seconds.to_le_bytes()).unwrap();
 }
 
-/// A node that has heard nothing of a master, with these times.
+/// A node that has received no message of a master, with these times.
 fn left_alone(limit: u16, automatic: u16) -> Bench {
     let mut bench = Bench::booted();
     time(&mut bench, LIMIT, limit);
     time(&mut bench, AUTOMATIC, automatic);
     bench.sample(&host_tests::bench::raw(0.0, 298.15));
-    // Before this, who has spoken does not count.
+    // Messages before this point do not count.
     bench.protocol.end_trial();
     bench.protocol.set_trial(Trial::Open);
     bench
@@ -141,7 +141,7 @@ fn other_commands_and_commands_without_a_trial_are_refused() {
     assert!(bench.write(0x2002, STATE, &[0]).is_err(), "it is read only");
 }
 
-/// The times are parameters: they are stored, and come back with the power.
+/// The times are parameters: stored, and present after a power cycle.
 #[test]
 fn the_times_are_stored() {
     let mut bench = Bench::booted();

@@ -1,5 +1,5 @@
-//! Clients that die, give up or start over at every step of every transfer, and frames that are lost: the server is
-//! free again, at the latest after its time-out, and no half of a value is stored.
+//! Clients that die, abort or start over at every step of every transfer, and lost frames: the server is free again, at
+//! the latest after its time-out, and never stores an incomplete value.
 
 use canopen::Duration;
 use canopen::sdo::Response;
@@ -7,7 +7,7 @@ use host_tests::domain::{DOMAIN, DomainDevice, ID, WORD};
 use host_tests::network::{Link, Network};
 use host_tests::sdo::{Channel, Client, Failure};
 
-/// Of the server, and a little more.
+/// Time-out of the server, and a little more.
 const TIME_OUT: Duration = Duration::from_millis(1010);
 /// Segments in a block of an upload.
 const BLOCK_SIZE: u8 = 10;
@@ -36,7 +36,7 @@ impl Transfer {
     }
 }
 
-/// What is stored, and what is to be written. 29 segments each.
+/// The stored value, and the value to write: 29 segments each.
 fn old() -> Vec<u8> {
     (0..200).collect()
 }
@@ -55,14 +55,14 @@ fn bus() -> Bus {
     network
 }
 
-/// A way on which something goes wrong at one frame.
+/// A channel with a fault at one frame.
 struct Broken<'a> {
     link: Link<'a, DomainDevice>,
     requests: usize,
     responses: usize,
-    /// The client dies after so many requests.
+    /// The client dies after this many requests.
     dies_after: usize,
-    /// Numbers of the request and of the response that is lost, from 0.
+    /// Numbers of the lost request and of the lost response, from 0.
     loses_request: Option<usize>,
     loses_response: Option<usize>,
 }
@@ -121,7 +121,7 @@ impl Channel for Broken<'_> {
     }
 }
 
-/// Runs a transfer whose client dies after so many requests; `false` when it had been complete by then.
+/// Runs a transfer whose client dies after `step` requests; `false` when the transfer was complete by then.
 fn die(network: &mut Bus, transfer: Transfer, step: usize) -> bool {
     let mut channel = Broken { dies_after: step, ..Broken::new(network) };
     let result = transfer.run(&mut channel);
@@ -129,13 +129,13 @@ fn die(network: &mut Bus, transfer: Transfer, step: usize) -> bool {
     result.is_err()
 }
 
-/// All that the server has said since the last look.
+/// All responses of the server since the last call.
 fn responses(network: &mut Bus) -> Vec<[u8; 8]> {
     let mut link = network.server(ID);
     std::iter::from_fn(|| link.received()).collect()
 }
 
-/// Another client gets what it asks for, by all transfers.
+/// Checks that all transfers of another client succeed.
 fn assert_free(network: &mut Bus, context: &dyn std::fmt::Debug) {
     let content = network.stations[0].unit.content().to_vec();
     assert!(content == old() || content == new(), "{context:?}: half a value");
@@ -146,7 +146,7 @@ fn assert_free(network: &mut Bus, context: &dyn std::fmt::Debug) {
     assert!(client.read_blocks(DOMAIN, 127) == Ok(old()), "{context:?}");
 }
 
-/// The steps of a transfer at which its client can die, each on a bus of its own.
+/// Calls `then` for each step of a transfer at which its client can die, each on a new bus.
 fn each_step(mut then: impl FnMut(&mut Bus, Transfer, usize)) {
     let mut steps = 0;
     for transfer in Transfer::ALL {
@@ -159,7 +159,7 @@ fn each_step(mut then: impl FnMut(&mut Bus, Transfer, usize)) {
             steps += 1;
         }
     }
-    // The requests: twice 1 and 29 segments; begin, start and three acknowledgements; begin, 29 segments and end.
+    // Number of requests: twice 1 and 29 segments; begin, start and three acknowledgements; begin, 29 segments and end.
     assert_eq!(steps, 30 + 30 + 5 + 31);
 }
 
@@ -168,7 +168,8 @@ fn a_client_that_dies_is_told_and_forgotten_after_the_time_out() {
     each_step(|network, transfer, step| {
         network.run(TIME_OUT);
         let last = responses(network).last().copied().and_then(Response::parse);
-        // After the last segment of a simple transfer and the end of a block download it waits for nobody.
+        // After the last segment of a segmented transfer and after the end of a block download, the server waits for no
+        // further request.
         let is_told = matches!(last, Some(Response::Abort(at, 0x0504_0000)) if at == DOMAIN);
         let is_over = match transfer {
             Read | Write => step == 30,
@@ -185,7 +186,7 @@ fn a_client_that_gives_up_leaves_a_free_server_that_says_nothing() {
     each_step(|network, transfer, step| {
         let mut link = network.server(ID);
         Client::new(&mut link).abort(DOMAIN);
-        // Segments of a block may be in the mailboxes already.
+        // Segments of a block may already be in the mailboxes.
         network.run(Duration::from_millis(10));
         let aborts = responses(network).into_iter().filter(|frame| frame[0] == 0x80).count();
         assert_eq!(aborts, 0, "{transfer:?} {step}");
@@ -198,7 +199,7 @@ fn a_client_that_gives_up_leaves_a_free_server_that_says_nothing() {
 #[test]
 fn a_client_that_starts_over_is_served_at_once() {
     each_step(|network, transfer, step| {
-        // Within a block download every frame is a segment: such a client has to give up first.
+        // Within a block download every frame is a segment, so the client must abort before it starts over.
         if transfer != WriteBlocks {
             network.run(Duration::from_millis(10));
             assert_free(network, &(transfer, step));
@@ -206,7 +207,7 @@ fn a_client_that_starts_over_is_served_at_once() {
     });
 }
 
-/// A frame that the server has not received: its receive FIFO was full. In a block transfer it is sent again.
+/// The server loses a frame because its receive FIFO is full. In a block transfer the client sends the frame again.
 #[test]
 fn a_lost_request_delays_a_block_download_or_ends_the_transfer() {
     for transfer in Transfer::ALL {
@@ -223,7 +224,8 @@ fn a_lost_request_delays_a_block_download_or_ends_the_transfer() {
                 Err(failure) => assert_eq!(failure, Failure::Silence, "{transfer:?} {lost}"),
             }
         }
-        // Of the download the 29 segments, of the upload the confirmation of the end, for which nobody waits.
+        // Completed transfers: for each of the 29 segments of the block download, and for the end confirmation of the
+        // block upload, which the client does not wait for.
         let expected = match transfer {
             Read | Write => 0,
             ReadBlocks => 1,
@@ -233,7 +235,7 @@ fn a_lost_request_delays_a_block_download_or_ends_the_transfer() {
     }
 }
 
-/// A frame that the client has not received.
+/// The client loses a frame.
 #[test]
 fn a_lost_segment_of_a_block_upload_is_sent_again() {
     let mut completed = 0;

@@ -1,10 +1,10 @@
-//! What is flashed has `unsafe` in one place: the modules of the board support that touch hardware. There clippy wants the
-//! reason of each block (`undocumented_unsafe_blocks`).
+//! In flashed images, `unsafe` occurs only in the modules of the board support that access hardware. In these modules
+//! clippy demands a reason for each block (`undocumented_unsafe_blocks`).
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Everything that is in an image.
+/// The source folders of the images.
 const FLASHED: [&str; 3] = ["crates", "firmware/src", "bootloader/src"];
 const PURE: [&str; 5] = ["canopen", "profiles", "storage", "update", "node"];
 const HARDWARE: &str = "crates/bsp/src/hardware";
@@ -21,7 +21,7 @@ fn sources(dir: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Whether the keyword is in the code, not in a comment or in the name of a lint.
+/// Whether the keyword occurs in the code, apart from comments and names of lints.
 fn is_unsafe(source: &str) -> bool {
     let code = source.lines().map(|line| line.split("//").next().unwrap_or_default());
     code.flat_map(|line| line.split(|c: char| !c.is_alphanumeric() && c != '_')).any(|word| word == "unsafe")

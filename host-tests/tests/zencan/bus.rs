@@ -1,7 +1,7 @@
 //! The virtual bus as the CAN interface of zencan.
 //!
-//! The clock of the runtime is paused and follows the bus: whoever waits for a frame lets the bus go on to its next
-//! event, and takes the clock along. So the time-outs of the master are those of the virtual time.
+//! The clock of the runtime is paused and follows the bus: a wait for a frame advances the bus to its next event, and
+//! the clock with it. So the time-outs of the master are in virtual time.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,13 +14,13 @@ use zencan_client::common::CanId;
 use zencan_client::common::messages::CanMessage;
 use zencan_client::common::traits::{AsyncCanReceiver, AsyncCanSender, CanSendError};
 
-/// The longest that the bus goes on without a look at the clients.
+/// Longest span that the bus runs without serving the clients.
 const STEP: canopen::Duration = canopen::Duration::from_millis(1);
 
 /// One of the two ends of the interface.
 pub(crate) struct Port<U> {
     network: Arc<Mutex<Network<U>>>,
-    /// A block upload has been asked for and not been answered.
+    /// A block upload was requested and not answered yet.
     uploading: Arc<AtomicBool>,
 }
 
@@ -37,20 +37,20 @@ impl<U> fmt::Debug for Port<U> {
 }
 
 impl<U: Unit> Port<U> {
-    /// Powers the stations up; their boot-up messages are on the bus already.
+    /// Powers the stations up; their boot-up messages are already on the bus.
     pub(crate) fn new(units: impl IntoIterator<Item = U>) -> Port<U> {
         let mut network = Network::new(units);
         network.start();
         Port { network: Arc::new(Mutex::new(network)), uploading: Arc::default() }
     }
 
-    /// A look at the other side.
+    /// Calls `look` with the network, to inspect the nodes.
     pub(crate) fn with<R>(&self, look: impl FnOnce(&mut Network<U>) -> R) -> R {
         look(&mut self.network.lock().expect("nobody panics with the lock"))
     }
 
-    /// zencan 0.0.5 takes the size flag of the response that begins a block upload (CiA 301, 7.2.4.3.13, bit 1 of the
-    /// first byte) for a part of its subcommand, and gives up. It gets the response without the flag.
+    /// Removes the size flag from a response. zencan 0.0.5 takes the size flag of the response that begins a block
+    /// upload (CiA 301, 7.2.4.3.13, bit 1 of the first byte) for a part of its subcommand, and aborts.
     fn without_size_flag(&self, frame: Frame) -> Frame {
         let mut data: Vec<u8> = frame.data().to_vec();
         if frame.id() & 0x780 == 0x580 && self.uploading.swap(false, Ordering::Relaxed) && data[0] >> 5 == 6 {
@@ -59,7 +59,7 @@ impl<U: Unit> Port<U> {
         Frame::new(frame.id(), &data).expect("as long as before")
     }
 
-    /// Lets the bus go on to its next event, and the clock with it.
+    /// Advances the bus to its next event, and the clock with it.
     async fn step(&self) {
         let passed = self.with(|network| {
             let before = network.now();
@@ -70,7 +70,7 @@ impl<U: Unit> Port<U> {
     }
 }
 
-/// The frame could not be sent, as this is no frame of CANopen.
+/// The frame could not be sent because it is no CANopen frame.
 #[derive(Debug)]
 pub(crate) struct Refused(CanMessage);
 

@@ -1,4 +1,4 @@
-//! LSS: three nodes without a node-ID are found, numbered, stored and boot.
+//! LSS: three nodes without a node-ID are found and numbered, store the node-ID, and boot.
 
 use host_tests::bench::raw;
 use host_tests::station::PressureNode;

@@ -1,4 +1,4 @@
-//! An independent master, the `zencan-client` crate, judges the node: SDO, NMT, PDO configuration, LSS.
+//! Tests of the node with an independent master, the `zencan-client` crate: SDO, NMT, PDO configuration, LSS.
 
 mod bus;
 mod lss;

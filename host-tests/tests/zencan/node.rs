@@ -39,7 +39,7 @@ fn state(port: &Port<PressureNode>) -> State {
     port.with(|network| network.stations[0].unit.protocol.state())
 }
 
-/// The value that the table promises after start-up; `None` for what is measured or comes from outside the table.
+/// The default value of the table after start-up; `None` for a measured value or one from outside the table.
 fn default(row: &Object) -> Option<Vec<u8>> {
     let is_given = matches!(row.index, 0x1009 | 0x100A | 0x1018 | 0x1F56 | 0x1F57);
     let is_live = matches!(row.index, 0x1001..=0x1003 | 0x3000 | 0x6100 | 0x6130 | 0x6150 | 0x7130 | 0x9130);
@@ -205,7 +205,7 @@ async fn what_is_saved_is_there_after_a_reset() {
     let (port, mut client) = node();
     client.write_u32(0x4000, 1, 77).await.unwrap();
     client.write_u16(0x1017, 0, 250).await.unwrap();
-    // The signature as a string: the number that zencan has for it is in the wrong byte order (CiA 301, 7.5.2.13).
+    // The signature as a string: zencan's number for it has the wrong byte order (CiA 301, 7.5.2.13).
     client.download(0x1010, 1, b"save").await.unwrap();
     client.write_u32(0x4000, 1, 78).await.unwrap();
     port.with(|network| {

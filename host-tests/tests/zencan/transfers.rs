@@ -1,4 +1,4 @@
-//! Long transfers, of every kind and length.
+//! Long transfers of every kind, with several lengths.
 
 use host_tests::domain::{DOMAIN, DomainDevice, ID, TEXT, WORD};
 use zencan_client::{RawAbortCode, SdoClient, SdoClientError};

@@ -1,4 +1,4 @@
-//! zencan-node, called as its documentation says, as a station of a simulated bus.
+//! zencan-node as a station of a simulated bus, called as its documentation describes.
 
 use canopen::{Duration, Frame, Instant, Transmit};
 use nodectl::bus::Station;
@@ -10,19 +10,20 @@ mod generated {
     zencan_node::include_modules!(NODE);
 }
 
-/// Its node-ID.
+/// The node-ID.
 pub const ID: u8 = 5;
 
-/// How often the node is called.
+/// Period of the calls of the node.
 const PERIOD: Duration = Duration::from_millis(1);
 
-/// The node. Its dictionary is global, so a process has one.
+/// The node. Its dictionary is global, so a process can have only one node.
 pub struct Zencan(zencan_node::Node<'static>);
 
 impl Zencan {
-    /// A node that boots with its first call. It has no memory to save in: that is left to the application.
+    /// A node that boots with its first call. It has no memory for saved parameters: storage is left to the
+    /// application.
     #[must_use]
-    #[allow(clippy::new_without_default)] // There is one.
+    #[allow(clippy::new_without_default)] // A process has only one node, so there is no default.
     pub fn new() -> Zencan {
         let id = zencan_node::common::NodeId::new(ID).expect("a node-ID");
         let (mailbox, state) = (&generated::NODE_MBOX, &generated::NODE_STATE);
@@ -34,7 +35,7 @@ impl Zencan {
         while let Some(message) = generated::NODE_MBOX.next_transmit_message() {
             let id = u16::try_from(message.id().raw()).unwrap_or(0);
             if let Some(frame) = Frame::new(id, message.data()) {
-                // The simulated bus has room for any number of frames.
+                // The simulated bus accepts any number of frames.
                 let _ = out.send(frame);
             }
         }
@@ -46,7 +47,7 @@ impl Station for Zencan {
         let id = CanId::Std(frame.id());
         let message =
             if frame.is_remote() { CanMessage::new_rtr(id) } else { CanMessage::new(id, frame.data()) };
-        // A message that the mailbox does not want is for somebody else.
+        // A message that the mailbox does not accept is addressed to another node.
         let _ = generated::NODE_MBOX.store_message(message);
         self.run(now, out);
     }

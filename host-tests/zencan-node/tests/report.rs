@@ -1,4 +1,5 @@
-//! What `nodectl check` says of zencan-node 0.0.5: a device that nobody here has written. docs/check.md explains each line.
+//! The report of `nodectl check` for zencan-node 0.0.5, a device from another project. docs/check.md explains each
+//! line.
 
 use canopen::{Duration, NodeId};
 use nodectl::Network;
@@ -6,7 +7,7 @@ use nodectl::bus::{Bus, Simulated};
 use nodectl::check::{self, Effect, Run, Setup, Subject};
 use zencan_device::{ID, Zencan};
 
-/// The checks that fail, by what is behind them.
+/// The failing checks, grouped by cause.
 const FAULTS: [(&str, &[&str]); 9] = [
     ("the boot-up message says 7Fh", &["NMT-01", "NMT-02", "NMT-03", "NMT-04", "NMT-05", "NMT-06"]),
     ("SDO is served in Stopped", &["NMT-28"]),

@@ -20,7 +20,7 @@ impl AdcCommon {
         }
     }
 
-    /// `None` for what is not modelled: the multi modes and VBAT.
+    /// `None` for unmodelled settings: the multi modes and VBAT.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             CSR => Some(()),
@@ -32,12 +32,12 @@ impl AdcCommon {
         }
     }
 
-    /// PCLK2 divided by this is the ADC clock.
+    /// The divider from PCLK2 to the ADC clock.
     pub(crate) fn divider(&self) -> u32 {
         2 * (field(self.ccr, 16, 2) + 1)
     }
 
-    /// The temperature sensor and the reference are on (TSVREFE).
+    /// Whether the temperature sensor and the reference are on (TSVREFE).
     pub(crate) fn sensors_on(&self) -> bool {
         bit(self.ccr, 23)
     }

@@ -1,8 +1,8 @@
 //! ADC1: regular conversions (RM0390 section 13, RM0090 section 13).
 //!
-//! Scan, single and continuous mode, software and timer trigger, DMA with DDS, overrun, every sample time and
-//! resolution. Injected and discontinuous conversions and the analogue watchdog are not modelled: a write that asks for
-//! them is on record.
+//! Modelled: scan, single and continuous mode, software and timer trigger, DMA with DDS, overrun, every sample time and
+//! resolution. Not modelled: injected and discontinuous conversions and the analogue watchdog. A write that selects one
+//! of these is recorded.
 
 mod common;
 mod sequence;
@@ -23,15 +23,15 @@ const SQR1: u32 = 0x2C;
 const SQR3: u32 = 0x34;
 const DR: u32 = 0x4C;
 
-/// Thresholds of the analogue watchdog: held, without effect as the watchdog cannot be turned on.
+/// Thresholds of the analogue watchdog: the values are stored, but the watchdog cannot be turned on.
 const PLAIN: &[Plain] = &[Plain::new(0x24, 0x0FFF, 0x0FFF), Plain::new(0x28, 0, 0x0FFF)];
 
 const EOC: u32 = 1;
 const STRT: u32 = 4;
 const OVR: u32 = 5;
-/// What CR1 may ask for: EOCIE, SCAN, RES, OVRIE, and AWDCH, which has no effect alone.
+/// Bits of CR1 that are modelled: EOCIE, SCAN, RES, OVRIE, and AWDCH, which has no effect alone.
 const CR1_MODELLED: u32 = 0x1F | 1 << 5 | 1 << 8 | 3 << 24 | 1 << 26;
-/// What CR2 may ask for: all but JEXTEN and JSWSTART.
+/// Bits of CR2 that are modelled: all but JEXTEN and JSWSTART.
 const CR2_MODELLED: u32 = 0x7F0F_0F03;
 /// tSTAB of DS10693: 3 us at most.
 const STABILISATION: Time = Time::from_micros(3);
@@ -49,12 +49,12 @@ pub(crate) enum Trigger {
 #[derive(Clone, Copy, Debug)]
 struct Conversion {
     rank: usize,
-    /// The end of the sample time: the instant whose voltage is converted.
+    /// The end of the sample time: the voltage of this instant is converted.
     sampled: Time,
     end: Time,
 }
 
-/// A conversion that has ended and waits for its value.
+/// A sampled channel that waits for its converted value.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
     pub(crate) channel: u32,
@@ -71,14 +71,14 @@ pub(crate) struct Adc {
     cr1: u32,
     cr2: u32,
     dr: u32,
-    /// When it can convert after ADON.
+    /// The end of the stabilisation time after ADON.
     stable: Time,
     conversion: Option<Conversion>,
-    /// DR has not been read since it was written.
+    /// DR has a value that has not been read.
     unread: bool,
-    /// A transfer by DMA is asked for.
+    /// A DMA request is pending.
     request: bool,
-    /// The last transfer of the stream is done and DDS is 0: no more requests.
+    /// The stream has made its last transfer and DDS is 0: no more requests.
     exhausted: bool,
 }
 
@@ -119,11 +119,11 @@ impl Adc {
         }
     }
 
-    /// `None` when the register, or what is asked of it, is not modelled.
+    /// `None` when the register, or a bit set in it, is not modelled.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         match offset {
             SR => {
-                // Software clears flags by writing 0. What an overrun left in DR is lost.
+                // Software clears flags by writing 0. Clearing OVR discards the value that an overrun left in DR.
                 self.unread &= !bit(self.sr & !value, OVR);
                 self.sr &= value;
                 Some(())
@@ -142,7 +142,7 @@ impl Adc {
         if bit(value, 0) && !self.is_on() {
             self.stable = now + STABILISATION;
         }
-        // Writing DMA to 0 and 1 again lets requests go on after the last transfer or an overrun.
+        // Writing 0 and then 1 to the DMA bit enables requests again after the last transfer or an overrun.
         if !self.uses_dma() || !bit(value, 8) {
             self.exhausted = false;
         }
@@ -184,7 +184,7 @@ impl Adc {
         }
     }
 
-    /// The trigger came. While a sequence runs it is ignored.
+    /// A trigger event. During a sequence the trigger is ignored.
     pub(crate) fn on_trigger(&mut self, at: Time) {
         self.start(at + times(self.cycle, TRIGGER_LATENCY));
     }
@@ -202,7 +202,7 @@ impl Adc {
         self.conversion = Some(Conversion { rank, sampled, end });
     }
 
-    /// The resolution, which is also how many cycles a conversion takes after its sample time.
+    /// The resolution, which is also the number of cycles of a conversion after its sample time.
     fn bits(&self) -> u32 {
         12 - 2 * field(self.cr1, 24, 2)
     }
@@ -219,18 +219,18 @@ impl Adc {
         (0..self.length()).map(|rank| (self.sequence.channel(rank), time(rank))).collect()
     }
 
-    /// When the conversion under way ends.
+    /// The end of the conversion under way.
     pub(crate) fn conversion_end(&self) -> Time {
         self.conversion.map_or(Time::NEVER, |conversion| conversion.end)
     }
 
-    /// What the conversion under way has sampled.
+    /// The channel and the instant of the conversion under way.
     pub(crate) fn sample(&self) -> Option<Sample> {
         let conversion = self.conversion?;
         Some(Sample { channel: self.sequence.channel(conversion.rank), at: conversion.sampled })
     }
 
-    /// Ends the conversion under way with a 12-bit code, and goes on with the sequence.
+    /// Ends the conversion under way with a 12-bit code, and continues the sequence.
     pub(crate) fn finish(&mut self, code: u32) {
         let Some(conversion) = self.conversion.take() else { return };
         let last = conversion.rank + 1 >= self.length();
@@ -245,7 +245,7 @@ impl Adc {
     fn deliver(&mut self, code: u32, last: bool) {
         let each = bit(self.cr2, 10);
         if self.unread && (self.uses_dma() || each) {
-            // Overrun: the old value stays and requests stop until OVR is cleared.
+            // Overrun: the old value stays and DMA requests stop until OVR is cleared.
             self.sr |= 1 << OVR;
         }
         if bit(self.sr, OVR) {
@@ -258,20 +258,20 @@ impl Adc {
         self.request = self.uses_dma() && !self.exhausted;
     }
 
-    /// Whether a transfer by DMA is asked for now.
+    /// Whether a DMA request is pending.
     pub(crate) fn requests(&self) -> bool {
         self.request
     }
 
-    /// The transfer was made; `last` when it was the last one of the stream.
+    /// The DMA request was served; `last` for the last transfer of the stream.
     pub(crate) fn served(&mut self, last: bool) {
         self.request = false;
         let keeps_on = bit(self.cr2, 9);
         self.exhausted = last && !keeps_on;
     }
 
-    /// When the `count`th conversion from now on ends, or earlier; never late. `trigger` is when the trigger next comes
-    /// and how soon after that again at the earliest.
+    /// The end of the `count`th conversion from now on, or an earlier instant, but never a later one. `trigger` is the
+    /// instant of the next trigger and the shortest span to the following one.
     pub(crate) fn end_after(&self, count: usize, trigger: (Time, Time)) -> Time {
         let Some(current) = self.conversion else { return self.end_from_trigger(count, trigger) };
         let in_sequence = self.length() - current.rank.min(self.length() - 1);
@@ -291,7 +291,7 @@ impl Adc {
         start + times(self.cycle, TRIGGER_LATENCY) + self.span(0, rest)
     }
 
-    /// How long `count` conversions from `rank` on take.
+    /// The duration of `count` conversions from `rank` on.
     fn span(&self, rank: usize, count: usize) -> Time {
         let cycles = (rank..rank + count).map(|rank| self.sequence.sample_cycles(rank) + self.bits());
         times(self.cycle, cycles.sum())
@@ -302,12 +302,12 @@ impl Adc {
         bit(self.cr1, 5) && !bit(self.sr, EOC) || bit(self.cr1, 26) && !bit(self.sr, OVR)
     }
 
-    /// Whether conversions end in a transfer by DMA.
+    /// Whether conversions end with a DMA transfer.
     pub(crate) fn transfers(&self) -> bool {
         self.uses_dma() && !self.exhausted && !bit(self.sr, OVR)
     }
 
-    /// Flags as the common status register shows them.
+    /// The flags as the common status register shows them.
     pub(crate) fn status(&self) -> u32 {
         self.sr & 0x3F
     }

@@ -26,7 +26,7 @@ const TI0R: u32 = 0x180;
 const TDH2R: u32 = 0x1AC;
 const RI0R: u32 = 0x1B0;
 const RDH1R: u32 = 0x1CC;
-/// Where the filter registers begin.
+/// Offset of the filter registers.
 pub(super) const FILTERS: u32 = 0x200;
 
 /// Bits of CAN_MCR.
@@ -63,8 +63,8 @@ pub struct Lines {
 
 /// A bxCAN peripheral at register level.
 ///
-/// On the bus it is a [`canbus::Controller`]. Not modelled: time stamps (to set TTCM is on record), debug freeze, the
-/// level of the CAN_RX pin within a frame, and the CAN_TX pin in loop-back mode.
+/// On the bus the peripheral is a [`canbus::Controller`]. Not modelled: time stamps (setting TTCM is recorded), debug
+/// freeze, the level of the CAN_RX pin within a frame, and the CAN_TX pin in loop-back mode.
 #[derive(Clone, Debug)]
 pub struct BxCan {
     slave: bool,
@@ -79,25 +79,25 @@ pub struct BxCan {
     pub(super) filters: FilterBanks,
     pub(super) status: Status,
     reception: Reception,
-    /// Cycles of its clock until a mailbox that is given back has made room.
+    /// Cycles of the peripheral's clock between RFOM and the next frame in the output mailbox.
     release: u32,
     poke: bool,
 }
 
-/// So many, unless a test says otherwise. The manual says only that it takes a while.
+/// The default number of these cycles. The manual only says that the release takes a while.
 const RELEASE: u32 = 8;
 
 /// Frames that have passed a filter, since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reception {
-    /// All of them.
+    /// All frames that have passed a filter.
     pub accepted: u64,
-    /// Those that a full FIFO lost.
+    /// Frames lost because the FIFO was full.
     pub lost: u64,
 }
 
 impl BxCan {
-    /// CAN1, which owns the filter banks, or with `slave` CAN2. `apb1` is its clock in hertz.
+    /// CAN1, which owns the filter banks, or with `slave` CAN2. `apb1` is the clock of APB1 in hertz.
     pub fn new(slave: bool, apb1: u64) -> BxCan {
         BxCan {
             slave,
@@ -117,7 +117,7 @@ impl BxCan {
         }
     }
 
-    /// A system reset, or one by RCC. The bus goes on as it is.
+    /// A system reset, or a reset by RCC. The state of the bus does not change.
     pub(super) fn reset(&mut self) {
         let mut monitor = self.monitor;
         monitor.cancel();
@@ -130,18 +130,18 @@ impl BxCan {
         self.timing
     }
 
-    /// What the receive FIFOs were given.
+    /// Counts of the frames that the filters passed to the receive FIFOs.
     pub fn reception(&self) -> Reception {
         self.reception
     }
 
-    /// The clock of APB1 is now this, in hertz; 0 stops it.
+    /// Sets the clock of APB1 in hertz; 0 stops the controller.
     pub fn set_clock(&mut self, apb1: u64) {
         self.clock = apb1;
         self.poke = true;
     }
 
-    /// Takes the wish for `Effect::Poke`: something has changed that the bus must see before the core runs on.
+    /// Takes the request for `Effect::Poke`: a change that the bus must see before the core continues.
     pub fn take_poke(&mut self) -> bool {
         std::mem::take(&mut self.poke)
     }
@@ -189,14 +189,14 @@ impl BxCan {
         Some(())
     }
 
-    /// The next instant at which something happens that neither software nor the bus causes.
+    /// The next instant at which the state changes without an access by software or an event on the bus.
     pub fn deadline(&self) -> Time {
         let looped = self.looped.map_or(Time::NEVER, |looped| looped.end);
         let released = self.fifos[0].deadline().min(self.fifos[1].deadline());
         self.monitor.due(self.bit()).min(looped).min(released)
     }
 
-    /// Lets everything due up to `now` happen.
+    /// Processes everything that is due up to `now`.
     pub fn advance(&mut self, now: Time) {
         let due = self.monitor.due(self.bit());
         if self.monitor.poll(now, self.bit()) {
@@ -208,7 +208,8 @@ impl BxCan {
         self.fifos.iter_mut().for_each(|fifo| fifo.advance(now));
     }
 
-    /// Has a mailbox that is given back (RFOM) take so many cycles to make room: what does not wait for it reads a frame twice.
+    /// Sets the cycles from RFOM to the release of the output mailbox. Software that does not wait for the release
+    /// reads a frame twice.
     pub fn release_after(&mut self, cycles: u32) {
         self.release = cycles;
     }
@@ -217,7 +218,7 @@ impl BxCan {
         Time(Time::PER_SECOND * u64::from(self.release) / self.clock.max(1))
     }
 
-    /// The interrupt lines now.
+    /// The current levels of the interrupt lines.
     pub fn lines(&self) -> Lines {
         let enable = self.status.enable;
         Lines {
@@ -228,7 +229,7 @@ impl BxCan {
         }
     }
 
-    /// Length of a bit: one quantum of SYNC_SEG, then BS1 and BS2 (RM0390, bxCAN bit timing).
+    /// The length of a bit: one quantum of SYNC_SEG, then BS1 and BS2 (RM0390, bxCAN bit timing).
     pub(super) fn bit(&self) -> Time {
         let quanta = 3 + field(self.timing, 16, 4) + field(self.timing, 20, 3);
         let cycles = u64::from(quanta * (field(self.timing, 0, 10) + 1));
@@ -236,7 +237,7 @@ impl BxCan {
         Time((Time::PER_SECOND * cycles + clock / 2) / clock)
     }
 
-    /// The bit with its sample point and its resynchronisation jump width.
+    /// The bit timing with sample point and resynchronisation jump width.
     pub(super) fn bit_timing(&self) -> BitTiming {
         let part = |from, width| field(self.timing, from, width) as u8 + 1;
         BitTiming::new(self.bit(), part(16, 4), part(20, 3), part(24, 2))
@@ -246,7 +247,7 @@ impl BxCan {
         bit(self.control, bit_of_mcr)
     }
 
-    /// Whether the transmitter gives up after one attempt.
+    /// Whether the transmitter makes only one attempt for a frame.
     pub(super) fn gives_up(&self) -> bool {
         self.is_set(NART)
     }

@@ -1,4 +1,4 @@
-//! The side of bxCAN that faces the bus.
+//! The interface of bxCAN to the bus.
 
 use canbus::{Attachment, Controller, ErrorReport, Frame, Time};
 

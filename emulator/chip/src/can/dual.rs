@@ -17,7 +17,7 @@ pub struct DualCan {
 }
 
 impl DualCan {
-    /// Both after reset. `apb1` is their clock in hertz.
+    /// Both controllers after a reset. `apb1` is the clock of APB1 in hertz.
     pub fn new(apb1: u64) -> DualCan {
         DualCan { can1: BxCan::new(false, apb1), can2: BxCan::new(true, apb1) }
     }
@@ -40,12 +40,12 @@ impl DualCan {
         self.share_filters();
     }
 
-    /// CAN2 filters with its part of the banks in CAN1.
+    /// Tells CAN2 its part of the filter banks, which are in CAN1.
     fn share_filters(&mut self) {
         self.can2.filters.clone_from(&self.can1.filters);
     }
 
-    /// The clock of APB1 is now this, in hertz; 0 stops it.
+    /// Sets the clock of APB1 in hertz; 0 stops both controllers.
     pub fn set_clock(&mut self, apb1: u64) {
         self.can1.set_clock(apb1);
         self.can2.set_clock(apb1);
@@ -71,12 +71,12 @@ impl DualCan {
         Some(())
     }
 
-    /// The next instant at which something happens that neither software nor the bus causes.
+    /// The next instant at which the state changes without an access by software or an event on the bus.
     pub fn deadline(&self) -> Time {
         self.can1.deadline().min(self.can2.deadline())
     }
 
-    /// Lets everything due up to `now` happen.
+    /// Processes everything that is due up to `now`.
     pub fn advance(&mut self, now: Time) {
         self.can1.advance(now);
         self.can2.advance(now);
@@ -87,7 +87,7 @@ impl DualCan {
         [self.can1.lines(), self.can2.lines()]
     }
 
-    /// Takes the wish of either for `Effect::Poke`.
+    /// Takes the requests of both controllers for `Effect::Poke`.
     pub fn take_poke(&mut self) -> bool {
         let first = self.can1.take_poke();
         self.can2.take_poke() || first

@@ -15,17 +15,17 @@ const RFOM: u32 = 5;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fifo {
     mailboxes: VecDeque<Registers>,
-    /// What the output mailbox showed last, for reads while it is empty.
+    /// The last content of the output mailbox, which reads return while the FIFO is empty.
     output: Registers,
     full: bool,
     overrun: bool,
-    /// When the output mailbox, which software gives back, makes room for the next one.
+    /// The end of the release of the output mailbox (RFOM).
     release: Option<Time>,
 }
 
 impl Fifo {
-    /// Stores a frame that has passed a filter. When three wait, the newest of them is replaced or, `locked`, kept:
-    /// one frame is lost, and the answer is `false`.
+    /// Stores a frame that has passed a filter. In a full FIFO the frame replaces the newest one or, when `locked`, is
+    /// discarded; one frame is lost, and the result is `false`.
     pub(crate) fn store(&mut self, frame: Registers, locked: bool) -> bool {
         let room = self.mailboxes.len() < DEPTH;
         if room {
@@ -49,7 +49,7 @@ impl Fifo {
             | flag(self.release.is_some(), RFOM)
     }
 
-    /// Writes CAN_RFxR: clears flags, and gives the output mailbox back until an instant.
+    /// Writes CAN_RFxR: clears flags, and begins a release of the output mailbox, which ends at `released`.
     pub(crate) fn write_status(&mut self, value: u32, released: Time) {
         self.full &= !bit(value, FULL);
         self.overrun &= !bit(value, FOVR);
@@ -58,12 +58,12 @@ impl Fifo {
         }
     }
 
-    /// When the output mailbox changes by itself.
+    /// The end of the release of the output mailbox.
     pub(crate) fn deadline(&self) -> Time {
         self.release.unwrap_or(Time::NEVER)
     }
 
-    /// Lets everything due up to `now` happen.
+    /// Processes everything that is due up to `now`.
     pub(crate) fn advance(&mut self, now: Time) {
         if self.release.take_if(|release| *release <= now).is_some() {
             self.mailboxes.pop_front();

@@ -21,10 +21,10 @@ const LAST_FILTER: u32 = F0R1 + 8 * BANKS as u32 - 4;
 const FMR_RESET: u32 = 0x2A1C_0E01;
 const FMR_WRITABLE: u32 = 0x3F01;
 
-/// Where a frame goes, and by which filter.
+/// The filter that a frame has passed, and the FIFO for the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Match {
-    /// FIFO 0 or 1.
+    /// The FIFO: 0 or 1.
     pub(crate) fifo: usize,
     /// Filter match index, counted for each FIFO.
     pub(crate) index: u8,
@@ -34,11 +34,11 @@ pub(crate) struct Match {
 #[derive(Clone, Debug)]
 pub(crate) struct FilterBanks {
     fmr: u32,
-    /// Bit `n` is bank `n`: list rather than mask.
+    /// Bit `n` set: bank `n` is a list, not a mask.
     list: u32,
-    /// One 32-bit filter rather than two of 16 bits.
+    /// Bit `n` set: bank `n` has 32-bit filters, not 16-bit ones.
     wide: u32,
-    /// FIFO 1 rather than FIFO 0.
+    /// Bit `n` set: bank `n` stores into FIFO 1, not FIFO 0.
     fifo1: u32,
     active: u32,
     registers: [[u32; 2]; BANKS],
@@ -95,13 +95,13 @@ impl FilterBanks {
         bit(self.fmr, 0)
     }
 
-    /// The banks of CAN1, or those of CAN2.
+    /// The banks of CAN1 or, with `slave`, of CAN2.
     pub(crate) fn share(&self, slave: bool) -> Range<usize> {
         let split = (field(self.fmr, 8, 6) as usize).min(BANKS);
         if slave { split..BANKS } else { 0..split }
     }
 
-    /// The filter that takes a frame, of those in `banks`; `None` when the frame is not for this node.
+    /// The filter of `banks` that the frame passes; `None` when the node does not receive the frame.
     pub(crate) fn accept(&self, frame: &Frame, banks: Range<usize>) -> Option<Match> {
         if self.is_initialising() {
             return None;
@@ -115,7 +115,7 @@ impl FilterBanks {
             numbers[fifo] += kind.filters();
             let hit = kind.first_match(self.registers[bank], identifier(frame));
             let Some(n) = hit.filter(|_| bit(self.active, bank as u32)) else { continue };
-            // Only a kind that takes priority replaces what an earlier bank has found.
+            // A match replaces one of an earlier bank only when its kind has a higher priority.
             if best.is_none_or(|(priority, _)| kind.priority() < priority) {
                 best = Some((kind.priority(), Match { fifo, index: first + n }));
             }
@@ -133,13 +133,13 @@ impl FilterBanks {
     }
 }
 
-/// Bank and register of the bank.
+/// The bank and the register within the bank.
 fn place(offset: u32) -> (usize, usize) {
     let n = (offset - F0R1) as usize / 4;
     (n / 2, n % 2)
 }
 
-/// What a bank holds.
+/// The scale and the mode of a bank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     List32,
@@ -149,7 +149,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Filters in a bank. Their numbers count inactive banks too.
+    /// Number of filters in the bank. Inactive banks are numbered too.
     fn filters(self) -> u8 {
         match self {
             Kind::Mask32 => 1,
@@ -158,7 +158,7 @@ impl Kind {
         }
     }
 
-    /// 32 bits before 16, list before mask; lower goes first.
+    /// Lower values have priority: 32 bits before 16, list before mask.
     fn priority(self) -> u8 {
         match self {
             Kind::List32 => 0,
@@ -168,7 +168,7 @@ impl Kind {
         }
     }
 
-    /// The first filter of a bank that an identifier, in the layout of CAN_RIxR, passes.
+    /// The first filter in the bank that an identifier, in the layout of CAN_RIxR, passes.
     fn first_match(self, [one, two]: [u32; 2], identifier: u32) -> Option<u8> {
         let low = |register: u32| register & 0xFFFF;
         let high = |register: u32| register >> 16;

@@ -12,7 +12,8 @@ const RTR: u32 = 1;
 pub(crate) struct Registers {
     /// CAN_TIxR or CAN_RIxR without TXRQ.
     pub(crate) identifier: u32,
-    /// CAN_TDTxR or CAN_RDTxR: length and, received, the filter match index. Time stamps are not modelled.
+    /// CAN_TDTxR or CAN_RDTxR: the length and, for a received frame, the filter match index. Time stamps are not
+    /// modelled.
     pub(crate) control: u32,
     /// CAN_xDLxR.
     pub(crate) low: u32,
@@ -21,7 +22,7 @@ pub(crate) struct Registers {
 }
 
 impl Registers {
-    /// A received frame and the filter that it passed.
+    /// The registers for a received frame and its filter match index.
     pub(crate) fn of(frame: &Frame, filter_match: u8) -> Registers {
         let mut data = [0; 8];
         data[..frame.bytes().len()].copy_from_slice(frame.bytes());

@@ -55,7 +55,7 @@ impl Status {
             | flag(state == ErrorState::BusOff, 2)
     }
 
-    /// Writes CAN_ESR: LEC is all that can be written.
+    /// Writes CAN_ESR: only LEC is writable.
     pub(crate) fn write_errors(&mut self, value: u32) {
         self.last_error = field(value, 4, 3);
     }
@@ -94,7 +94,7 @@ impl Status {
         self.wake_up = true;
     }
 
-    /// Sleep mode was entered; the flag exists only with its interrupt.
+    /// Sleep mode was entered; the flag is set only while its interrupt is enabled.
     pub(crate) fn asleep(&mut self) {
         self.sleep = bit(self.enable, SLKIE);
     }

@@ -7,7 +7,7 @@ use crate::register::{bit, flag};
 
 const MAILBOXES: usize = 3;
 const TXRQ: u32 = 0;
-/// Places in the byte of CAN_TSR that each mailbox has.
+/// Bits in each mailbox's byte of CAN_TSR.
 const RQCP: u32 = 0;
 const TXOK: u32 = 1;
 const ALST: u32 = 2;
@@ -20,13 +20,13 @@ const CONTROL_WRITABLE: u32 = 0xFFFF_010F;
 enum State {
     #[default]
     Empty,
-    /// Pending or, the one with the highest priority, scheduled.
+    /// Pending, or scheduled if its priority is the highest.
     Pending,
     /// On the wire.
     Transmit,
 }
 
-/// How an attempt ended.
+/// The outcome of an attempt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Outcome {
     #[default]
@@ -41,7 +41,7 @@ struct Mailbox {
     registers: Registers,
     state: State,
     requested: Time,
-    /// Place in the order of all requests.
+    /// The number of the request in the order of all requests.
     turn: u64,
     abort: bool,
     completed: bool,
@@ -56,7 +56,7 @@ impl Mailbox {
         self.completed = true;
     }
 
-    /// An attempt has failed; with `give_up`, or after an abort request, it was the last.
+    /// An attempt has failed. The attempt was the last one with `give_up`, or after an abort request.
     fn fail(&mut self, outcome: Outcome, give_up: bool) {
         self.outcome = outcome;
         self.state = State::Pending;
@@ -84,7 +84,7 @@ impl Mailbox {
             | flag(self.abort, ABRQ)
     }
 
-    /// Writes its byte of CAN_TSR.
+    /// Writes the mailbox's byte of CAN_TSR.
     fn write_status(&mut self, value: u32) {
         let own = match self.outcome {
             Outcome::None => false,
@@ -92,7 +92,7 @@ impl Mailbox {
             Outcome::Lost => bit(value, ALST),
             Outcome::Failed => bit(value, TERR),
         };
-        // Clearing RQCP clears the other three too.
+        // Clearing RQCP also clears TXOK, ALST and TERR.
         if own || bit(value, RQCP) {
             self.outcome = Outcome::None;
         }
@@ -107,13 +107,13 @@ impl Mailbox {
 pub(crate) struct Transmitter {
     mailboxes: [Mailbox; MAILBOXES],
     turns: u64,
-    /// Completions that a test wants lost, and aborts that it wants too late.
+    /// Numbers of completions that a test suppresses, and of aborts that a test makes come too late.
     pub(crate) lost_ends: usize,
     pub(crate) late_aborts: usize,
 }
 
 impl Transmitter {
-    /// CAN_TSR. With `fifo` the order of requests decides (TXFP), else the identifiers.
+    /// CAN_TSR. With `fifo` (TXFP) the order of requests decides the priority, otherwise the identifiers.
     pub(crate) fn status(&self, fifo: bool) -> u32 {
         let each = self.mailboxes.iter().enumerate().fold(0, |word, (n, mailbox)| {
             let empty = flag(mailbox.state == State::Empty, 26 + n as u32);
@@ -139,7 +139,7 @@ impl Transmitter {
         (0..MAILBOXES).filter(|n| self.mailboxes[*n].state != State::Empty)
     }
 
-    /// The lower one goes first; mailboxes of equal priority go by their number.
+    /// The lower value goes first; mailboxes of equal priority go by their number.
     fn priority(&self, n: usize, fifo: bool) -> (u64, usize) {
         let mailbox = &self.mailboxes[n];
         let key = if fifo { mailbox.turn } else { mailbox.registers.frame().arbitration().into() };
@@ -205,7 +205,7 @@ impl Transmitter {
         };
     }
 
-    /// When the oldest pending request was made.
+    /// The instant of the oldest pending request.
     pub(crate) fn requested(&self) -> Option<Time> {
         self.pending().map(|n| self.mailboxes[n].requested).min()
     }
@@ -214,7 +214,7 @@ impl Transmitter {
         (0..MAILBOXES).filter(|n| self.mailboxes[*n].state == State::Pending)
     }
 
-    /// The scheduled mailbox's frame, of the requests made up to `at`.
+    /// The frame of the scheduled mailbox, of the requests made up to `at`.
     pub(crate) fn scheduled(&self, fifo: bool, at: Time) -> Option<Frame> {
         self.schedule(fifo, at).map(|n| self.mailboxes[n].registers.frame())
     }
@@ -224,14 +224,14 @@ impl Transmitter {
         ready.min_by_key(|n| self.priority(*n, fifo))
     }
 
-    /// The scheduled mailbox goes on the wire.
+    /// The transmission of the scheduled mailbox begins.
     pub(crate) fn begin(&mut self, fifo: bool, at: Time) {
         if let Some(n) = self.schedule(fifo, at) {
             self.mailboxes[n].state = State::Transmit;
         }
     }
 
-    /// Whether a mailbox is on the wire.
+    /// Whether the transmission of a mailbox is under way.
     pub(crate) fn is_transmitting(&self) -> bool {
         self.mailboxes.iter().any(|mailbox| mailbox.state == State::Transmit)
     }
@@ -262,7 +262,7 @@ impl Transmitter {
         }
     }
 
-    /// Whether a request has completed and software has not seen it yet.
+    /// Whether a request has completed and software has not cleared its flag.
     pub(crate) fn interrupt(&self) -> bool {
         self.mailboxes.iter().any(|mailbox| mailbox.completed)
     }

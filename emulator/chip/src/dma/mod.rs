@@ -1,7 +1,8 @@
 //! A DMA controller: eight streams (RM0390 section 9, RM0090 section 10).
 //!
-//! Direct mode between a peripheral and memory, circular and double buffer. Transfers take no time. Memory to memory,
-//! FIFO mode, bursts and flow control by the peripheral are not modelled: a write that asks for them is on record.
+//! Modelled: direct mode between a peripheral and memory, circular and double buffer. Transfers take no time. Not
+//! modelled: memory to memory, FIFO mode, bursts and flow control by the peripheral. A write that selects one of these
+//! is recorded.
 
 mod stream;
 
@@ -14,7 +15,7 @@ const HIFCR: u32 = 0x0C;
 const FIRST_STREAM: u32 = 0x10;
 const STREAM_SIZE: u32 = 0x18;
 
-/// Where the flags of each of four streams begin in a status register.
+/// Positions of the flags of four streams in a status register.
 const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
 
 #[derive(Clone, Default)]
@@ -35,7 +36,7 @@ impl Dma {
         }
     }
 
-    /// `None` when the register, or what is asked of it, is not modelled.
+    /// `None` when the register, or a bit set in it, is not modelled.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             LISR | HISR => Some(()),
@@ -60,13 +61,13 @@ impl Dma {
         Some(())
     }
 
-    /// The stream that serves a request: the first enabled one of those that the request is wired to.
+    /// The stream that serves a request: the first enabled stream that the request is wired to.
     pub(crate) fn serving(&mut self, request: &[Line]) -> Option<&mut Stream> {
         let line = self.line(request)?;
         self.streams.get_mut(line.stream)
     }
 
-    /// The same, to look at.
+    /// The stream that serves a request, for reading.
     pub(crate) fn serves(&self, request: &[Line]) -> Option<&Stream> {
         self.streams.get(self.line(request)?.stream)
     }
@@ -76,7 +77,7 @@ impl Dma {
         request.iter().copied().find(|line| self.streams[line.stream].listens_to(line.channel))
     }
 
-    /// The stream that was enabled with the flags of its last transfer up.
+    /// A stream that was enabled while flags of its last transfer were set.
     pub(crate) fn take_begun_with_flags(&mut self) -> Option<usize> {
         self.streams.iter_mut().position(Stream::take_begun_with_flags)
     }
@@ -92,14 +93,14 @@ fn locate(offset: u32) -> Option<(usize, u32)> {
     Some(((place / STREAM_SIZE) as usize, place % STREAM_SIZE))
 }
 
-/// A request line: the stream it ends at and the channel that selects it there (RM0390 tables 28 and 29).
+/// A request line: its stream, and the channel that selects the line there (RM0390 tables 28 and 29).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Line {
     pub(crate) stream: usize,
     pub(crate) channel: u32,
 }
 
-/// The line to a stream that a channel selects.
+/// The line of a channel to a stream.
 pub(crate) const fn line(stream: usize, channel: u32) -> Line {
     Line { stream, channel }
 }

@@ -15,31 +15,31 @@ const PINC: u32 = 9;
 const MINC: u32 = 10;
 const DBM: u32 = 18;
 const CT: u32 = 19;
-/// PFCTRL, PBURST and MBURST.
+/// Unmodelled bits of CR: PFCTRL, PBURST and MBURST.
 const CR_NOT_MODELLED: u32 = 1 << 5 | 0xF << 21;
-/// DMDIS: FIFO mode.
+/// Unmodelled bit of FCR: DMDIS (FIFO mode).
 const FCR_NOT_MODELLED: u32 = 1 << 2;
 
-/// Flags in the order of the status registers.
+/// Positions of the flags within a stream's part of the status registers.
 const DMEIF: u32 = 2;
 const TEIF: u32 = 3;
 const HTIF: u32 = 4;
 const TCIF: u32 = 5;
 
-/// Which way a transfer goes.
+/// The direction of a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Direction {
     PeripheralToMemory,
     MemoryToPeripheral,
 }
 
-/// The next item that a stream moves.
+/// The next item that the stream moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Transfer {
     pub(crate) direction: Direction,
     pub(crate) peripheral: u32,
     pub(crate) memory: u32,
-    /// Bytes; in direct mode PSIZE counts on both sides.
+    /// Size in bytes. In direct mode PSIZE applies to both sides.
     pub(crate) size: u8,
 }
 
@@ -48,13 +48,13 @@ pub(crate) struct Stream {
     cr: u32,
     /// Items left.
     left: u32,
-    /// Items in a whole round.
+    /// Items in a complete round.
     all: u32,
     par: u32,
     memory: [u32; 2],
     fcr: u32,
     flags: u32,
-    /// A transfer has begun while flags of the one before were up.
+    /// A transfer has begun while flags of the last transfer were set.
     begun_with_flags: bool,
 }
 
@@ -86,7 +86,7 @@ impl Stream {
             }
             M0AR => self.write_memory(0, value),
             M1AR => self.write_memory(1, value),
-            // Protected while the stream is enabled.
+            // Write-protected while the stream is enabled.
             NDTR | PAR if self.enabled() => {}
             NDTR => self.left = value & 0xFFFF,
             PAR => self.par = value,
@@ -110,7 +110,7 @@ impl Stream {
         (value & CR_NOT_MODELLED == 0 && !memory_to_memory).then_some(())
     }
 
-    /// In double buffer mode the address that is not in use can be changed while the stream runs.
+    /// Double buffer mode: the address not in use can be written while the stream runs.
     fn write_memory(&mut self, index: usize, value: u32) {
         let in_use = usize::from(bit(self.cr, CT)) == index;
         if !self.enabled() || bit(self.cr, DBM) && !in_use {
@@ -118,7 +118,8 @@ impl Stream {
         }
     }
 
-    /// Whether a transfer has begun since the last call before the flags of the one before were cleared (RM0390 section 9.5.5, EN).
+    /// Whether a transfer has begun, since the last call, while flags of the previous transfer were set (RM0390 section
+    /// 9.5.5, EN).
     pub(super) fn take_begun_with_flags(&mut self) -> bool {
         std::mem::take(&mut self.begun_with_flags)
     }
@@ -131,7 +132,7 @@ impl Stream {
         self.enabled() && self.left != 0 && field(self.cr, 25, 3) == channel
     }
 
-    /// The next item; the caller moves it and then says `done` or `fail`.
+    /// The next item; the caller moves the item and then calls `done` or `fail`.
     pub(crate) fn next(&self) -> Transfer {
         let size = 1 << field(self.cr, 11, 2).min(2);
         let moved = (self.all - self.left) * size;
@@ -150,7 +151,7 @@ impl Stream {
         }
     }
 
-    /// Counts an item that was moved; `true` when it was the last one of a round.
+    /// Counts a moved item; `true` for the last item of a round.
     pub(crate) fn done(&mut self) -> bool {
         self.left -= 1;
         // Half transfer (RM0390 section 9.3.7).
@@ -175,7 +176,7 @@ impl Stream {
         }
     }
 
-    /// A bus error: the stream stops.
+    /// A bus error stops the stream.
     pub(crate) fn fail(&mut self) {
         self.flags |= 1 << TEIF;
         self.cr &= !(1 << EN);

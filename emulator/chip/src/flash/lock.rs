@@ -1,4 +1,4 @@
-//! The locks of FLASH_CR and FLASH_OPTCR: two keys in order open them.
+//! The locks of FLASH_CR and FLASH_OPTCR: two keys in the right order open a lock.
 
 use crate::peripherals::BusFault;
 
@@ -12,7 +12,7 @@ enum State {
     Locked,
     FirstKey,
     Open,
-    /// A wrong key came: nothing opens it before the next reset.
+    /// A wrong key was written: the lock stays closed until the next reset.
     Dead,
 }
 
@@ -31,7 +31,7 @@ impl Lock {
         self.state == State::Open
     }
 
-    /// Takes a key; a wrong one is a bus error.
+    /// Takes a key; a wrong key is a bus error.
     pub(super) fn take(&mut self, key: u32) -> Result<(), BusFault> {
         self.state = match self.state {
             State::Locked if key == self.keys[0] => State::FirstKey,

@@ -1,8 +1,9 @@
 //! FLASH: the controller of the flash array (RM0390 section 3, RM0090 section 3).
 //!
-//! Unlocking, programming in all widths, sector and mass erase, write protection, error flags and busy times. The array
-//! itself is with the core: effects say what becomes of it. A programmed unit changes when the operation starts, an erased
-//! sector when it ends; reads in between wait for the end anyway.
+//! Modelled: unlocking, programming in all widths, sector and mass erase, write protection, error flags and busy times.
+//! The array itself is kept by the core; effects tell the core how the array changes. A programmed unit changes when
+//! the operation starts, an erased sector when the erase ends. A read in between waits for the end of the operation, so
+//! the difference cannot be seen.
 
 mod lock;
 mod program;
@@ -49,12 +50,12 @@ const OPTCR_WRITABLE: u32 = 0x0FFF_FFEC;
 /// The first of the nWRP bits: a sector is protected while its bit is 0.
 const OPTCR_NWRP: u32 = 16;
 const OPTCR_DEFAULT: u32 = 0x0FFF_AAEC;
-/// RDP, and its levels with a value of their own; any other is level 1.
+/// Position of RDP, and the values for levels 0 and 2; any other value means level 1.
 const OPTCR_RDP: u32 = 8;
 const LEVEL_0: u32 = 0xAA;
 const LEVEL_2: u32 = 0xCC;
 
-/// An operation that was refused: its flag in FLASH_SR.
+/// A refused operation, as the number of its flag in FLASH_SR.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Refused {
     WriteProtected = 4,
@@ -63,12 +64,12 @@ enum Refused {
     Sequence = 7,
 }
 
-/// What goes on in the array.
+/// The operation under way in the array.
 #[derive(Clone, Debug)]
 enum Work {
-    /// The array is as it will be.
+    /// Programming: the array has already changed.
     Programmed,
-    /// These sectors become FFh at the end; with `cut` the power goes away before that.
+    /// An erase: the sectors become FFh at the end; with `cut` the power fails before the end.
     Erase { sectors: Vec<Range<u32>>, cut: bool },
 }
 
@@ -84,11 +85,11 @@ pub struct Flash {
     optcr: u32,
     work: Option<Work>,
     busy_until: Time,
-    /// The first half of a double word: the core stores it as two words.
+    /// The first half of a double word: the core stores a double word as two words.
     half: Option<Store>,
     operations: u64,
     cut_at: Option<u64>,
-    /// BSY stays up until then, whatever the array does.
+    /// BSY stays set until this instant, independent of the array.
     stuck_until: Time,
 }
 
@@ -112,17 +113,17 @@ impl Flash {
     }
 
     /// Cuts the power in the `n`th operation from now on (1 is the next one). Each programmed unit and each erased
-    /// sector is an operation. The array is then torn, and `Effect::PowerCut` tells.
+    /// sector is an operation. The operation leaves a torn unit, and the chip emits `Effect::PowerCut`.
     pub fn cut_power_at_operation(&mut self, n: u64) {
         self.cut_at = Some(self.operations + n);
     }
 
-    /// Keeps BSY up until this instant, though the array can be read: a controller that hangs.
+    /// Keeps BSY set until this instant although the array can be read: the controller hangs.
     pub fn hang(&mut self, until: Time) {
         self.stuck_until = until;
     }
 
-    /// How the core reads the array (RM0390, 3.8.1).
+    /// The settings for reads of the array (RM0390, 3.8.1).
     pub(crate) fn access(&self) -> FlashAccess {
         let (caches_code, caches_constants) = (bit(self.acr, 9), bit(self.acr, 10));
         FlashAccess { wait_states: self.wait_states(), caches_code, caches_constants }
@@ -133,7 +134,7 @@ impl Flash {
         field(self.acr, 0, 4)
     }
 
-    /// Operations so far.
+    /// Number of operations so far.
     pub fn operations(&self) -> u64 {
         self.operations
     }
@@ -143,7 +144,7 @@ impl Flash {
         !field(self.optcr, OPTCR_NWRP, 12) & 0xFFF
     }
 
-    /// A reset. One in the middle of an erase leaves the sector torn.
+    /// A reset. A reset in the middle of an erase leaves the sector torn.
     pub(crate) fn reset(&mut self, effects: &mut VecDeque<Effect>) {
         if let Some(Work::Erase { sectors, .. }) = self.work.take() {
             self.tear(&sectors, effects);
@@ -167,7 +168,7 @@ impl Flash {
         }
     }
 
-    /// Writes a register after `advance`; `Ok(None)` when it, or what is asked of it, is not modelled.
+    /// Writes a register after `advance`; `Ok(None)` when the register, or a bit set in it, is not modelled.
     pub(crate) fn write(
         &mut self,
         offset: u32,
@@ -182,7 +183,7 @@ impl Flash {
             SR => self.sr &= !(value & SR_CLEARABLE),
             CR if self.lock.is_open() => self.write_control(value, now, effects),
             OPTCR if self.option_lock.is_open() => return Ok(self.write_options(value, now, effects)),
-            // Locked: the write has no effect.
+            // Locked: a write has no effect.
             CR | OPTCR => {}
             _ => return Ok(None),
         }
@@ -201,7 +202,7 @@ impl Flash {
         }
     }
 
-    /// Options take effect with OPTSTRT. `None` for PCROP.
+    /// Option bytes are programmed when OPTSTRT is set. `None` for the unmodelled PCROP.
     fn write_options(&mut self, value: u32, now: Time, effects: &mut VecDeque<Effect>) -> Option<()> {
         if bit(value, OPTCR_STRT) && self.read_out_level() != LEVEL_2 {
             self.program_options(value & OPTCR_WRITABLE, now, effects);
@@ -212,7 +213,7 @@ impl Flash {
         (!bit(value, 31)).then_some(())
     }
 
-    /// From level 1 to level 0 the array is erased, write protected or not (RM0390 section 3.6.3).
+    /// A change from level 1 to level 0 erases the array, including write-protected sectors (RM0390 section 3.6.3).
     fn program_options(&mut self, options: u32, now: Time, effects: &mut VecDeque<Effect>) {
         let before = self.read_out_level();
         self.optcr = options;
@@ -230,12 +231,12 @@ impl Flash {
 
     fn report(&mut self, outcome: Result<(), Refused>) {
         if let Err(refused) = outcome {
-            // OPERR is only set while its interrupt is enabled (RM0390 section 3.8.5).
+            // OPERR is set only while its interrupt is enabled (RM0390 section 3.8.5).
             self.sr |= 1 << refused as u32 | flag(bit(self.cr, CR_ERRIE), SR_OPERR);
         }
     }
 
-    /// When the operation under way ends.
+    /// The end of the operation under way.
     pub(crate) fn deadline(&self) -> Time {
         let watched = self.erases() || self.work.is_some() && bit(self.cr, CR_EOPIE);
         if watched { self.busy_until } else { Time::NEVER }

@@ -1,4 +1,4 @@
-//! Programming: what a store by the core into the array does (RM0390 section 3.5.4).
+//! Programming: the effect of a store by the core into the array (RM0390 section 3.5.4).
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use crate::peripherals::{BusFault, Effect};
 use crate::register::field;
 use crate::variant::FLASH_BASE;
 
-/// A store into the array: where, what is there and what is to be.
+/// A store into the array: the address, the old and the new content.
 #[derive(Clone, Debug)]
 pub(super) struct Store {
     address: u32,
@@ -22,12 +22,12 @@ impl Store {
         self.address + self.new.len() as u32
     }
 
-    /// This store and the one that follows it as one.
+    /// The double word of this store and the one that follows.
     fn join(self, next: Store) -> Store {
         Store { old: [self.old, next.old].concat(), new: [self.new, next.new].concat(), ..self }
     }
 
-    /// Programming only clears bits.
+    /// The content after programming, which only clears bits.
     fn result(&self) -> Vec<u8> {
         self.old.iter().zip(&self.new).map(|(old, new)| old & new).collect()
     }
@@ -47,7 +47,7 @@ impl Flash {
         if !range.contains(&address) {
             return Err(BusFault);
         }
-        // The store waits for an erase that is under way, and then finds the sector empty.
+        // The store waits for an erase under way, and then finds the sector erased.
         let erased = self.erases_at(address);
         self.end_work(effects);
         if effects.back() == Some(&Effect::PowerCut) {
@@ -61,7 +61,7 @@ impl Flash {
         Ok(())
     }
 
-    /// The unit to program now; `None` while half of a double word is still to come.
+    /// The unit to program now; `None` while half of a double word is missing.
     fn accept(&mut self, store: Store) -> Result<Option<Store>, Refused> {
         let modes = field(self.cr, 0, 3);
         if !self.lock.is_open() || modes != 1 << CR_PG {
@@ -78,7 +78,8 @@ impl Flash {
         Ok(Some(unit))
     }
 
-    /// A unit of `width` bytes. The core stores a double word as two words: the first one is kept until the second comes.
+    /// Collects a unit of `width` bytes. The core stores a double word as two words: the first word is kept until the
+    /// second one comes.
     fn gather(&mut self, store: Store, width: u32) -> Result<Option<Store>, Refused> {
         let kept = self.half.take();
         match (width, store.new.len() as u32, kept) {

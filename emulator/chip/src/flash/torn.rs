@@ -1,20 +1,20 @@
-//! What the flash holds after the power went away in the middle of an operation: neither old nor new, and always the
-//! same for the same operation, so a test can repeat it.
+//! The content of the flash after a power cut in the middle of an operation: neither old nor new. The same operation
+//! always gives the same content, so that a test can be repeated.
 
 use std::ops::Range;
 
 use crate::peripherals::Effect;
 
-/// Bytes between the part of a sector that is erased and the part that is not, which hold anything.
+/// Bytes between the erased and the unerased part of a sector; they have arbitrary values.
 const BORDER: u32 = 256;
 
-/// The cells of a unit that was being programmed: only some of the bits that had to fall have fallen.
+/// The content of a unit after a cut in its programming: only some of the bits to be cleared are cleared.
 pub(super) fn programmed(old: &[u8], new: &[u8], salt: u64) -> Vec<u8> {
     let pairs = (0..).zip(old.iter().zip(new));
     pairs.map(|(index, (old, new))| old & (new | scatter(salt.wrapping_add(index)) as u8)).collect()
 }
 
-/// A sector that was being erased.
+/// The content of a sector after a cut in its erase.
 pub(super) fn erased(sector: Range<u32>, salt: u64) -> [Effect; 2] {
     let eighth = (sector.end - sector.start) / 8;
     let border = sector.start + eighth * (1 + scatter(salt) as u32 % 6);

@@ -1,4 +1,4 @@
-//! Operations that take their time: erasing, and how any operation ends.
+//! Erase operations, and the end of any operation.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -10,7 +10,7 @@ use crate::peripherals::Effect;
 use crate::register::{bit, field, flag};
 
 impl Flash {
-    /// Starts what SER or MER selects; with both nothing is erased (RM0390 section 3.5.3).
+    /// Starts the erase that SER or MER selects; with both bits set nothing is erased (RM0390 section 3.5.3).
     pub(super) fn erase(&mut self, now: Time, effects: &mut VecDeque<Effect>) -> Result<(), Refused> {
         let psize = field(self.cr, 8, 2);
         let (chosen, time): (Vec<usize>, Time) = match (bit(self.cr, CR_SER), bit(self.cr, CR_MER)) {
@@ -32,7 +32,7 @@ impl Flash {
         Ok(())
     }
 
-    /// Erases the whole array, whatever protects it.
+    /// Erases the whole array, including protected sectors.
     pub(super) fn erase_all(&mut self, now: Time, effects: &mut VecDeque<Effect>) {
         let time = timing::mass_erase(self.variant.flash_size(), field(self.cr, 8, 2));
         self.begin((0..self.variant.sectors().count()).collect(), time, now, effects);
@@ -47,18 +47,18 @@ impl Flash {
         effects.push_back(Effect::StallFlash(self.busy_until));
     }
 
-    /// Counts operations; `true` when the power goes away in one of them.
+    /// Counts operations; `true` when the power is cut in one of them.
     pub(super) fn count(&mut self, operations: u64) -> bool {
         self.operations += operations;
         self.cut_at.take_if(|at| *at <= self.operations).is_some()
     }
 
-    /// When an operation that is asked for now can start.
+    /// The earliest start of an operation that is requested now.
     pub(super) fn free(&self, now: Time) -> Time {
         now.max(self.busy_until)
     }
 
-    /// Ends the operation whose time has come.
+    /// Ends the operation under way if its end has been reached.
     pub(crate) fn advance(&mut self, now: Time, effects: &mut VecDeque<Effect>) {
         if now >= self.busy_until {
             self.end_work(effects);
@@ -78,11 +78,12 @@ impl Flash {
                 effects.extend(sectors.into_iter().map(|range| Effect::Fill { range, byte: 0xFF }));
             }
         }
-        // EOP is only set while its interrupt is enabled (RM0390 section 3.8.5).
+        // EOP is set only while its interrupt is enabled (RM0390 section 3.8.5).
         self.sr |= flag(bit(self.cr, CR_EOPIE), SR_EOP);
     }
 
-    /// Of several sectors the first half is erased, the next one torn and the rest untouched.
+    /// A cut in the erase of several sectors: the first half is erased, the next sector is torn and the rest is
+    /// unchanged.
     pub(super) fn tear(&self, sectors: &[Range<u32>], effects: &mut VecDeque<Effect>) {
         let (whole, rest) = sectors.split_at(sectors.len() / 2);
         effects.extend(whole.iter().map(|range| Effect::Fill { range: range.clone(), byte: 0xFF }));

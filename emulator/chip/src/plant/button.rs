@@ -5,10 +5,10 @@ use std::str::FromStr;
 use canbus::Time;
 use thiserror::Error;
 
-/// Buttons that the board has.
+/// Number of buttons on the board.
 pub const BUTTONS: usize = 2;
 
-/// For so long after it was pressed or released a contact bounces, and it opens and closes with this period.
+/// The time for which a contact bounces after a press or release, and the period of the bouncing.
 const BOUNCES_FOR: Time = Time::from_micros(3000);
 const BOUNCE: Time = Time::from_micros(700);
 
@@ -26,7 +26,7 @@ impl Button {
         }
     }
 
-    /// Whether it is held down.
+    /// Whether the button is held down.
     pub(super) fn is_down(&self) -> bool {
         self.is_down
     }
@@ -39,16 +39,16 @@ impl Button {
     }
 }
 
-/// Somebody presses or releases a button.
+/// A press or a release of a button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Push {
-    /// Which one, from 0 on.
+    /// The number of the button, from 0 on.
     pub button: usize,
-    /// Pressed, and held.
+    /// `true` for a press, after which the button is held.
     pub down: bool,
 }
 
-/// Why a push cannot be understood. Every message is one line.
+/// The reason why the text of a push is invalid. Every message is one line.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum PushError {
     /// Not `NUMBER:down` or `NUMBER:up`.
@@ -62,7 +62,7 @@ pub enum PushError {
 impl FromStr for Push {
     type Err = PushError;
 
-    /// `NUMBER:down` or `NUMBER:up`, with the numbers as they are on the board, from 1 on.
+    /// `NUMBER:down` or `NUMBER:up`; the numbers are those on the board, from 1 on.
     fn from_str(spec: &str) -> Result<Self, PushError> {
         let (number, down) = match spec.split_once(':') {
             Some((number, "down")) => (number, true),

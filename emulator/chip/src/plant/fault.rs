@@ -1,11 +1,11 @@
-//! Faults of the sensors and of the board, from an instant of virtual time on.
+//! Faults of the sensors and of the board, each with a span of virtual time.
 
 use std::str::FromStr;
 
 use canbus::Time;
 use thiserror::Error;
 
-/// What is wrong.
+/// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// The wire of the pressure transducer's output is broken.
@@ -22,9 +22,9 @@ pub enum FaultKind {
     MissingIndex,
     /// The data line of the absolute encoder is broken.
     OpenSsi,
-    /// The absolute encoder tells a position that is half a revolution off.
+    /// The absolute encoder sends a position that is half a revolution off.
     WrongCode,
-    /// No battery behind VBAT, or an empty one: a loss of the main supply is one of the backup domain too.
+    /// No battery, or an empty one, at VBAT: a loss of the main supply is also a loss of the backup domain's supply.
     BatteryEmpty,
     /// The clock on OSC_IN has stopped.
     NoCrystal,
@@ -44,17 +44,17 @@ const NAMES: [(&str, FaultKind); 10] = [
 ];
 
 impl FaultKind {
-    /// All there are.
+    /// All kinds of faults.
     pub fn all() -> impl Iterator<Item = FaultKind> {
         NAMES.into_iter().map(|(_, kind)| kind)
     }
 
-    /// As it is written.
+    /// The name in the text form.
     pub fn name(self) -> &'static str {
         NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }
 
-    /// What is wrong, in words.
+    /// A description of the fault.
     pub fn text(self) -> &'static str {
         match self {
             FaultKind::OpenSensor => "pressure transducer: broken wire",
@@ -76,12 +76,12 @@ impl FaultKind {
     }
 }
 
-/// A fault that comes or goes now.
+/// A fault that begins or ends now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultSwitch {
-    /// What is wrong.
+    /// The kind of the fault.
     pub kind: FaultKind,
-    /// It comes, or goes.
+    /// `true` when the fault begins.
     pub is_on: bool,
 }
 
@@ -99,14 +99,14 @@ impl FromStr for FaultSwitch {
     }
 }
 
-/// A fault and when it is there.
+/// A fault and its span of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What is wrong.
+    /// The kind of the fault.
     pub kind: FaultKind,
-    /// Since when.
+    /// The begin of the fault.
     pub from: Time,
-    /// Until when; [`Time::NEVER`] for ever.
+    /// The end of the fault; [`Time::NEVER`] for a permanent fault.
     pub until: Time,
 }
 
@@ -115,16 +115,16 @@ impl Fault {
         self.from <= now && now < self.until
     }
 
-    /// Its next start or end; never when both are over.
+    /// The next begin or end of the fault; never when both are over.
     pub(super) fn next_edge(&self, now: Time) -> Time {
         [self.from, self.until].into_iter().find(|edge| now < *edge).unwrap_or(Time::NEVER)
     }
 }
 
-/// Why a fault cannot be understood. Every message is one line.
+/// The reason why the text of a fault is invalid. Every message is one line.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum FaultError {
-    /// Neither `NAME@SECONDS` nor `NAME:on`.
+    /// The text is neither `NAME@SECONDS` nor `NAME:on`.
     #[error(
         "`{0}` is not of the form NAME@SECONDS or NAME@SECONDS..SECONDS, for example open-sensor@2.5; from now on: NAME:on, NAME:off"
     )]
@@ -132,10 +132,10 @@ pub enum FaultError {
     /// No fault has this name.
     #[error("unknown fault `{0}`; known are {known}", known = NAMES.map(|known| known.0).join(", "))]
     Name(String),
-    /// Not a time from 0 on.
+    /// The time is not a number from 0 on.
     #[error("`{0}` is not a time in seconds")]
     Time(String),
-    /// It ends before it starts.
+    /// The fault ends before it begins.
     #[error("`{0}` ends before it starts")]
     Order(String),
 }

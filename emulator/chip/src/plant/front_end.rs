@@ -7,19 +7,20 @@
 //!                   └── thermistor ── ground                10 kohm at 25 degrees Celsius, beta 3950 K
 //! ```
 //!
-//! The transducer is ratiometric and both dividers bring 5 V to 3.3 V, so PA0 over PA1 is the pressure whatever the
-//! supply is, and at 5 V the ADC reads the same ratio of VDDA as the transducer gives of its supply. A broken wire
-//! leaves PA0 to the divider's lower resistor: 0 V. That of a thermistor leaves PC2 to VDDA. The chip's own temperature sensor and reference follow the factory
-//! calibration words in system memory (DS10693, temperature sensor and reference voltage).
+//! The transducer is ratiometric and both dividers bring 5 V to 3.3 V. So the ratio of PA0 to PA1 is the pressure at
+//! any supply voltage. At 5 V, the ratio of PA0 to VDDA equals the ratio of the transducer's output to its supply. A
+//! broken wire leaves PA0 to the divider's lower resistor: 0 V. A broken wire of the thermistor leaves PC2 to the
+//! resistor to VDDA. The chip's own temperature sensor and reference follow the factory calibration words in system
+//! memory (DS10693, temperature sensor and reference voltage).
 
 /// Full scale of the transducer in pascal.
 pub const FULL_SCALE: f64 = 1_000_000.0;
 
-/// Both dividers.
+/// The ratio of both dividers.
 const DIVIDER: f64 = 0.66;
 /// VDDA at which the factory calibrates, in volts.
 const CALIBRATION_VDDA: f64 = 3.3;
-/// Codes of a 12-bit conversion.
+/// Number of codes of a 12-bit conversion.
 const CODES: f64 = 4096.0;
 
 /// Code of the temperature sensor at 30 degrees Celsius and 3.3 V: 0.7725 V.
@@ -29,7 +30,7 @@ pub(crate) const TS_CAL2: u16 = 1207;
 /// Code of the 1.21 V reference at 3.3 V.
 pub(crate) const VREFIN_CAL: u16 = 1502;
 
-/// The thermistor at its reference temperature, and the resistor to VDDA.
+/// Resistance of the thermistor at its reference temperature, and of the resistor to VDDA.
 const THERMISTOR_OHM: f64 = 10_000.0;
 const SERIES_OHM: f64 = 10_000.0;
 const THERMISTOR_KELVIN: f64 = 298.15;
@@ -37,7 +38,7 @@ const THERMISTOR_BETA: f64 = 3950.0;
 
 const CAL1_KELVIN: f64 = 273.15 + 30.0;
 const CAL2_KELVIN: f64 = 273.15 + 110.0;
-/// Reference in volts.
+/// Voltage of the internal reference in volts.
 const VREFINT: f64 = 1.21;
 
 /// Supplies of the board in volts.
@@ -56,12 +57,12 @@ impl Default for Rails {
 }
 
 impl Rails {
-    /// PA0 for an output of the transducer, as a ratio of its supply.
+    /// The voltage of PA0 as a ratio of VDDA; `output` is a ratio of the transducer's supply.
     pub(super) fn transducer_ratio(&self, output: f64) -> f64 {
         output * self.supply_ratio()
     }
 
-    /// PA1.
+    /// The voltage of PA1, as a ratio of VDDA.
     pub(super) fn supply_ratio(&self) -> f64 {
         self.transducer * DIVIDER / self.vdda
     }
@@ -79,12 +80,12 @@ impl Rails {
     }
 }
 
-/// What the transducer gives at a pressure in pascal, as a ratio of its supply; it cannot leave its rails.
+/// The output of the transducer at a pressure in pascal, as a ratio of its supply; limited to its rails.
 pub(super) fn transducer(pascal: f64) -> f64 {
     (0.1 + 0.8 * pascal / FULL_SCALE).clamp(0.0, 1.0)
 }
 
-/// What the thermistor leaves of VDDA at a temperature in kelvin.
+/// The voltage across the thermistor at a temperature in kelvin, as a ratio of VDDA.
 pub(super) fn thermistor(kelvin: f64) -> f64 {
     let resistance = THERMISTOR_OHM * (THERMISTOR_BETA * (1.0 / kelvin - 1.0 / THERMISTOR_KELVIN)).exp();
     1.0 / (1.0 + SERIES_OHM / resistance)

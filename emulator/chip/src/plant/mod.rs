@@ -1,4 +1,5 @@
-//! The physical world around the chip: pressure, temperature, shaft and buttons, and what the board makes of them.
+//! The physical world around the chip: pressure, temperature, shaft and buttons, and the board's circuits between these
+//! and the chip.
 
 mod button;
 mod fault;
@@ -22,7 +23,7 @@ use signal::Stimulus;
 pub use spec::SpecError;
 pub use table::{Table, TableError};
 
-/// Everything the sensors measure.
+/// The quantities that the sensors measure, and the faults.
 #[derive(Clone, Debug)]
 pub struct Plant {
     pressure: Stimulus,
@@ -36,7 +37,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// No pressure, 25 degrees Celsius everywhere, the shaft at rest at 0, an encoder with so many lines, and no button pressed.
+    /// No pressure, 25 degrees Celsius everywhere, the shaft at rest at 0, an encoder with `encoder_lines` lines, no
+    /// button pressed.
     pub(crate) fn new(encoder_lines: u32) -> Self {
         let still = |value| Stimulus::new(Signal::Constant(value), Time::ZERO);
         Self {
@@ -65,12 +67,12 @@ impl Plant {
         self.thermistor = Stimulus::new(signal, now);
     }
 
-    /// Sets the motion of the shaft from `now` on; even motion starts where the shaft is.
+    /// Sets the motion of the shaft from `now` on; even motion starts at the current position.
     pub fn set_shaft(&mut self, motion: Motion, now: Time) {
         self.shaft.set(motion, now);
     }
 
-    /// Presses or releases a button at `now`; one that the board does not have is ignored.
+    /// Presses or releases a button at `now`; a button that the board does not have is ignored.
     pub fn push(&mut self, push: Push, now: Time) {
         if let Some(button) = self.buttons.get_mut(push.button) {
             button.set(push.down, now);
@@ -82,7 +84,7 @@ impl Plant {
         self.faults.push(fault);
     }
 
-    /// Lets a fault come at `now`, or go, also one that would have come later.
+    /// Begins or ends a fault at `now`. Other faults of the same kind, also later ones, are removed.
     pub fn switch_fault(&mut self, FaultSwitch { kind, is_on }: FaultSwitch, now: Time) {
         self.faults.retain(|fault| fault.kind != kind);
         if is_on {
@@ -90,37 +92,37 @@ impl Plant {
         }
     }
 
-    /// The faults that are there at `now`.
+    /// The faults that are active at `now`.
     pub fn faults(&self, now: Time) -> impl Iterator<Item = FaultKind> {
         FaultKind::all().filter(move |kind| self.has(*kind, now))
     }
 
-    /// Takes all faults away.
+    /// Removes all faults.
     pub fn clear_faults(&mut self) {
         self.faults.clear();
     }
 
-    /// What the pressure is set to.
+    /// The signal of the pressure.
     pub fn pressure_signal(&self) -> &Signal {
         self.pressure.signal()
     }
 
-    /// What the temperature of the chip is set to.
+    /// The signal of the temperature of the chip.
     pub fn temperature_signal(&self) -> &Signal {
         self.temperature.signal()
     }
 
-    /// What the temperature of the thermistor is set to.
+    /// The signal of the temperature of the thermistor.
     pub fn thermistor_signal(&self) -> &Signal {
         self.thermistor.signal()
     }
 
-    /// What the shaft is set to.
+    /// The motion of the shaft.
     pub fn motion(&self) -> &Motion {
         self.shaft.motion()
     }
 
-    /// Which buttons are held down.
+    /// The buttons that are held down.
     pub fn held(&self) -> [bool; BUTTONS] {
         self.buttons.map(|button| button.is_down())
     }
@@ -199,29 +201,29 @@ impl Plant {
         started != ended && !self.has(FaultKind::MissingIndex, now)
     }
 
-    /// What the absolute encoder reads, in revolutions; `None` when its line is open.
+    /// The position that the absolute encoder sends, in revolutions; `None` when its data line is broken.
     pub(crate) fn absolute(&self, now: Time) -> Option<f64> {
         let half_off = if self.has(FaultKind::WrongCode, now) { 0.5 } else { 0.0 };
         (!self.has(FaultKind::OpenSsi, now)).then(|| self.revolutions(now) + half_off)
     }
 
-    /// Whether there is something behind VBAT.
+    /// Whether a battery supplies VBAT.
     pub(crate) fn has_battery(&self, now: Time) -> bool {
         !self.has(FaultKind::BatteryEmpty, now)
     }
 
-    /// Whether there is a clock on OSC_IN.
+    /// Whether OSC_IN has a clock.
     pub(crate) fn has_crystal(&self, now: Time) -> bool {
         !self.has(FaultKind::NoCrystal, now)
     }
 
-    /// When that changes next.
+    /// The next instant at which the clock on OSC_IN fails or returns.
     pub(crate) fn next_crystal_edge(&self, now: Time) -> Time {
         let faults = self.faults.iter().filter(|fault| fault.kind == FaultKind::NoCrystal);
         faults.map(|fault| fault.next_edge(now)).fold(Time::NEVER, Time::min)
     }
 
-    /// Which contacts are closed.
+    /// The contacts that are closed.
     pub(crate) fn closed(&self, now: Time) -> [bool; BUTTONS] {
         self.buttons.map(|button| button.is_closed(now))
     }

@@ -1,25 +1,25 @@
-//! The shaft and the incremental encoder on it. The absolute one on the same shaft is a device of the SPI.
+//! The shaft and its incremental encoder. The absolute encoder on the same shaft is a device of the SPI.
 
 use canbus::Time;
 
 use super::signal::Signal;
 
-/// How the shaft moves.
+/// The motion of the shaft.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
-    /// Turns evenly from where it is, in revolutions a minute; negative is backwards.
+    /// Even motion from the current position, in revolutions per minute; negative is backwards.
     Rpm(f64),
-    /// Is at a position, in revolutions.
+    /// A position as a signal, in revolutions.
     Angle(Signal),
 }
 
-/// A shaft with an incremental encoder: A leads B forwards, and the index is high for one quarter period in each
-/// revolution, that in which A and B are both low at angle 0.
+/// A shaft with an incremental encoder. A leads B in forward motion. The index is high for one quarter period in each
+/// revolution: the quarter at angle 0, in which A and B are both low.
 #[derive(Clone, Debug)]
 pub(super) struct Shaft {
     motion: Motion,
     since: Time,
-    /// Position in revolutions at `since`, where even motion starts.
+    /// Position in revolutions at the instant `since`, at which even motion starts.
     start: f64,
     /// Quarter periods in a revolution: four times the lines of the encoder.
     quarters: i64,
@@ -45,7 +45,7 @@ impl Shaft {
     pub(super) fn revolutions(&self, now: Time) -> f64 {
         let age = now.since(self.since);
         match &self.motion {
-            // One rounding, in the division: the product is exact for any run of some minutes.
+            // The division is the only rounding: the product is exact for any run of some minutes.
             Motion::Rpm(rpm) => self.start + rpm * age.0 as f64 / (60 * Time::PER_SECOND) as f64,
             Motion::Angle(signal) => signal.at(age),
         }
@@ -62,15 +62,15 @@ impl Shaft {
         (matches!(quarter, 1 | 2), matches!(quarter, 2 | 3))
     }
 
-    /// Which edges of the index lie behind: the ones at its start and the ones at its end. They differ while it is high.
+    /// Counts of the passed edges of the index: at its begin and at its end. The counts differ while the index is high.
     pub(super) fn index_edges(&self, now: Time) -> (i64, i64) {
         let quarter = self.quarter(now);
         (quarter.div_euclid(self.quarters), (quarter - 1).div_euclid(self.quarters))
     }
 }
 
-/// The first instant after `from`, up to `until`, at which `key` is no longer what it is at `from`. It is exact when
-/// the shaft does not turn back and forth over an edge in between.
+/// The first instant after `from`, up to `until`, at which `key` differs from its value at `from`. The instant is exact
+/// unless the shaft turns back and forth over an edge in between.
 pub(crate) fn first_change<K: PartialEq>(from: Time, until: Time, key: impl Fn(Time) -> K) -> Option<Time> {
     let before = key(from);
     if key(until) == before {

@@ -6,12 +6,12 @@ use canbus::Time;
 
 use super::table::Table;
 
-/// A quantity as a function of the time since it was set, in seconds.
+/// A quantity as a function of the time since its signal was set, in seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Signal {
-    /// Always the same.
+    /// A constant value.
     Constant(f64),
-    /// A sine that starts at its offset, rising.
+    /// A sine that starts at its offset and rises.
     Sine {
         /// Mean value.
         offset: f64,
@@ -20,7 +20,7 @@ pub enum Signal {
         /// Frequency.
         hertz: f64,
     },
-    /// A straight line, and constant after it.
+    /// A straight line, constant after its end.
     Ramp {
         /// Value at the start.
         from: f64,
@@ -29,7 +29,7 @@ pub enum Signal {
         /// Duration.
         seconds: f64,
     },
-    /// One value up to an instant, another from it on.
+    /// One value before an instant, another value after it.
     Step {
         /// Value before.
         from: f64,
@@ -44,10 +44,10 @@ pub enum Signal {
         mean: f64,
         /// Standard deviation.
         sigma: f64,
-        /// Chooses one of the possible courses.
+        /// The seed of the noise.
         seed: u64,
     },
-    /// From a CSV file.
+    /// The values of a CSV file.
     Table(Table),
 }
 
@@ -67,7 +67,7 @@ impl Signal {
 }
 
 impl Signal {
-    /// The lowest value that it has, noise left out.
+    /// The lowest value of the signal; noise does not count.
     pub fn lowest(&self) -> f64 {
         match self {
             Signal::Constant(value) => *value,
@@ -79,7 +79,7 @@ impl Signal {
     }
 }
 
-/// A number of the standard normal distribution that depends on nothing but the seed and the instant (Box-Muller).
+/// A number of the standard normal distribution that depends only on the seed and the instant (Box-Muller).
 fn normal(seed: u64, age: Time) -> f64 {
     let first = mix(mix(seed) ^ age.0);
     let radius = (-2.0 * unit(first).ln()).sqrt();

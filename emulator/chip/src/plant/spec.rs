@@ -1,4 +1,4 @@
-//! The text form of stimuli: `NAME:ARGUMENTS`, as on the command line.
+//! The text form of stimuli, `NAME:ARGUMENTS`, as used on the command line.
 
 use std::fmt;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::shaft::Motion;
 use super::signal::Signal;
 use super::table::{Table, TableError};
 
-/// Why a stimulus cannot be understood. Every message is one line.
+/// The reason why the text of a stimulus is invalid. Every message is one line.
 #[derive(Debug, Error, PartialEq)]
 pub enum SpecError {
     /// No `:` between name and arguments.
@@ -19,14 +19,14 @@ pub enum SpecError {
     /// No signal has this name.
     #[error("unknown signal `{0}`; known are const, sine, ramp, step, noise and csv, and rpm for the shaft")]
     Name(String),
-    /// Not as many arguments as the signal takes.
+    /// The number of arguments does not fit the signal.
     #[error("{name} takes {expected}, not `{given}`")]
     Arguments {
         /// Name of the signal.
         name: &'static str,
-        /// The arguments it takes.
+        /// The arguments of the signal.
         expected: &'static str,
-        /// What was given.
+        /// The given text.
         given: String,
     },
     /// An argument that is not a finite number.
@@ -59,7 +59,7 @@ impl FromStr for Signal {
     }
 }
 
-/// As it is read, but for a table, whose file is not told.
+/// The text form that `from_str` reads; a table is shown without its file name.
 impl fmt::Display for Signal {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
@@ -73,7 +73,7 @@ impl fmt::Display for Signal {
     }
 }
 
-/// As it is read.
+/// The text form that `from_str` reads.
 impl fmt::Display for Motion {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::spec::number;
 
-/// Why a CSV file cannot be used.
+/// The reason why a CSV file cannot be used.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum TableError {
     /// The file cannot be read.
@@ -16,7 +16,7 @@ pub enum TableError {
     Read {
         /// The file.
         path: String,
-        /// What the system says.
+        /// The error message of the system.
         reason: String,
     },
     /// A line that is not `time,value`.
@@ -27,7 +27,7 @@ pub enum TableError {
         /// Counted from 1.
         line: usize,
     },
-    /// A time that does not come after the one before.
+    /// A time that is not later than the one before.
     #[error("{path}, line {line}: times must rise")]
     Order {
         /// The file.
@@ -35,7 +35,7 @@ pub enum TableError {
         /// Counted from 1.
         line: usize,
     },
-    /// No point at all.
+    /// The file has no points.
     #[error("{path} holds no points")]
     Empty {
         /// The file.
@@ -43,7 +43,7 @@ pub enum TableError {
     },
 }
 
-/// Points of a signal, joined by straight lines; before the first and after the last point it is constant.
+/// Points of a signal, joined by straight lines; the signal is constant before the first and after the last point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     points: Arc<[(f64, f64)]>,
@@ -53,7 +53,7 @@ impl Table {
     /// Reads a file. Empty lines, lines that start with `#` and a heading are skipped.
     ///
     /// # Errors
-    /// When the file cannot be read or is not as above.
+    /// When the file cannot be read or has another form.
     pub fn open(path: &Path) -> Result<Self, TableError> {
         let name = path.display().to_string();
         let text = fs::read_to_string(path)
@@ -61,7 +61,7 @@ impl Table {
         Self::parse(&name, &text)
     }
 
-    /// The lowest of its points.
+    /// The lowest of the points.
     pub(super) fn lowest(&self) -> f64 {
         self.points.iter().map(|&(_, value)| value).fold(f64::INFINITY, f64::min)
     }

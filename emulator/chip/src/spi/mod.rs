@@ -1,6 +1,6 @@
 //! SPI as a master (RM0390 section 26, RM0090 section 28): full duplex and receive only, frames of 8 and 16 bits.
 //!
-//! Slave mode, I2S, the hardware CRC and TI mode are not modelled: a write that asks for them is on record.
+//! Slave mode, I2S, the hardware CRC and TI mode are not modelled: a write that selects one of these is recorded.
 
 mod ssi;
 
@@ -46,28 +46,28 @@ struct Shift {
     end: Time,
 }
 
-/// What is at the other end of the wires.
+/// The device at the other end of the wires.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Far {
-    /// The encoder, at so many revolutions.
+    /// The absolute encoder, at a position in revolutions.
     Position(f64),
-    /// Nothing that drives the line: it has this level.
+    /// No device: the line has this level.
     Nothing(bool),
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Spi {
-    /// One cycle of its PCLK.
+    /// One cycle of the SPI's PCLK.
     pclk: Time,
     cr1: u32,
     cr2: u32,
     received: u32,
     full: bool,
-    /// Written to DR and not yet on the wire.
+    /// DR has a frame that is not on the wire yet.
     waiting: bool,
     shift: Option<Shift>,
     overrun: bool,
-    /// The value of DR was read since the overrun: reading SR next clears it.
+    /// DR was read since the overrun: the next read of SR clears OVR.
     overrun_seen: bool,
     mode_fault: bool,
     device: Ssi,
@@ -90,7 +90,7 @@ impl Spi {
         }
     }
 
-    /// After a reset; the device on the wire stays.
+    /// A reset; the state of the device on the wire stays.
     pub(crate) fn reset(&mut self) {
         *self = Self::new(self.pclk, self.device.clone());
     }
@@ -99,7 +99,7 @@ impl Spi {
         self.pclk = pclk;
     }
 
-    /// Reads a register as it is after `run`.
+    /// Reads a register; `run` must come first.
     pub(crate) fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
             CR1 => Some(self.cr1),
@@ -113,7 +113,7 @@ impl Spi {
         }
     }
 
-    /// Writes a register after `run`. `None` when it, or what is asked of it, is not modelled.
+    /// Writes a register; `run` must come first. `None` when the register, or a bit set in it, is not modelled.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         match offset {
             CR1 => self.write_control(value, now),
@@ -121,7 +121,7 @@ impl Spi {
                 self.cr2 = value & 0xF7;
                 (!bit(value, 4)).then_some(())
             }
-            // MODF is cleared by a read of SR and a write to CR1; the other flags are not written.
+            // MODF is cleared by a read of SR and a write to CR1; the other flags are not writable.
             SR => Some(()),
             DR => {
                 self.waiting = true;
@@ -153,7 +153,7 @@ impl Spi {
         bit(self.cr1, CR1_SPE) && bit(self.cr1, CR1_MSTR)
     }
 
-    /// A master that only receives clocks without end while it is on.
+    /// Whether the SPI is a master that only receives: its clock runs without end while the SPI is on.
     fn only_receives(&self) -> bool {
         bit(self.cr1, CR1_RXONLY) || bit(self.cr1, CR1_BIDIMODE) && !bit(self.cr1, CR1_BIDIOE)
     }
@@ -162,12 +162,12 @@ impl Spi {
         if bit(self.cr1, CR1_DFF) { 16 } else { 8 }
     }
 
-    /// Whether the clock is high at rest and bits are sampled at its second edge, as SSI wants it: CPHA and CPOL.
+    /// Whether the clock is high at rest and bits are sampled at the second edge (CPHA and CPOL), as SSI needs.
     pub(crate) fn fits_ssi(&self) -> bool {
         field(self.cr1, 0, 2) == 0b11
     }
 
-    /// A cycle of the clock, while the SPI is on.
+    /// A cycle of the serial clock, while the SPI is on.
     pub(crate) fn clock(&self) -> Option<Time> {
         self.is_on().then(|| self.bit_time())
     }
@@ -177,7 +177,7 @@ impl Spi {
         times(self.pclk, 2 << field(self.cr1, 3, 3))
     }
 
-    /// Puts the next frame on the wire when there is one and the wire is free.
+    /// Puts the next frame on the wire when a frame is waiting and the wire is free.
     fn load(&mut self, now: Time) {
         if self.shift.is_none() && self.is_on() && (self.waiting || self.only_receives()) {
             self.waiting = false;
@@ -186,7 +186,7 @@ impl Spi {
         }
     }
 
-    /// Ends the frames whose time has come. `encoder` tells what is on the wires at an instant.
+    /// Ends the frames that are due. `encoder` returns the device on the wires at an instant.
     pub(crate) fn run(&mut self, now: Time, encoder: impl Fn(Time) -> Far) {
         while let Some(shift) = self.shift.take_if(|shift| shift.end <= now) {
             let word = match encoder(shift.start) {
@@ -202,7 +202,7 @@ impl Spi {
 
     fn receive(&mut self, word: u32) {
         if self.full {
-            // The frame that did not fit is lost.
+            // The frame is lost, because the last one was not read.
             self.overrun = true;
             self.overrun_seen = false;
             return;
@@ -218,14 +218,14 @@ impl Spi {
         self.received
     }
 
-    /// The byte that came is gone, as by a disturbance inside of the chip.
+    /// Discards the received byte, as a disturbance inside the chip would.
     pub(crate) fn lose(&mut self) {
         self.full = false;
     }
 
     fn read_status(&mut self) -> u32 {
         let status = self.status();
-        // OVR is cleared by a read of DR and then of SR (RM0390 section 26.3.10).
+        // A read of DR followed by a read of SR clears OVR (RM0390 section 26.3.10).
         if std::mem::take(&mut self.overrun_seen) {
             self.overrun = false;
         }
@@ -240,17 +240,17 @@ impl Spi {
             | flag(self.shift.is_some(), BSY)
     }
 
-    /// A frame is there and DMA is to fetch it.
+    /// Whether a received frame waits for DMA.
     pub(crate) fn asks_to_store(&self) -> bool {
         bit(self.cr2, 0) && self.full
     }
 
-    /// DMA is to bring the next frame.
+    /// Whether the SPI requests the next frame from DMA.
     pub(crate) fn asks_to_load(&self) -> bool {
         bit(self.cr2, 1) && !self.waiting && self.is_on()
     }
 
-    /// When something happens that an interrupt or DMA waits for.
+    /// The next event that an interrupt or DMA waits for.
     pub(crate) fn deadline(&self) -> Time {
         let by_dma = self.cr2 & 3 != 0;
         let by_interrupt = self.cr2 & 0xE0 != 0 && !self.interrupt();

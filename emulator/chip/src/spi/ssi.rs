@@ -1,22 +1,22 @@
-//! An absolute encoder with an SSI output on MISO, on the same shaft as the incremental one.
+//! An absolute encoder with an SSI output on MISO, on the same shaft as the incremental encoder.
 //!
-//! The line is high at rest. The first edge of the clock latches the position; the first bit that is sampled is still
-//! the rest level, then the word follows with the most significant bit first, then the line is low until the clock has
-//! rested for the monoflop time.
+//! The line is high at rest. The first edge of the clock latches the position. The first sampled bit is still the rest
+//! level; then the word follows, most significant bit first. Afterwards the line is low until the clock has paused for
+//! the monoflop time.
 
 use canbus::Time;
 
-/// Time without a clock after which the encoder is ready for a new word.
+/// Pause of the clock after which the encoder is ready for a new word.
 const MONOFLOP: Time = Time::from_micros(20);
 
-/// The form of the word.
+/// The format of the word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SsiFormat {
     /// Bits of the position within a revolution.
     pub single_turn: u32,
     /// Bits of the number of revolutions.
     pub multi_turn: u32,
-    /// Gray code instead of binary.
+    /// Whether the word is in Gray code instead of binary.
     pub gray: bool,
 }
 
@@ -27,11 +27,11 @@ impl Default for SsiFormat {
     }
 }
 
-/// The encoder as seen from the clock line.
+/// The state of the encoder's serial output.
 #[derive(Clone, Debug)]
 pub(crate) struct Ssi {
     format: SsiFormat,
-    /// The word that is being sent and how many bits have been, the rest level included.
+    /// The word under way and the number of bits sent, the rest level included.
     word: u64,
     sent: u32,
     last_clock: Option<Time>,
@@ -42,7 +42,7 @@ impl Ssi {
         Self { format, word: 0, sent: 0, last_clock: None }
     }
 
-    /// Clocks `bits` bits from `start` on, when the encoder is at `position`, in revolutions.
+    /// Clocks `bits` bits out from `start` on, with the encoder at `position`, in revolutions.
     pub(crate) fn clock_out(&mut self, bits: u32, start: Time, bit: Time, position: f64) -> u32 {
         let rested = self.last_clock.is_none_or(|last| start.since(last) >= MONOFLOP);
         if rested {

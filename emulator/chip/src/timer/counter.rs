@@ -1,4 +1,5 @@
-//! The time base of a timer: prescaler, counter and auto-reload register, computed and never stepped.
+//! The time base of a timer: prescaler, counter and auto-reload register. The value is computed on demand, never
+//! stepped.
 
 use canbus::Time;
 
@@ -14,7 +15,7 @@ impl Shadow {
         Self { preload: value, active: value }
     }
 
-    /// A write by software, that takes effect at once without `buffered`.
+    /// A write by software; without `buffered` it takes effect at once.
     pub(super) fn write(&mut self, value: u32, buffered: bool) {
         self.preload = value;
         if !buffered {
@@ -31,20 +32,20 @@ impl Shadow {
     }
 }
 
-/// What happened on the way of the counter.
+/// A run of the counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
-    /// The value before.
+    /// The value before the run.
     pub(super) from: u32,
     /// Steps made; the last one may be an overflow to 0.
     pub(super) ticks: u64,
-    /// Values in the cycle of the counter.
+    /// Number of values in the cycle of the counter.
     pub(super) modulus: u64,
 }
 
 impl Run {
-    /// Whether the counter reached `value` on the way (the value before does not count). A value above the top counts
-    /// as reached at the overflow (RM0390 section 17.4.5, CC1IF).
+    /// Whether the counter reached `value` in the run (the start value does not count). A value above the top counts as
+    /// reached at the overflow (RM0390 section 17.4.5, CC1IF).
     pub(super) fn reached(&self, value: u32) -> bool {
         let value = u64::from(value);
         let goal = if value < self.modulus { value } else { 0 };
@@ -54,15 +55,15 @@ impl Run {
     }
 }
 
-/// A counter that counts up.
+/// An up-counter.
 #[derive(Clone, Debug)]
 pub(super) struct Counter {
     /// One cycle of the timer clock.
     cycle: Time,
-    /// FFFFh or FFFF FFFFh.
+    /// The largest value: FFFFh or FFFF FFFFh.
     max: u32,
     value: u32,
-    /// When running: since when the counter has this value. When stopped: how long it has had it.
+    /// While the counter runs: the instant at which it reached its value. While it is stopped: the age of the value.
     since: Time,
     running: bool,
     pub(super) prescaler: Shadow,
@@ -82,7 +83,7 @@ impl Counter {
         }
     }
 
-    /// The largest value that fits.
+    /// The largest value of the counter.
     pub(super) fn max(&self) -> u32 {
         self.max
     }
@@ -103,7 +104,7 @@ impl Counter {
         }
     }
 
-    /// The timer clock changes; the part of a tick that has passed is forgotten.
+    /// Changes the timer clock; the elapsed part of a tick is discarded.
     pub(super) fn set_cycle(&mut self, cycle: Time, now: Time) {
         if cycle != self.cycle {
             self.cycle = cycle;
@@ -115,18 +116,18 @@ impl Counter {
         self.value = value & self.max;
     }
 
-    /// Starts again from 0 with the prescaler at its start (an update event by software).
+    /// Restarts from 0 and resets the prescaler (an update event by software).
     pub(super) fn clear(&mut self, now: Time) {
         self.value = 0;
         self.restart_tick(now);
     }
 
-    /// Puts the prescaler to its start.
+    /// Resets the prescaler.
     pub(super) fn restart_tick(&mut self, now: Time) {
         self.since = if self.running { now } else { Time::ZERO };
     }
 
-    /// Loads the preloads (an update event).
+    /// Activates the preloaded values (an update event).
     pub(super) fn load(&mut self) {
         self.prescaler.load();
         self.top.load();
@@ -151,7 +152,7 @@ impl Counter {
         u64::from(top - self.value) + 1
     }
 
-    /// When the counter next overflows.
+    /// The instant of the next overflow.
     pub(super) fn overflow(&self) -> Time {
         self.after(self.ticks_to_overflow())
     }
@@ -164,14 +165,14 @@ impl Counter {
         }
     }
 
-    /// The length of a whole cycle, or of the one that follows a pending load when that is shorter.
+    /// The length of a cycle of the counter, or of the next cycle if a pending load makes that one shorter.
     pub(super) fn period(&self) -> Time {
         let length = |prescaler, top| self.cycle.0 * (u64::from(prescaler) + 1) * (u64::from(top) + 1);
         let now = length(self.prescaler.active, self.top.active);
         Time(now.min(length(self.prescaler.preload, self.top.preload)))
     }
 
-    /// When the counter next reaches `value`, or an earlier instant at which that can be told better.
+    /// The instant at which the counter next reaches `value`, or an earlier instant at which the caller must ask again.
     pub(super) fn reaches(&self, value: u32) -> Time {
         if value > self.value && value <= self.top.active {
             self.after(u64::from(value - self.value))
@@ -182,13 +183,13 @@ impl Counter {
         }
     }
 
-    /// Counts up to `now` but not into an overflow.
+    /// Counts up to `now`, but not over an overflow.
     pub(super) fn run_in_period(&mut self, now: Time) -> Run {
         let ticks = self.elapsed(now).min(self.ticks_to_overflow() - 1);
         self.go(ticks, u64::from(self.max) + 1)
     }
 
-    /// The overflow itself, when it is due at `now`.
+    /// Carries out an overflow that is due at `now`.
     pub(super) fn run_over(&mut self, now: Time) -> bool {
         let due = self.overflow() <= now;
         if due {
@@ -214,7 +215,7 @@ impl Counter {
         run
     }
 
-    /// Moves by `steps` of an encoder, in either direction; the run is seen in the direction of the motion.
+    /// Moves by `steps` of an encoder, in either direction; the run is described in the direction of the motion.
     pub(super) fn turn(&mut self, steps: i64) -> Turn {
         if !self.counts() {
             return Turn { run: Run { from: self.value, ticks: 0, modulus: self.modulus() }, wrapped: false };
@@ -225,7 +226,7 @@ impl Counter {
         turn
     }
 
-    /// What `turn` would do.
+    /// The result of `turn`, without the move.
     pub(super) fn look(&self, steps: i64) -> Turn {
         let modulus = self.modulus() as i64;
         let wrapped = !(0..modulus).contains(&(i64::from(self.value) + steps));
@@ -237,17 +238,17 @@ impl Counter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Turn {
     run: Run,
-    /// Over the top or below 0.
+    /// The counter passed its top or 0.
     pub(super) wrapped: bool,
 }
 
 impl Turn {
-    /// Whether a value was passed on the way, forwards or backwards.
+    /// Whether the move passed a value, forwards or backwards.
     pub(super) fn reached(&self, value: u32, forwards: bool) -> bool {
         if forwards {
             return self.run.reached(value);
         }
-        // Backwards is forwards with every value mirrored.
+        // A backward run is a forward run with all values mirrored.
         let mirror =
             |value: u32| ((self.run.modulus - u64::from(value) % self.run.modulus) % self.run.modulus) as u32;
         u64::from(value) < self.run.modulus

@@ -4,7 +4,7 @@ use super::{SR_UIF, Timer};
 use crate::register::{bit, field};
 
 impl Timer {
-    /// Whether the two first inputs drive the counter.
+    /// Whether inputs 1 and 2 drive the counter.
     pub(crate) fn is_encoder(&self) -> bool {
         matches!(field(self.smcr, 0, 3), 1..=3)
     }
@@ -23,8 +23,8 @@ impl Timer {
         }
     }
 
-    /// Counts between the last position and this one (RM0390 section 17.3.12): every edge of both inputs, or only
-    /// those of input 2 (mode 1) or input 1 (mode 2). One inverted input turns the direction around.
+    /// Counts between the last position and this one (RM0390 section 17.3.12): every edge of both inputs, or only the
+    /// edges of input 2 (mode 1) or input 1 (mode 2). One inverted input reverses the direction.
     fn steps_to(&self, position: Option<i64>) -> i64 {
         let (Some(before), Some(position)) = (self.position, position) else { return 0 };
         let counted = |position: i64| match field(self.smcr, 0, 3) {
@@ -36,7 +36,7 @@ impl Timer {
         if bit(self.ccer, 1) == bit(self.ccer, 5) { steps } else { -steps }
     }
 
-    /// Whether a move of the encoder from the last position raises an interrupt that is not up yet.
+    /// Whether a move of the encoder from the last position raises an interrupt that is not pending yet.
     pub(crate) fn rises_at(&self, position: Option<i64>) -> bool {
         let steps = self.steps_to(position);
         let turn = self.counter.look(steps);
@@ -44,7 +44,7 @@ impl Timer {
         wraps || self.awaited_channels().any(|channel| turn.reached(self.compare[channel].active, steps > 0))
     }
 
-    /// Whether the encoder drives the counter and an interrupt can come of it.
+    /// Whether the encoder drives the counter and an enabled interrupt may result.
     pub(crate) fn watches_encoder(&self) -> bool {
         let watches = self.awaits(SR_UIF) || self.awaited_channels().next().is_some();
         self.is_encoder() && self.counter.running() && watches

@@ -1,11 +1,11 @@
 //! Timers TIM2 to TIM7 and TIM9 to TIM14 (RM0390 sections 17 to 19, RM0090 sections 18 to 20).
 //!
-//! Up-counting, update and compare events, preloads, TRGO, encoder mode, input capture, and the DMA requests of TIM3's
-//! update and channel 2. Output pins, other DMA requests, counting down and the other slave modes are not modelled: a
-//! write that asks for them is on record.
+//! Modelled: up-counting, update and compare events, preloads, TRGO, encoder mode, input capture, and the DMA requests
+//! of TIM3's update and channel 2. Not modelled: output pins, other DMA requests, counting down and the other slave
+//! modes. A write that selects one of these is recorded.
 //!
-//! A compare value is reached when the counter comes to it. One that is written when the counter already has it waits for
-//! the next round: a program must not count on more.
+//! A compare matches when the counter changes to the compare value. A compare value equal to the current count
+//! therefore matches only in the next round; a program must not rely on an immediate match.
 
 mod capture;
 mod counter;
@@ -36,22 +36,22 @@ const CR1_UDIS: u32 = 1;
 const CR1_URS: u32 = 2;
 const CR1_OPM: u32 = 3;
 const CR1_ARPE: u32 = 7;
-/// DIR and CMS: counting down and up-down.
+/// Unmodelled bits of CR1: DIR and CMS, counting down and up-down.
 const CR1_DOWN: u32 = 0x0070;
 const SR_UIF: u32 = 0;
-/// UIE, CC1IE to CC4IE, TIE; what lies above asks for DMA.
+/// Bits of DIER for interrupts: UIE, CC1IE to CC4IE, TIE; the higher bits enable DMA requests.
 const DIER_INTERRUPTS: u32 = 0x005F;
 /// UDE; CC1DE to CC4DE follow.
 const DIER_UDE: u32 = 8;
 
-/// What a timer has.
+/// The features of a timer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Kind {
-    /// 32 bits instead of 16.
+    /// Whether the counter has 32 bits instead of 16.
     pub(crate) wide: bool,
     /// Capture and compare channels.
     pub(crate) channels: u32,
-    /// Bits of DIER: the DMA requests that are modelled.
+    /// The modelled DMA requests, as bits of DIER.
     pub(crate) requests: u32,
 }
 
@@ -68,11 +68,11 @@ pub(crate) struct Timer {
     sr: u32,
     ccmr: [u32; 2],
     ccer: u32,
-    /// Position of the encoder, in quarter periods, at the last look; `None` while none is connected.
+    /// Position of the encoder at the last update, in quarter periods; `None` without an encoder.
     position: Option<i64>,
-    /// The last motion of the encoder was backwards.
+    /// Whether the last motion of the encoder was backwards.
     backwards: bool,
-    /// An update event by software sent TRGO.
+    /// Whether an update event by software has sent TRGO.
     triggered: bool,
 }
 
@@ -96,12 +96,12 @@ impl Timer {
         }
     }
 
-    /// The clock of the timer changes at `now`, up to which it was run.
+    /// Changes the timer clock at `now`; the timer has been run up to `now`.
     pub(crate) fn set_cycle(&mut self, cycle: Time, now: Time) {
         self.counter.set_cycle(cycle, now);
     }
 
-    /// Reads a register as it is after `run`.
+    /// Reads a register; `run` must come first.
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         match offset {
             CR1 => Some(self.cr1 | flag(self.backwards && self.is_encoder(), 4)),
@@ -122,7 +122,7 @@ impl Timer {
         }
     }
 
-    /// Writes a register after `run`. `None` when it, or what is asked of it, is not modelled.
+    /// Writes a register; `run` must come first. `None` when the register, or a bit set in it, is not modelled.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: Time) -> Option<()> {
         match offset {
             CR1 => return self.write_control(value, now),
@@ -170,7 +170,7 @@ impl Timer {
 
     fn write_compare(&mut self, offset: u32, value: u32) -> Option<()> {
         let channel = self.channel_at(offset)?;
-        // An input channel's register is read only.
+        // The register of an input channel is read-only.
         if !self.is_input(channel) {
             let buffered = bit(self.mode(channel), 3);
             self.compare[channel].write(value & self.counter.max(), buffered);
@@ -183,7 +183,7 @@ impl Timer {
         (offset.is_multiple_of(4) && channel < self.kind.channels).then_some(channel as usize)
     }
 
-    /// The eight bits of CCMR of a channel.
+    /// The channel's eight bits of CCMR.
     fn mode(&self, channel: usize) -> u32 {
         field(self.ccmr[channel / 2], channel as u32 % 2 * 8, 8)
     }
@@ -203,7 +203,7 @@ impl Timer {
         (value & !0x1F == 0).then_some(())
     }
 
-    /// Loads the preloads and sets UIF unless that is masked.
+    /// Activates the preloads and sets UIF unless `silent`.
     fn update_event(&mut self, silent: bool) {
         if bit(self.cr1, CR1_UDIS) {
             return;
@@ -213,7 +213,8 @@ impl Timer {
         self.sr |= flag(!silent, SR_UIF);
     }
 
-    /// Counts up to `now`. `position` is that of the encoder on the two inputs, in quarter periods; `None` without one.
+    /// Counts up to `now`. `position` is the position of the encoder on inputs 1 and 2, in quarter periods; `None`
+    /// without an encoder.
     pub(crate) fn run(&mut self, now: Time, position: Option<i64>) {
         if self.is_encoder() {
             self.follow(position);
@@ -257,12 +258,12 @@ impl Timer {
         self.sr & 0x1E
     }
 
-    /// Takes the flag of a channel, 1 to 4, down again.
+    /// Clears the flag of a channel, 1 to 4.
     pub(crate) fn forget_match(&mut self, channel: u32) {
         self.sr &= !(1 << channel);
     }
 
-    /// An interrupt is enabled whose flag is not up.
+    /// Whether an interrupt is enabled and its flag is not set.
     fn awaits(&self, flag_bit: u32) -> bool {
         bit(self.dier & !self.sr, flag_bit)
     }
@@ -272,7 +273,8 @@ impl Timer {
         channels.filter(|&channel| self.awaits(channel as u32 + 1) && !self.is_input(channel))
     }
 
-    /// When the next interrupt that is not up yet comes, or earlier; never late. Not for encoder mode.
+    /// The instant of the next interrupt that is not pending yet, or an earlier instant, but never a later one. Never
+    /// in encoder mode.
     pub(crate) fn deadline(&self) -> Time {
         if self.is_encoder() {
             return Time::NEVER;
@@ -289,12 +291,12 @@ impl Timer {
         self.awaited_channels().map(compare).fold(update, Time::min)
     }
 
-    /// Whether an update event asks for DMA.
+    /// Whether an update event requests DMA.
     pub(crate) fn requests_on_update(&self) -> bool {
         bit(self.dier, DIER_UDE)
     }
 
-    /// When TRGO next rises, and how soon after that again at the earliest.
+    /// The instant of the next TRGO, and the shortest span to the following one.
     pub(crate) fn trigger_output(&self) -> (Time, Time) {
         let next = match field(self.cr2, 4, 3) {
             2 if !bit(self.cr1, CR1_UDIS) => self.counter.overflow(),

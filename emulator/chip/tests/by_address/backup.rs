@@ -1,4 +1,4 @@
-//! Backup SRAM: its gates, and what it outlives.
+//! Backup SRAM: its clock gate and write protection, and the resets and power losses that it survives.
 
 use canbus::Time;
 use chip::{Peripherals, Reason};
@@ -11,7 +11,7 @@ const PWR_CSR: u32 = PWR_CR + 4;
 const DBP: u32 = 1 << 8;
 const BRE: u32 = 1 << 9;
 
-/// Clocked, writable, and kept by the battery.
+/// A chip whose backup SRAM is clocked, writable, and kept by the battery.
 fn rig() -> Rig {
     let mut rig = Rig::new();
     open(&mut rig);

@@ -1,4 +1,4 @@
-//! RCC, PWR and what is done with addresses: as a start-up sequence sees them.
+//! RCC, PWR and the address map, as a start-up sequence uses them.
 
 use crate::support::{AHB1ENR, APB1ENR, RCC, Rig};
 use canbus::Time;

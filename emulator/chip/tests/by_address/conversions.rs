@@ -1,4 +1,4 @@
-//! TIM3, ADC1 and DMA2 as the firmware samples: four channels at 16 kHz into a circular buffer.
+//! TIM3, ADC1 and DMA2 with the settings of the firmware: four channels at 16 kHz into a circular buffer.
 
 use canbus::Time;
 use chip::Peripherals;
@@ -31,11 +31,11 @@ const DMA_IRQ: u8 = 56;
 const ADC_IRQ: u8 = 18;
 /// One cycle of the ADC clock: PCLK2 of 72 MHz over 4.
 const CYCLE: u64 = 560;
-/// 16 kHz.
+/// The sampling period: 16 kHz.
 const PERIOD: u64 = Time::PER_SECOND / 16_000;
-/// Channels 0, 1, 18 and 17: 28, 28, 480 and 480 cycles of sampling, 12 of conversion each.
+/// End of the sample time of channels 0, 1, 18 and 17: 28, 28, 480 and 480 cycles of sampling, 12 of conversion each.
 const SAMPLED: [u64; 4] = [28, 40 + 28, 80 + 480, 80 + 492 + 480];
-/// From the trigger to the start.
+/// Cycles from the trigger to the start of the sequence.
 const LATENCY: u64 = 2;
 const ADON: u32 = 1;
 const SWSTART: u32 = 1 << 30;
@@ -74,7 +74,7 @@ fn start(rig: &mut Rig, items: u32, stream: u32) -> Time {
     rig.now
 }
 
-/// When conversion `n` has its voltage.
+/// The instant at which conversion `n` samples its voltage.
 fn sampled(start: Time, n: u64) -> Time {
     start + Time(PERIOD * (n / 4 + 1) + (LATENCY + SAMPLED[(n % 4) as usize]) * CYCLE)
 }
@@ -219,7 +219,7 @@ fn a_thermistor_divides_vdda_and_may_be_broken() {
         rig.chip.plant_mut(now).add_fault(Fault { kind, from: after(from), until: after(until) });
     }
     rig.write(SQR3, 12);
-    // 10 kohm at 25 degrees Celsius; at 0, beta 3950 K makes 33.6 kohm of it.
+    // The thermistor has 10 kohm at 25 degrees Celsius; with beta 3950 K it has 33.6 kohm at 0 degrees.
     for (kelvin, ratio, millis) in [
         (298.15, 0.5, 1),
         (273.15, 0.770_751, 2),

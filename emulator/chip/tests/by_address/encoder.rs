@@ -197,7 +197,7 @@ fn dma_copies_the_count_at_the_index() {
 fn dma_copies_the_count_whenever_the_adc_is_triggered() {
     let mut rig = counting();
     rig.set(APB2ENR, 1 << 8);
-    // Updates of TIM3 every 100 us start the ADC, whose results nobody fetches.
+    // Updates of TIM3 every 100 us start the ADC; nothing reads its results.
     rig.write(0x4001_2000 + 8, 1 << 28 | 8 << 24 | 1);
     copy_count(&mut rig, 2, 8);
     rig.write(TIM3 + 4, 2 << 4);
@@ -207,7 +207,7 @@ fn dma_copies_the_count_whenever_the_adc_is_triggered() {
     rig.write(TIM3 + CR1, 1);
     rig.wait(Time::from_millis(1));
     rig.read(TIM3 + CNT);
-    // 40.96 counts in 100 us; the ninth and tenth go over the first two.
+    // 40.96 counts in 100 us; the ninth and tenth copy overwrite the first two.
     let expected = [9, 10, 3, 4, 5, 6, 7, 8].map(|n| n * 4096 / 100);
     let copied: Vec<u16> = (0..8).map(|n| rig.half_word(BUFFER + 2 * n)).collect();
     assert_eq!(copied, expected);

@@ -1,4 +1,4 @@
-//! FLASH: as a flash driver and a power cut see it.
+//! FLASH as a flash driver uses it, and power cuts.
 
 use canbus::Time;
 use chip::{Board, BusFault, Effect, Peripherals, Stm32f4, Variant};

@@ -1,4 +1,4 @@
-//! The registers of the flash (RM0390, 3.8) and what a driver does with them.
+//! The registers of the flash (RM0390, 3.8) and their use by a driver.
 
 use canbus::Time;
 
@@ -17,7 +17,7 @@ pub(crate) const PGPERR: u32 = 1 << 6;
 pub(crate) const PGSERR: u32 = 1 << 7;
 pub(crate) const BSY: u32 = 1 << 16;
 
-/// Bits of CR: programming, a sector or everything to be erased, the start, and the interrupts.
+/// Bits of CR: programming, sector erase, mass erase, the start, and the interrupts.
 pub(crate) const PG: u32 = 1;
 pub(crate) const SER: u32 = 1 << 1;
 pub(crate) const MER: u32 = 1 << 2;
@@ -28,16 +28,16 @@ pub(crate) const LOCK: u32 = 1 << 31;
 /// PSIZE: words.
 pub(crate) const X32: u32 = 2 << 8;
 
-/// What KEYR takes, one after the other.
+/// The keys for KEYR, in order.
 pub(crate) const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// CR for a sector to be erased.
+/// The value of CR that selects a sector for an erase.
 pub(crate) const fn erasure(sector: u32) -> u32 {
     SER | sector << 3 | X32
 }
 
 impl Rig {
-    /// Both keys.
+    /// Writes both keys.
     pub(crate) fn unlock_flash(&mut self) {
         KEYS.into_iter().for_each(|key| self.write(KEYR, key));
     }
@@ -48,7 +48,7 @@ impl Rig {
         self.write(CR, erasure(sector) | STRT);
     }
 
-    /// Waits for the end of what the flash does, and tells how long that was, to 16 us.
+    /// Waits for the end of the operation and returns the duration, to 16 us.
     pub(crate) fn wait_for_flash(&mut self) -> Time {
         let start = self.now;
         while self.read(SR) & BSY != 0 {

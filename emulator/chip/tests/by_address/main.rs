@@ -1,4 +1,4 @@
-//! The chip as a program sees it: loads and stores by address, interrupt lines, effects.
+//! The interface of the chip to a program: loads and stores by address, interrupt lines, effects.
 
 mod backup;
 mod clocks;

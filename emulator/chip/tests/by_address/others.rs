@@ -100,7 +100,7 @@ fn with_ssi() -> Rig {
 const MASTER: u32 = 1 << 9 | 1 << 8 | 3 << 3 | 1 << 2 | 0b11;
 const SPE: u32 = 1 << 6;
 const FRAMES_OF_16: u32 = 1 << 11;
-/// Rest level, 12 bits of 3 revolutions, 13 bits of half a turn, 6 of nothing.
+/// The expected bits: rest level, 12 bits with 3 revolutions, 13 bits with half a turn, 6 zeros.
 const WORD: u32 = 1 << 31 | (3 << 13 | 4096) << 6;
 
 #[test]
@@ -220,13 +220,13 @@ fn the_crc_unit_has_the_ethernet_polynomial() {
     assert_eq!(rig.read(CRC), u32::MAX);
     rig.write(CRC, 0x3132_3334);
     rig.write(CRC, 0x3536_3738);
-    // CRC-32/MPEG-2 of "12345678", worked out apart.
+    // CRC-32/MPEG-2 of "12345678", from an independent implementation.
     assert_eq!(rig.read(CRC), mpeg2(b"12345678"));
     rig.write(CRC + 8, 1);
     assert_eq!(rig.read(CRC), u32::MAX);
 }
 
-/// Bit by bit, as the reference manual describes the unit.
+/// The CRC bit by bit, as the reference manual describes the unit.
 fn mpeg2(bytes: &[u8]) -> u32 {
     bytes.iter().fold(u32::MAX, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte) << 24, |crc, _| {

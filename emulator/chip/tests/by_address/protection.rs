@@ -12,7 +12,7 @@ const BOOTLOADER: [(u32, u32); 2] = [(0, 0x0800_0000), (1, 0x0800_4000)];
 const APPLICATION: (u32, u32) = (4, 0x0801_0000);
 const LEVEL_2: u32 = 0x0FFF_CCEC;
 
-/// A probe, and a quick one.
+/// The access of a debug probe; each access takes 20 ms.
 impl Registers for Rig {
     type Error = BusFault;
 
@@ -27,7 +27,7 @@ impl Registers for Rig {
     }
 }
 
-/// What the flash says to an erase of a sector and to a word programmed at its start.
+/// The error flags after an erase of a sector and after programming a word at its start.
 fn erase_and_program(rig: &mut Rig, (sector, start): (u32, u32)) -> [u32; 2] {
     rig.unlock_flash();
     Rig::write(rig, CR, erasure(sector) | STRT);
@@ -39,7 +39,7 @@ fn erase_and_program(rig: &mut Rig, (sector, start): (u32, u32)) -> [u32; 2] {
     [erase, program]
 }
 
-/// The error flags at the end, cleared.
+/// Waits for the end of the operation and clears its error flags, which are returned.
 fn settled(rig: &mut Rig) -> u32 {
     rig.wait_for_flash();
     let flags = Rig::read(rig, SR);

@@ -1,4 +1,4 @@
-//! Bugs that silicon does not forgive, each seeded into a program that is right without it.
+//! Bugs that silicon does not tolerate, each seeded into a program that is correct otherwise.
 
 use chip::{Breach, Peripherals};
 
@@ -17,10 +17,10 @@ const BACKUP: u32 = 0x4002_4000;
 
 /// HSE and PLL on, the system clock still from HSI. 144 MHz: 8 MHz / 4 x 144 / 2.
 const PLL_144: u32 = 1 << 22 | 144 << 6 | 4;
-/// APB1 a quarter, APB2 a half, from the PLL.
+/// The system clock from the PLL, APB1 at a quarter, APB2 at half of it.
 const PRESCALERS: u32 = 0b101 << 10 | 0b100 << 13;
 
-/// A program with every step right but those that are given.
+/// The settings of a program; a test changes one of them.
 struct Program {
     wait_states: u32,
     pll: u32,
@@ -36,7 +36,7 @@ struct Program {
 
 /// 36 MHz / 2 / 18 = 1 Mbit/s with 15 and 2 quanta: sampled at 88.9 %.
 const TIMING: u32 = 1 << 20 | 14 << 16 | 1;
-/// 480 cycles for channels 10 to 18.
+/// Sample times of 480 cycles for channels 10 to 18.
 const LONG: u32 = 0x07FF_FFFF;
 
 const RIGHT: Program = Program {
@@ -53,7 +53,7 @@ const RIGHT: Program = Program {
 };
 
 impl Program {
-    /// Runs it and returns what it broke.
+    /// Runs the program and returns the breaches.
     fn broken(&self) -> Vec<Breach> {
         let mut rig = Rig::new();
         rig.set(APB1ENR, 1 << 25 | 1 << 28);
@@ -88,7 +88,7 @@ impl Program {
         rig.write(CAN1, 0);
     }
 
-    /// Pressure at PA0 and the internal reference.
+    /// Measures the pressure at PA0 and the internal reference.
     fn measure(&self, rig: &mut Rig) {
         rig.write(GPIOA_MODER, 0xA800_0000 | self.analogue_pins);
         rig.write(ADC_CCR, 1 << 23 | self.adc_prescaler << 16);
@@ -103,7 +103,7 @@ impl Program {
     }
 }
 
-/// What a seeded bug says, in one line.
+/// The messages of all breaches, in one line.
 fn says(program: &Program) -> String {
     program.broken().iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }

@@ -1,4 +1,4 @@
-//! A program that talks to the chip by address, and a memory beside it.
+//! A program that accesses the chip by address, and its memory.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ pub(crate) const AHB1ENR: u32 = RCC + 0x30;
 pub(crate) const APB1ENR: u32 = RCC + 0x40;
 pub(crate) const APB2ENR: u32 = RCC + 0x44;
 
-/// RAM and flash, a byte an entry.
+/// RAM and flash, one entry for each byte.
 #[derive(Default)]
 pub(crate) struct Bytes(pub(crate) BTreeMap<u32, u8>);
 
@@ -23,12 +23,12 @@ impl Memory for Bytes {
     }
 }
 
-/// The chip, its memory and the instant at which the program is.
+/// The chip, its memory and the current instant of the program.
 pub(crate) struct Rig {
     pub(crate) chip: Stm32f4,
     pub(crate) memory: Bytes,
     pub(crate) now: Time,
-    /// Effects that are not stores to memory.
+    /// Effects other than stores to memory.
     pub(crate) effects: Vec<Effect>,
 }
 
@@ -61,14 +61,14 @@ impl Rig {
         self.write(address, value);
     }
 
-    /// A store of the program into flash.
+    /// A store by the program into flash.
     pub(crate) fn program(&mut self, address: u32, new: &[u8]) {
         let old: Vec<u8> = (address..).take(new.len()).map(|a| self.byte(a)).collect();
         self.chip.program(address, &old, new, self.now).expect("flash");
         self.take_effects();
     }
 
-    /// A byte of memory; what was never written is erased flash.
+    /// A byte of memory; an address that was never written is erased flash.
     pub(crate) fn byte(&self, address: u32) -> u8 {
         self.memory.0.get(&address).copied().unwrap_or(0xFF)
     }
@@ -77,7 +77,7 @@ impl Rig {
         u16::from_le_bytes([self.byte(address), self.byte(address + 1)])
     }
 
-    /// Goes on to an instant, stopping at every deadline of the chip on the way.
+    /// Advances to an instant, stopping at every deadline of the chip.
     pub(crate) fn run_to(&mut self, until: Time) {
         while self.chip.deadline() <= until {
             self.now = self.now.max(self.chip.deadline());
@@ -91,7 +91,7 @@ impl Rig {
         self.run_to(self.now + span);
     }
 
-    /// Goes on until an interrupt line is up, and tells when that is; `None` when it stays down for `limit`.
+    /// Advances until an interrupt line is set and returns the instant; `None` when the line stays low for `limit`.
     pub(crate) fn run_to_irq(&mut self, irq: u8, limit: Time) -> Option<Time> {
         let end = self.now + limit;
         while self.chip.lines().irqs >> irq & 1 == 0 {

@@ -1,4 +1,4 @@
-//! IWDG.
+//! The independent watchdog, IWDG.
 
 use canbus::Time;
 use chip::{Effect, Peripherals};
@@ -10,7 +10,7 @@ const PR: u32 = KR + 0x04;
 const RLR: u32 = KR + 0x08;
 const SR: u32 = KR + 0x0C;
 
-/// Starts it as the firmware does: /16 and 199, a tick of 0.5 ms.
+/// Starts the watchdog with the settings of the firmware: prescaler 16, reload 199, a tick of 0.5 ms.
 fn start(rig: &mut Rig) {
     rig.write(KR, 0xCCCC);
     rig.write(KR, 0x5555);

@@ -15,7 +15,7 @@ struct Bank {
     registers: [u32; 2],
 }
 
-/// One filter, spelled out: which bits of which form of the identifier have to be what.
+/// One filter, written out: a mask and a value for one of the forms of the identifier.
 struct Filter {
     rank: (bool, bool),
     fifo: u32,
@@ -85,7 +85,7 @@ fn observe(can: &mut DualCan, unit: u32, frame: &Frame) -> Option<(u32, u32)> {
     })
 }
 
-/// Both units on the bus, the banks from `split` on for CAN2.
+/// Both units on the bus; the banks from `split` on belong to CAN2.
 fn set_up(banks: &[Bank], split: u32) -> DualCan {
     let mut can = DualCan::new(APB1);
     let bits = |test: fn(&Bank) -> bool| banks.iter().enumerate().map(|(n, b)| u32::from(test(b)) << n).sum();
@@ -109,7 +109,7 @@ fn set_up(banks: &[Bank], split: u32) -> DualCan {
     can
 }
 
-/// Few identifiers, so that filters overlap.
+/// Frames with few different identifiers, so that filters overlap.
 fn frame() -> impl Strategy<Value = Frame> {
     let base = prop::sample::select(vec![0_u16, 1, 0x80, 0x181, 0x601, 0x7FF]);
     let extended = prop::sample::select(vec![0_u32, 0x0601_8000, 0x0604_0001, 0x1FFF_FFFF]);
@@ -177,7 +177,8 @@ fn numbers_count_inactive_banks_for_each_fifo() {
         bank(false, true, 1, true, [id, !1]),
     ];
     let frame = standard(0x123, &[]);
-    // By hand: FIFO 0 has 0, 1 (inactive list of two) and 2..5; FIFO 1 has 0, 1 and then the 32-bit mask.
+    // Expected by hand: FIFO 0 has filters 0, 1 (inactive list of two) and 2..5; FIFO 1 has 0, 1 and then the 32-bit
+    // mask.
     assert_eq!(observe(&mut set_up(&banks, 28), 0, &frame), Some((1, 2)));
     assert_eq!(observe(&mut set_up(&banks[..3], 28), 0, &frame), Some((0, 4)));
 }

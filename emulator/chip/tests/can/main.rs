@@ -1,4 +1,4 @@
-//! bxCAN as its driver and the bus see it.
+//! bxCAN as its driver and the bus use it.
 
 mod filters;
 mod modes;

@@ -154,7 +154,7 @@ fn alone_on_the_bus_it_becomes_passive_and_stays_so() {
     rig.write(0, IER, 0x7 << 8 | 1 << 15);
     rig.run(Time::from_millis(10));
     assert!(!rig.chips[0].lines()[0].sce, "no condition is new");
-    // LEC belongs to software until the next error.
+    // Software may write LEC; the value stays until the next error.
     rig.write(0, ESR, 7 << 4);
     assert_eq!(rig.read(0, ESR) >> 4 & 7, 7);
     rig.hosts.push(HostNode::new(BIT));
@@ -162,7 +162,7 @@ fn alone_on_the_bus_it_becomes_passive_and_stays_so() {
     assert_eq!(rig.read(0, ESR), 127 << 16 | 1);
 }
 
-/// Every attempt of the chip fails by a bit error in the data field.
+/// A bit error in the data field makes every attempt of the chip fail.
 fn fail_always(rig: &mut Rig) {
     for frame in 0..64 {
         rig.bus.faults.schedule(Fault { frame, position: Position::Bit(30), seen_by: SeenBy::Transmitters });
@@ -184,7 +184,7 @@ fn bus_off_after_32_failures_and_automatic_recovery() {
     while rig.read(0, ESR) & 4 != 0 {
         rig.run(BIT);
     }
-    // The flag has just ended; the run of recessive bits begins with the delimiter.
+    // The flag has just ended; the recessive bits begin with the delimiter.
     let bits = rig.now.since(off).0.div_ceil(BIT.0);
     assert!((128 * 11 - 1..=128 * 11).contains(&bits), "{bits}");
     assert_eq!(rig.read(0, ESR) & 0xFFFF_0007, 0);

@@ -1,4 +1,4 @@
-//! Chips on a bus, driven by register accesses only.
+//! Chips on a bus, driven only by register accesses.
 
 use canbus::{Bus, Controller, Event, Frame, HostNode, Id, StandardId, Time};
 use chip::can::DualCan;
@@ -9,7 +9,7 @@ pub(crate) const MSR: u32 = 0x04;
 pub(crate) const TSR: u32 = 0x08;
 pub(crate) const RF0R: u32 = 0x0C;
 pub(crate) const RF1R: u32 = 0x10;
-/// The output mailbox is given back.
+/// CAN_RFxR: releases the output mailbox.
 pub(crate) const RFOM: u32 = 1 << 5;
 pub(crate) const IER: u32 = 0x14;
 pub(crate) const ESR: u32 = 0x18;
@@ -19,7 +19,7 @@ pub(crate) const FM1R: u32 = 0x204;
 pub(crate) const FS1R: u32 = 0x20C;
 pub(crate) const FFA1R: u32 = 0x214;
 pub(crate) const FA1R: u32 = 0x21C;
-/// The first register of a mailbox.
+/// The first register of each transmit mailbox.
 pub(crate) const TX: [u32; 3] = [0x180, 0x190, 0x1A0];
 pub(crate) const RX: [u32; 2] = [0x1B0, 0x1C0];
 
@@ -49,7 +49,7 @@ pub(crate) fn standard(id: u16, data: &[u8]) -> Frame {
     Frame::data(StandardId::new(id).unwrap(), data).unwrap()
 }
 
-/// The same cases in every run of a property test.
+/// Property tests run the same cases each time.
 pub(crate) fn fixed() -> Config {
     Config { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::default() }
 }
@@ -144,7 +144,7 @@ impl Rig {
         }
     }
 
-    /// Brings the bus and the chips to the present and tells when something happens next.
+    /// Brings the bus and the chips up to the current instant and returns the instant of the next event.
     fn step(&mut self) -> Time {
         let now = self.now;
         self.chips.iter_mut().for_each(|chip| chip.advance(now));

@@ -51,7 +51,7 @@ fn a_sent_frame_interrupts_at_the_end_of_frame() {
     rig.run(Time(1));
     assert!(rig.chips[0].lines()[0].tx);
     assert_eq!(rig.read(0, TSR) & (TME[2] | 0xFF << 16), TME[2] | 0b0011 << 16);
-    // Clearing RQCP clears TXOK with it.
+    // Clearing RQCP also clears TXOK.
     rig.write(0, TSR, 1 << 16);
     assert_eq!(rig.read(0, TSR), 0x1C00_0000);
     assert!(!rig.chips[0].lines()[0].tx);
@@ -94,7 +94,7 @@ fn a_pending_mailbox_is_write_protected_and_aborted_at_once() {
     assert_eq!(rig.read(0, TX[0]), 0x300 << 21, "the frame can be read back");
     rig.run(Time::from_millis(1));
     assert_eq!(received(&mut rig), []);
-    // Without a request an abort means nothing.
+    // An abort without a request has no effect.
     rig.write(0, TSR, 1);
     rig.write(0, TSR, 1 << 7);
     assert_eq!(rig.read(0, TSR) & 0xFF, 0);

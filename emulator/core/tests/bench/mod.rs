@@ -1,4 +1,4 @@
-//! A machine with nothing around the core but flash that can be programmed, for programs that tell a verdict.
+//! A bench with a bare machine: a core and programmable flash. Its programs report a verdict.
 
 use std::path::PathBuf;
 
@@ -10,21 +10,21 @@ use object::{Object, ObjectSymbol};
 const PASSED: u32 = 0x600D_600D;
 const FAILED: u32 = 0xBAD0_BAD0;
 
-/// How long programming takes.
+/// Duration of programming.
 const BUSY: Time = Time::from_micros(16);
 
-/// What the program found out.
+/// The verdict of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// All is well.
+    /// All checks passed.
     Passed,
-    /// Something does not hold; the program's own number for it.
+    /// A check failed; the number is the program's own.
     Failed(u32),
     /// No verdict within a tenth of a virtual second.
     Silent,
 }
 
-/// Flash that takes any store as programming; nothing else.
+/// Flash that accepts any store as programming, and no other peripheral.
 #[derive(Default)]
 pub(crate) struct Bare {
     effects: Vec<Effect>,
@@ -80,12 +80,12 @@ impl Bench {
         Bench { machine, verdict: verdict_of(program) }
     }
 
-    /// Runs to the verdict, or for a tenth of a second.
+    /// Runs for a tenth of a virtual second.
     pub(crate) fn run(&mut self) -> Verdict {
         self.run_in_slices(Time::from_millis(1))
     }
 
-    /// Runs for two seconds: for programs that count.
+    /// Runs to the verdict, for two virtual seconds at most: for programs that count.
     #[allow(dead_code)]
     pub(crate) fn run_long(&mut self) -> Verdict {
         while self.machine.now() < Time::from_millis(2000) && self.verdict() == Verdict::Silent {
@@ -102,7 +102,7 @@ impl Bench {
         (address & !1, size)
     }
 
-    /// The same in slices, always to the end of the tenth.
+    /// Runs for a tenth of a virtual second, in slices.
     pub(crate) fn run_in_slices(&mut self, slice: Time) -> Verdict {
         let end = Time::from_millis(100);
         while self.machine.now() < end {
@@ -116,7 +116,7 @@ impl Bench {
         verdict([self.word(0), self.word(1)])
     }
 
-    /// A number that the program noted.
+    /// A number noted by the program.
     pub(crate) fn note(&self, index: u32) -> u32 {
         self.word(2 + index)
     }
@@ -128,7 +128,7 @@ impl Bench {
     }
 }
 
-/// What the first two words of the verdict say.
+/// The meaning of the first two words of the verdict.
 pub(crate) fn verdict([said, code]: [u32; 2]) -> Verdict {
     match said {
         PASSED => Verdict::Passed,
@@ -162,7 +162,7 @@ pub(crate) fn path(program: &str) -> PathBuf {
     directory().join(program)
 }
 
-/// Where the ELF files are.
+/// The directory of the ELF files.
 fn directory() -> PathBuf {
     std::env::var_os("MECHANICS_IMAGES").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/thumbv7em-none-eabihf/release")),

@@ -1,21 +1,22 @@
-//! A function in RAM programs a word and reads another one: the read waits until the flash is done, what is in RAM does not.
+//! A function in RAM programs a word and reads another one. The read waits until the flash is ready; the code in RAM
+//! does not wait.
 #![no_std]
 #![no_main]
 
 use cortex_m_rt::entry;
 use mechanics_images::{expect, finish};
 
-/// Two words far from everything else in flash.
+/// Two words far from all other content of the flash.
 const WORDS: usize = 0x0804_0000;
 const CYCCNT: *const u32 = 0xE000_1004 as *const u32;
-/// What programming takes (the bench says 16 us) at the 16 MHz of a reset.
+/// Cycles of programming (16 us in the bench) at the 16 MHz after a reset.
 const BUSY: u32 = 256;
 
 /// Cycles of the store, and of a load from flash after it.
 #[unsafe(link_section = ".data.program_and_read")]
 #[inline(never)]
 fn program_and_read(words: *mut u32) -> (u32, u32) {
-    // SAFETY: the words are in flash, the counter is where the architecture puts it.
+    // SAFETY: the words are in flash, and the architecture defines the address of the counter.
     unsafe {
         let start = CYCCNT.read_volatile();
         words.write_volatile(0);

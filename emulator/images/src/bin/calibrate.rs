@@ -1,5 +1,6 @@
-//! What instructions take, by the cycle counter: to compare the model with a chip. The clocks are those of the firmware (144 MHz,
-//! PCLK1 36 MHz, PCLK2 72 MHz, out of the HSI, so that any board will do), and each line is printed by semihosting.
+//! Measures instructions with the cycle counter, to compare the model with a chip. The clocks are those of the firmware
+//! (144 MHz, PCLK1 36 MHz, PCLK2 72 MHz), derived from the HSI, so that any board will do. Each line is printed by
+//! semihosting.
 #![no_std]
 #![no_main]
 
@@ -13,17 +14,17 @@ use stm32f4xx_hal::pac::Peripherals;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 
-/// How often an instruction is repeated.
+/// Number of repetitions of an instruction.
 const COUNT: u32 = 64;
 /// A register on each bus: CR of PWR, MEMRMP of SYSCFG, IDR of GPIOA.
 const ON_APB1: u32 = 0x4000_7000;
 const ON_APB2: u32 = 0x4001_3800;
 const ON_AHB1: u32 = 0x4002_0010;
-/// Registers to which a zero can be written: CSR of PWR, EXTICR1 of SYSCFG.
+/// Registers to which a zero can be written without effect: CSR of PWR, EXTICR1 of SYSCFG.
 const WRITABLE_ON_APB1: u32 = 0x4000_7004;
 const WRITABLE_ON_APB2: u32 = 0x4001_3808;
 
-/// The cycles of some code and of reading the counter. The first time fills the caches of the flash.
+/// The cycles of some code and of reading the counter. The first of two runs fills the caches of the flash.
 #[inline(always)]
 fn cycles(code: impl Fn()) -> u32 {
     let mut took = 0;
@@ -38,8 +39,8 @@ fn cycles(code: impl Fn()) -> u32 {
     took
 }
 
-/// Repeats an instruction, and prints what that took: the difference between twice as often and once, in which what is around them
-/// cancels out.
+/// Repeats an instruction and prints its cycles: the difference between twice as many repetitions and once as many, in
+/// which the code around them cancels out.
 macro_rules! repeat {
     ($name:literal, $($instruction:literal),+ $(; $($operand:tt)*)?) => {{
         let once = cycles(|| unsafe { asm!(".rept 64", $($instruction),+, ".endr" $(, $($operand)*)?) });
@@ -48,7 +49,7 @@ macro_rules! repeat {
     }};
 }
 
-/// 4 KiB of instructions in a row: more than the caches hold.
+/// 4 KiB of straight-line code: more than the caches hold.
 #[inline(never)]
 fn straight_line() {
     unsafe { asm!(".rept 2048", "nop", ".endr") };
@@ -71,7 +72,7 @@ fn main() -> ! {
     repeat!("LDR, one after the other", "ldr r0, [{0}]"; in(reg) here, out("r0") _);
     repeat!("STR", "str r0, [{0}]"; in(reg) here, out("r0") _);
     repeat!("branch not taken", "cmp r0, r0", "bne 2f", "2:"; out("r0") _);
-    // Over an instruction: where a branch leads to the next one, nothing shows that it was taken.
+    // The branch skips an instruction: a branch to the next instruction would look the same as one not taken.
     repeat!("branch taken", "b 2f", "nop", "2:");
     repeat!("UDIV of 1", "udiv r1, {0}, {0}"; in(reg) 1, out("r1") _);
     repeat!("UDIV of FFFFFFFFh", "udiv r1, {0}, {1}"; in(reg) u32::MAX, in(reg) 3, out("r1") _);

@@ -1,5 +1,5 @@
-//! A fault becomes a HardFault while its own exception is off, and its own exception when that is on; the status
-//! registers say what happened.
+//! A fault becomes a HardFault while its own exception is disabled, and its own exception while that is enabled; the
+//! status registers show the cause.
 #![no_std]
 #![no_main]
 
@@ -10,7 +10,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use mechanics_images::{expect, finish};
 
-/// Nothing answers here.
+/// An address without memory or register.
 const NOWHERE: *const u32 = 0x6000_0000 as *const u32;
 const FORCED: u32 = 1 << 30;
 const PRECISERR: u32 = 1 << 9;
@@ -26,8 +26,8 @@ fn main() -> ! {
     finish(Err(0x99))
 }
 
-/// Counts, clears the status, and returns to behind the load, which is two bytes long. The return address is the
-/// seventh word of the frame.
+/// Counts, clears the status, and returns behind the load, which is two bytes long. The return address is the seventh
+/// word of the frame.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 extern "C" fn BusFault() {
@@ -40,7 +40,7 @@ extern "C" fn BusFault() {
     )
 }
 
-/// Loads a word, in two bytes.
+/// Loads a word with an instruction of two bytes.
 #[inline(never)]
 fn load(address: *const u32) -> u32 {
     let word;

@@ -1,4 +1,4 @@
-//! An interrupt between LDREX and STREX must make the store fail, also when it touched nothing.
+//! An interrupt between LDREX and STREX must make the store fail, even if the interrupt did not access the address.
 #![no_std]
 #![no_main]
 
@@ -9,7 +9,7 @@ use cortex_m_rt::entry;
 use mechanics_images::{expect, finish};
 use stm32f4::stm32f446::{Interrupt, interrupt};
 
-/// Loads exclusively, pends an interrupt (or nothing), stores exclusively: 0 when the store took place.
+/// Loads exclusively, pends an interrupt (or none), stores exclusively: 0 when the store succeeded.
 fn attempt(pend: u32) -> u32 {
     let mut word = 0_u32;
     let failed: u32;

@@ -1,5 +1,5 @@
-//! The memory protection unit lets code run from some parts of RAM only. A call of a function that lies in another one is a MemManage
-//! fault, whose handler notes the status and returns to the caller.
+//! The memory protection unit restricts the parts of RAM that may run code. A call of a function in another part is a
+//! MemManage fault; its handler notes the status and returns to the caller.
 #![no_std]
 #![no_main]
 
@@ -14,17 +14,17 @@ const MPU_RBAR: *mut u32 = 0xE000_ED9C as *mut u32;
 const MPU_RASR: *mut u32 = 0xE000_EDA0 as *mut u32;
 const SHCSR: *mut u32 = 0xE000_ED24 as *mut u32;
 
-/// RBAR: the region is in the lowest bits. RASR: no code; all may read and write; normal memory; the region counts.
+/// RBAR: the lowest bits hold the region. RASR: no code; full data access; normal memory; region enabled.
 const VALID: u32 = 1 << 4;
 const XN: u32 = 1 << 28;
 const NORMAL: u32 = 3 << 24 | 1 << 17 | 1;
-/// CFSR.
+/// Bits of CFSR.
 const IACCVIOL: u32 = 1;
 
 #[unsafe(no_mangle)]
 static SEEN: AtomicU32 = AtomicU32::new(0);
 
-// The fault is at the first instruction of the function, and the link register of the frame is the way back.
+// The fault is at the first instruction of the function; the link register in the frame is the return address.
 global_asm!(
     ".global MemoryManagement",
     ".thumb_func",
@@ -56,7 +56,7 @@ unsafe extern "C" {
 
 fn in_ram() -> u32 {
     let code = (IN_RAM.as_ptr() as usize | 1) as *const ();
-    // SAFETY: the word is the code of such a function.
+    // SAFETY: the word is the code of a function of this type.
     let code: extern "C" fn() -> u32 = unsafe { core::mem::transmute(code) };
     code()
 }
@@ -74,7 +74,7 @@ fn switch(control: u32) {
     cortex_m::asm::isb();
 }
 
-/// What the last call was refused for.
+/// The status of the last refused call.
 fn seen() -> u32 {
     SEEN.swap(0, Relaxed)
 }
@@ -92,13 +92,13 @@ fn main() -> ! {
     let flash_goes_on = unsafe { ANSWER() };
     IN_RAM.store(0x4770_202B, Relaxed);
     let is_data = IN_RAM.load(Relaxed) == 0x4770_202B;
-    // But in its first half.
+    // Code in the first half is allowed again.
     region(1, 0x2000_0000, NORMAL | 15 << 1);
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
     let allowed = in_ram();
     let none = seen();
-    // But for the eighth of that half in which the function lies.
+    // Except in the eighth of that half with the function.
     let eighth = IN_RAM.as_ptr() as u32 >> 13 & 7;
     region(1, 0x2000_0000, NORMAL | 1 << 8 << eighth | 15 << 1);
     cortex_m::asm::dsb();

@@ -1,4 +1,4 @@
-//! Four contexts compute with all floating-point registers; none may see another's values.
+//! Four contexts compute with all floating-point registers; no context may see the values of another.
 #![no_std]
 #![no_main]
 
@@ -9,7 +9,7 @@ use cortex_m_rt::entry;
 use mechanics_images::{expect, finish};
 use stm32f4::stm32f446::{Interrupt, interrupt};
 
-/// Fills S0..S15 with a value, lets an interrupt in by pending it in STIR, and tells whether they still hold it.
+/// Fills S0..S15 with a value, pends an interrupt through STIR, and returns whether the registers still hold the value.
 fn holds(value: u32, pend: u32) -> bool {
     let changed: u32;
     unsafe {
@@ -65,6 +65,6 @@ fn TIM3() {
 
 #[interrupt]
 fn TIM4() {
-    // Nothing above: a line that is not enabled.
+    // The highest level pends no further exception: the line is not enabled.
     unsafe { CLEAN[2] = holds(0x4080_0000, Interrupt::TIM5 as u32) };
 }

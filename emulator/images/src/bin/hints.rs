@@ -1,4 +1,4 @@
-//! WFE, SEV and YIELD are hints: the program goes on behind them, one instruction after the other.
+//! WFE, SEV and YIELD are hints: the program continues with the next instruction.
 #![no_std]
 #![no_main]
 

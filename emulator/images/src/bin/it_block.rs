@@ -1,6 +1,6 @@
-//! An exception taken inside of an IT block must come back to the rest of the block.
+//! An exception taken inside an IT block must return to the rest of the block.
 //!
-//! The block calls the supervisor conditionally: the SVC is its second instruction, and two more follow, one for each
+//! The block contains a conditional SVC as its second instruction, and two more instructions follow, one for each
 //! outcome of the condition. Without the IT state both would run.
 #![no_std]
 #![no_main]
@@ -30,6 +30,6 @@ fn main() -> ! {
 
 #[exception]
 fn SVCall() {
-    // Leaves other flags behind than it found.
+    // The handler changes the flags.
     unsafe { asm!("cmp {0}, #1", in(reg) 0_u32) };
 }

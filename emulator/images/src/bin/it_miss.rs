@@ -1,4 +1,4 @@
-//! An IT block whose accesses go to pages that were never touched: what runs next must not believe to be inside of the block.
+//! An IT block that accesses pages for the first time: the instructions after the block must not count as part of it.
 #![no_std]
 #![no_main]
 
@@ -7,11 +7,11 @@ use core::arch::asm;
 use cortex_m_rt::entry;
 use mechanics_images::{expect, finish};
 
-/// Pages of RAM that nothing else uses.
+/// Pages of RAM without other use.
 const FIRST: u32 = 0x2001_0000;
 const PAGE: u32 = 0x400;
 
-/// Stores when `condition` is zero, then counts to two from one.
+/// Stores when `condition` is zero; then counts from zero to two.
 fn count(address: u32, condition: u32) -> u32 {
     let counted: u32;
     unsafe {

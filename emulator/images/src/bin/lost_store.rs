@@ -1,5 +1,5 @@
-//! A store to nowhere is not waited for: its fault comes later, without an address, and the program has gone on. With the write buffer off the
-//! fault is that of the instruction.
+//! A store to an unused address is buffered: its fault comes later, without an address, and the program has already
+//! continued. With the write buffer off, the fault belongs to the store instruction.
 #![no_std]
 #![no_main]
 
@@ -9,19 +9,19 @@ use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m_rt::entry;
 use mechanics_images::{expect, finish};
 
-/// Nothing answers here: outside of the chip, and between its peripherals.
+/// Addresses without memory or register: outside the chip, and between its peripherals.
 const NOWHERE: [*mut u32; 2] = [0x6000_0000 as *mut u32, 0x4000_7C00 as *mut u32];
 const ACTLR: *mut u32 = 0xE000_E008 as *mut u32;
 const SHCSR: *mut u32 = 0xE000_ED24 as *mut u32;
 const DISDEFWBUF: u32 = 1 << 1;
-/// CFSR.
+/// Bits of CFSR.
 const PRECISERR_AND_BFARVALID: u32 = 1 << 9 | 1 << 15;
 const IMPRECISERR: u32 = 1 << 10;
 
 static STATUS: AtomicU32 = AtomicU32::new(0);
 static FAULTS: AtomicU32 = AtomicU32::new(0);
 
-// Notes and clears the status. Behind a precise fault it goes on behind the instruction, which has 16 bits.
+// Notes and clears the status. After a precise fault, the handler returns behind the instruction, which has 16 bits.
 global_asm!(
     ".global BusFault",
     ".thumb_func",
@@ -47,7 +47,7 @@ global_asm!(
     faults = sym FAULTS,
 );
 
-/// Stores a word there; whether what comes behind was done, and once.
+/// Stores a word at `place`; whether the instructions behind the store ran exactly once.
 fn store(place: *mut u32) -> bool {
     let count: u32;
     unsafe {

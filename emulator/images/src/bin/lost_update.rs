@@ -1,5 +1,5 @@
-//! A counter that a program and an interrupt raise without protection. On silicon some counts are lost; where interrupts come
-//! between blocks of code only, none is.
+//! A counter that a program and an interrupt increment without protection. On silicon some counts are lost; if
+//! interrupts come between blocks of code only, no count is lost.
 #![no_std]
 #![no_main]
 
@@ -23,7 +23,7 @@ extern "C" fn bump() {
     SHARED.store(SHARED.load(Relaxed) + 1, Relaxed);
 }
 
-/// Counts what is missing, and begins again.
+/// The number of lost counts; restarts the count.
 fn lost() -> u32 {
     let expected = TIMES + INTERRUPTS.swap(0, Relaxed);
     expected - SHARED.swap(0, Relaxed)
@@ -39,7 +39,7 @@ fn main() -> ! {
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
     unsafe { NVIC::unmask(Interrupt::TIM2) };
-    // Disturbed only by an interrupt that the test makes.
+    // The program causes no interrupt here; only the test may cause one.
     bump_often();
     note(0, lost());
 

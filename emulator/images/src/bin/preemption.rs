@@ -1,4 +1,4 @@
-//! Three interrupts, each pended by the one below: a higher one starts at once, an equal or lower one waits.
+//! Three interrupts, each pended by the one below: a higher one starts at once; an equal or lower one waits.
 #![no_std]
 #![no_main]
 
@@ -52,7 +52,7 @@ fn TIM3() {
 #[interrupt]
 fn TIM4() {
     log(3);
-    // The same priority: this one must end first.
+    // TIM5 has the same priority: this handler must end first.
     NVIC::pend(Interrupt::TIM5);
     cortex_m::asm::isb();
     log(4);

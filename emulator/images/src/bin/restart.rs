@@ -1,4 +1,4 @@
-//! A requested reset starts the program again, RAM keeps what it holds, and the second life knows of the first.
+//! A requested reset restarts the program. RAM keeps its content, so the second run knows of the first.
 #![no_std]
 #![no_main]
 

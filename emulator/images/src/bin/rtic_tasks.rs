@@ -1,4 +1,4 @@
-//! RTIC itself: a hardware task, two software tasks of different priorities and a shared resource with a lock.
+//! RTIC: a hardware task, two software tasks of different priorities and a shared resource with a lock.
 #![no_std]
 #![no_main]
 
@@ -36,7 +36,7 @@ mod app {
         }
     }
 
-    /// Twice: spawns the low task, then the high one, which must run first.
+    /// Runs twice: spawns the low task, then the high one, which must run first.
     #[task(binds = TIM2, priority = 1, local = [rounds], shared = [log])]
     fn hardware(mut context: hardware::Context) {
         *context.local.rounds += 1;
@@ -44,13 +44,13 @@ mod app {
             let log: *mut u32 = log;
             let expected = unsafe { log.read_volatile() } << 4 | 1;
             unsafe { log.write_volatile(expected) };
-            // Nobody else may touch the resource until the lock ends.
+            // No other task may access the resource until the lock ends.
             let _ = high::spawn();
             if unsafe { log.read_volatile() } != expected {
                 unsafe { log.write_volatile(0xDEAD_DEAD) };
             }
         });
-        // The high task ran the moment the lock ended.
+        // The high task must have run as soon as the lock ended.
         context.shared.log.lock(|log| *log = if *log & 0xF == 2 { *log } else { 0xBEEF_BEEF });
         let _ = low::spawn(*context.local.rounds);
     }

@@ -1,11 +1,11 @@
-//! A function is run, its code in flash is changed, and it is run again: the new code must run.
+//! Runs a function, changes its code in flash, and runs it again: the new code must run.
 #![no_std]
 #![no_main]
 
 use cortex_m_rt::entry;
 use mechanics_images::{expect, finish};
 
-/// Two instructions that return a number, far from everything else in flash.
+/// Address of two instructions that return a number, far from all other content of the flash.
 const FUNCTION: usize = 0x0804_0000;
 
 /// `movs r0, #n; bx lr`

@@ -1,4 +1,4 @@
-//! A stack that runs off the start of RAM: the frame cannot be saved, and HardFault runs all the same.
+//! A stack that runs off the start of RAM: the frame cannot be saved, but HardFault must still run.
 #![no_std]
 #![no_main]
 
@@ -12,7 +12,7 @@ const STKERR: u32 = 1 << 12;
 
 #[entry]
 fn main() -> ! {
-    // A stack pointer at the very start of RAM: the exception frame of the SVC lands below.
+    // The stack pointer is at the start of RAM: the exception frame of the SVC would lie below RAM.
     unsafe { asm!("mov sp, {0}", "svc #0", in(reg) 0x2000_0000_u32, options(noreturn)) }
 }
 
@@ -21,7 +21,7 @@ fn SVCall() {
     finish(Err(1))
 }
 
-/// The stack is not usable: take another before anything else. Takes the place of the trampoline of cortex-m-rt.
+/// The stack is not usable: the handler first sets another one. Replaces the trampoline of cortex-m-rt.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 extern "C" fn HardFault() -> ! {

@@ -1,5 +1,5 @@
-//! System registers and exceptions where they are easily got wrong: SysTick, the cycle counter, states of exceptions, SVC under
-//! PRIMASK, Thread mode without privileges, BASEPRI and the choice of the stack.
+//! Details of system registers and exceptions that are easily wrong: SysTick, the cycle counter, states of exceptions,
+//! SVC under PRIMASK, unprivileged Thread mode, BASEPRI and the choice of the stack.
 #![no_std]
 #![no_main]
 
@@ -18,7 +18,7 @@ const DEMCR: *mut u32 = 0xE000_EDFC as *mut u32;
 const DWT_CTRL: *mut u32 = 0xE000_1000 as *mut u32;
 const DWT_CYCCNT: *mut u32 = 0xE000_1004 as *mut u32;
 
-/// What handlers have seen: SHCSR, ICSR and CONTROL in SVCall, HFSR and CFSR in HardFault.
+/// Values seen by the handlers: SHCSR, ICSR and CONTROL in SVCall, HFSR and CFSR in HardFault.
 static STATES: AtomicU32 = AtomicU32::new(0);
 static CONTROL_STATE: AtomicU32 = AtomicU32::new(0);
 static SELECTED: AtomicU32 = AtomicU32::new(0);
@@ -33,7 +33,7 @@ fn write(register: *mut u32, value: u32) {
     unsafe { register.write_volatile(value) }
 }
 
-/// It is zero after a write, counts from the reload value, and keeps its count while it stands.
+/// SysTick is zero after a write, counts from the reload value, and keeps its count while stopped.
 fn systick() -> Result<(), u32> {
     write(SYST_RVR, 99_999);
     write(SYST_CVR, 1);
@@ -68,7 +68,7 @@ fn states() -> Result<(), u32> {
     expect(read(SHCSR) & 1 << 7 == 0, 24)
 }
 
-/// Masked, a call cannot be taken: HardFault, forced.
+/// A masked SVC cannot be taken: it becomes a forced HardFault.
 fn masked_call() -> Result<(), u32> {
     unsafe { asm!("cpsid i", "svc 0", "nop", "cpsie i") };
     expect(HARD.swap(0, Relaxed) == 1 << 30, 31)
@@ -86,7 +86,7 @@ fn unprivileged() -> Result<(), u32> {
     expect(STATUS.swap(0, Relaxed) == 0x8200 && HARD.swap(0, Relaxed) == 1 << 30, 41)
 }
 
-/// The chip has the upper four of eight priority bits.
+/// The chip implements the upper four of eight priority bits.
 fn priority_bits() -> Result<(), u32> {
     let read: u32;
     unsafe {
@@ -95,7 +95,8 @@ fn priority_bits() -> Result<(), u32> {
     expect(read == 0xF0, 51)
 }
 
-/// A handler is on the main stack and says so; Thread mode finds its own stack again, with and without privileges.
+/// A handler runs on the main stack, and CONTROL shows it; Thread mode finds its own stack again, with and without
+/// privileges.
 fn stacks() -> Result<(), u32> {
     stack_of_thread(0b10).and(stack_of_thread(0b11))
 }
@@ -115,7 +116,7 @@ fn stack_of_thread(chosen: u32) -> Result<(), u32> {
     expect(control & 2 != 0 && stack_pointer == top as u32, 62)
 }
 
-/// Each check is made, whatever the one before found: another core may differ in more than one.
+/// Every check is made even if an earlier check failed: another core may differ in several.
 #[entry]
 fn main() -> ! {
     let checks = [systick, cycle_counter, states, masked_call, thread_mode, priority_bits];
@@ -128,7 +129,7 @@ fn main() -> ! {
     finish(result)
 }
 
-/// A call pends PendSV, to see it pending, and ends with privileges.
+/// The handler pends PendSV, to see it pending, and returns with privileges.
 #[exception]
 fn SVCall() {
     write(ICSR, 1 << 28);
@@ -143,7 +144,7 @@ fn SVCall() {
 #[exception]
 fn PendSV() {}
 
-// Notes why, and goes on behind the instruction of 16 bits, with interrupts on.
+// Notes the cause and returns behind the instruction of 16 bits, with interrupts enabled.
 global_asm!(
     ".global HardFault",
     ".thumb_func",

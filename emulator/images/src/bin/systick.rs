@@ -1,4 +1,4 @@
-//! SysTick wakes WFI: a sleeping loop runs once a tick, and the cycle counter agrees.
+//! SysTick wakes WFI: a sleeping loop runs once per tick, and the cycle counter confirms the period.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Two interrupts at once, of one priority: the second follows the first without the stack being touched, and faster.
+//! Two simultaneous interrupts of one priority: the second follows the first without unstacking, and faster.
 #![no_std]
 #![no_main]
 

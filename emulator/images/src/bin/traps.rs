@@ -1,5 +1,6 @@
-//! Instructions that silicon refuses: with the floating-point unit off, at an unaligned address, and those that are trapped: a division
-//! by zero, and any access to an unaligned word. The handler notes the status and goes on behind the instruction, all of which have 32 bits.
+//! Instructions that silicon refuses: floating point while the unit is off, accesses to an unaligned address, and
+//! trapped operations: a division by zero, and any access to an unaligned word. The handler notes the status and
+//! returns behind the instruction; all these instructions have 32 bits.
 #![no_std]
 #![no_main]
 
@@ -13,7 +14,7 @@ const CPACR: *mut u32 = 0xE000_ED88 as *mut u32;
 const CCR: *mut u32 = 0xE000_ED14 as *mut u32;
 const SHCSR: *mut u32 = 0xE000_ED24 as *mut u32;
 
-/// CFSR.
+/// Bits of CFSR.
 const NOCP: u32 = 1 << 19;
 const UNALIGNED: u32 = 1 << 24;
 const DIVBYZERO: u32 = 1 << 25;
@@ -38,7 +39,7 @@ global_asm!(
     ".ltorg",
 );
 
-/// What the last instruction was refused for.
+/// The status of the last refused instruction.
 fn seen() -> u32 {
     SEEN.swap(0, Relaxed)
 }

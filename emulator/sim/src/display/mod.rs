@@ -1,4 +1,4 @@
-//! What the user sees: a live screen on a terminal, plain lines elsewhere, nothing beside JSON.
+//! The display: a live screen on a terminal, plain lines elsewhere, and no display with JSON output.
 
 mod nodes;
 mod plain;
@@ -16,18 +16,18 @@ use crate::status::{NodeStatus, Status};
 use plain::Plain;
 use screen::Screen;
 
-/// One of the three.
+/// The kind of display in use.
 pub struct Display(Kind);
 
 enum Kind {
     Screen(Box<Screen>),
     Plain(Plain),
-    /// The log goes to the standard error output: the other one is for a program.
+    /// The log goes to the standard error output, because a program reads the standard output.
     Quiet,
 }
 
 impl Display {
-    /// Shows `greeting` first: lines that tell what runs and what to type.
+    /// Opens the display with `greeting`: lines that state what is running and which commands exist.
     pub fn open(greeting: &[String]) -> io::Result<Display> {
         let interactive = io::stdout().is_terminal() && io::stdin().is_terminal();
         let kind = if interactive {
@@ -38,12 +38,12 @@ impl Display {
         Ok(Display(kind))
     }
 
-    /// Shows nothing but the log, which goes to the standard error output.
+    /// A display of the log only, on the standard error output.
     pub fn quiet() -> Display {
         Display(Kind::Quiet)
     }
 
-    /// Whether commands are typed on the screen; if not, they come line by line on the standard input.
+    /// Whether the user types commands on the screen; otherwise commands are lines on the standard input.
     pub fn takes_commands(&self) -> bool {
         matches!(self.0, Kind::Screen(_))
     }
@@ -58,7 +58,7 @@ impl Display {
         Ok(())
     }
 
-    /// Tells the user something about a command.
+    /// Shows the user a message about a command.
     pub fn say(&mut self, text: String) {
         match &mut self.0 {
             Kind::Screen(screen) => screen.log(text),
@@ -66,7 +66,7 @@ impl Display {
         }
     }
 
-    /// Shows the state of the nodes when it is time to, and returns what the user has typed.
+    /// Shows the state of the nodes if an update is due, and returns a command that the user has typed.
     pub fn update(&mut self, now: Time, status: impl FnOnce() -> Status) -> io::Result<Option<Command>> {
         match &mut self.0 {
             Kind::Screen(screen) => screen.update(status),
@@ -80,12 +80,12 @@ fn log_line(line: &Line) -> String {
     format!("{} node {} {:5} {}", line.at, line.node, format!("{:?}", line.level).to_lowercase(), line.text)
 }
 
-/// The board's number, and its node-ID where that is another one.
+/// The board's number, followed by its node-ID if that differs.
 fn name(node: &NodeStatus) -> String {
     if node.id == node.node_id { node.id.to_string() } else { format!("{} ({})", node.id, node.node_id) }
 }
 
-/// A line cut into lines of so many letters.
+/// A line wrapped at `width` characters.
 fn wrapped(line: &str, width: usize) -> Vec<ratatui::text::Line<'static>> {
     let letters: Vec<char> = line.chars().collect();
     letters.chunks(width).map(|part| ratatui::text::Line::from(part.iter().collect::<String>())).collect()

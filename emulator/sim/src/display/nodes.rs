@@ -1,11 +1,11 @@
-//! The nodes on the screen: a table where the terminal is wide enough, else as many lines a node as the node needs.
+//! The nodes on the screen: a table if the terminal is wide enough, otherwise as many lines as each node needs.
 
 use ratatui::style::Stylize;
 use ratatui::text::{Line, Text};
 
 use crate::status::{NodeRates, NodeStatus, Rates, Status};
 
-/// Titles of the table with their widths; a quantity stands over its unit.
+/// Titles of the table with their widths; the unit is below the quantity.
 const COLUMNS: [(&str, usize); 10] = [
     ("node", 9),
     ("is", 8),
@@ -18,11 +18,11 @@ const COLUMNS: [(&str, usize); 10] = [
     ("frames/s", 8),
     ("CPU/%", 6),
 ];
-/// Below the first line of a node.
+/// Indentation of a node's second and further lines.
 const INDENT: &str = "   ";
 const NONE: NodeRates = NodeRates { frames: 0.0, cpu_load: 0.0 };
 
-/// All nodes in lines of this width. There are `height` lines at most; the last one tells how many nodes find no room.
+/// All nodes in at most `height` lines of this width; the last line tells how many nodes do not fit.
 pub(super) fn text(status: &Status, rates: Option<&Rates>, width: usize, height: usize) -> Text<'static> {
     let of = |index: usize| rates.and_then(|rates| rates.nodes.get(index)).unwrap_or(&NONE);
     let nodes = status.nodes.iter().enumerate().map(|(index, node)| Shown::new(node, of(index)));
@@ -44,11 +44,11 @@ fn columns(cells: [String; COLUMNS.len()]) -> String {
     cells.collect::<Vec<_>>().join(" ").trim_end().to_owned()
 }
 
-/// Whole nodes only.
+/// As many complete nodes as fit.
 fn fitting(blocks: Vec<Vec<Line<'static>>>, height: usize) -> Text<'static> {
     let (total, mut shown) = (blocks.len(), Vec::new());
     let all: usize = blocks.iter().map(Vec::len).sum();
-    // Where not all find room, a line is kept for how many are missing.
+    // If not all nodes fit, one line is reserved for the number of missing nodes.
     let room = if all > height { height.saturating_sub(1) } else { height };
     for (fit, block) in blocks.into_iter().enumerate() {
         if shown.len() + block.len() > room {
@@ -61,10 +61,10 @@ fn fitting(blocks: Vec<Vec<Line<'static>>>, height: usize) -> Text<'static> {
     Text::from(shown)
 }
 
-/// A node in words.
+/// A node as text.
 struct Shown {
     cells: [String; COLUMNS.len()],
-    /// The same with units.
+    /// The values with their units.
     words: Vec<String>,
 }
 
@@ -93,7 +93,7 @@ impl Shown {
         Shown { cells, words }
     }
 
-    /// As many words in a line as fit, and no word in two lines unless it is longer than a line.
+    /// The words in as few lines as possible; a word is only broken if it is longer than a line.
     fn lines(&self, width: usize) -> Vec<Line<'static>> {
         let mut lines = vec![String::new()];
         for word in &self.words {

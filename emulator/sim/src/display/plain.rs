@@ -1,4 +1,4 @@
-//! Plain lines, when the output is not a terminal.
+//! Plain lines, for an output that is not a terminal.
 
 use std::io::{self, Write};
 
@@ -8,7 +8,7 @@ use super::tpdo;
 use crate::log::Line;
 use crate::status::Status;
 
-/// How often the nodes are shown, in virtual time.
+/// Period of the nodes' states, in virtual time.
 const PERIOD: Time = Time::from_millis(1000);
 
 /// Writes log lines as they come and the state of the nodes once a virtual second.
@@ -28,7 +28,7 @@ impl Plain {
         writeln!(io::stdout(), "{}", super::log_line(line))
     }
 
-    /// `status` is only made when it is due.
+    /// `status` is only called when an update is due.
     pub(super) fn update(&mut self, now: Time, status: impl FnOnce() -> Status) -> io::Result<()> {
         if now.since(self.shown.at) < PERIOD {
             return Ok(());
@@ -41,7 +41,7 @@ impl Plain {
     }
 }
 
-/// One line a node.
+/// One line for each node.
 fn lines(status: &Status, earlier: &Status) -> Vec<String> {
     let rates = status.rates(earlier);
     let bus = format!("bus {:.1} %", rates.bus_load * 100.0);

@@ -10,12 +10,12 @@ use super::view::View;
 use crate::console::Command;
 use crate::status::Status;
 
-/// How often the screen is drawn and keys are read, in the host's time.
+/// Period of drawing and of reading keys, in the host's time.
 const REFRESH: Duration = Duration::from_millis(100);
-/// Rates are averaged over this time of the host.
+/// Period over which rates are averaged, in the host's time.
 const AVERAGE: Duration = Duration::from_secs(1);
 
-/// The terminal and what is on it.
+/// The terminal and its content.
 pub(super) struct Screen {
     terminal: DefaultTerminal,
     view: View,
@@ -24,7 +24,7 @@ pub(super) struct Screen {
 }
 
 impl Screen {
-    /// Takes over the terminal; it is given back when the value is dropped.
+    /// Takes over the terminal; it is restored when the value is dropped.
     pub(super) fn open(greeting: &[String]) -> io::Result<Screen> {
         let view = View::new(greeting);
         let now = Instant::now();
@@ -35,7 +35,7 @@ impl Screen {
         self.view.log(line);
     }
 
-    /// Draws and reads keys when it is time to. `status` is only made then.
+    /// Draws and reads keys when an update is due; only then `status` is called.
     pub(super) fn update(&mut self, status: impl FnOnce() -> Status) -> io::Result<Option<Command>> {
         if self.drawn.elapsed() < REFRESH {
             return Ok(None);
@@ -51,7 +51,7 @@ impl Screen {
         self.read_keys()
     }
 
-    /// Everything typed so far, up to the first complete command.
+    /// Reads the keys typed so far, up to the first complete command.
     fn read_keys(&mut self) -> io::Result<Option<Command>> {
         while event::poll(Duration::ZERO)? {
             let Event::Key(key) = event::read()? else { continue };

@@ -1,9 +1,9 @@
-//! TPDO 1 as a node sends it when it is delivered: what 1A00h maps and 6131h selects by default.
+//! TPDO 1 with the default mapping: the contents of 1A00h and 6131h in the delivered firmware.
 
 use crate::personality::Personality;
 use crate::status::NodeStatus;
 
-/// The first value of the last TPDO 1 with its unit. A PDO that is mapped otherwise is shown as it is.
+/// The first value of the last TPDO 1 with its unit. A PDO with another mapping is shown as bytes.
 pub(super) fn value(node: &NodeStatus) -> String {
     let Some(data) = &node.heard.tpdo1 else { return "none".to_owned() };
     match (node.personality, data.as_slice()) {

@@ -1,4 +1,4 @@
-//! What is on the live screen: heading, nodes, log, and a line to type commands into.
+//! The content of the live screen: heading, nodes, log, and a line for commands.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -14,15 +14,15 @@ use super::nodes;
 use crate::console::{self, Command};
 use crate::status::{Rates, Status};
 
-/// Lines of the log that are kept.
+/// Maximum number of stored log lines.
 const LOG_LINES: usize = 500;
-/// Lines of the log that are shown before the greeting is.
+/// The number of log lines for which space is kept when the greeting is shown.
 const LEAST_LOG: usize = 5;
-/// Lines from which on the parts have borders.
+/// The minimum number of lines for borders around the parts.
 const WITH_BORDERS: u16 = 18;
-/// The keys, where there is nothing typed.
+/// The keys, shown while the command line is empty.
 const KEYS: &str = "? help  q quit";
-/// What `?` shows: no line is longer than the narrowest terminal that shows everything.
+/// The help text of `?`. No line is longer than the width of the narrowest terminal that shows everything.
 const HELP: [&str; 7] = [
     "pressure, temperature, thermistor,",
     "shaft, button, fault: [ID=]SPEC, as",
@@ -33,7 +33,7 @@ const HELP: [&str; 7] = [
     "nodectl monitor, trace: more to see",
 ];
 
-/// What is on the screen.
+/// The content of the screen.
 #[derive(Default)]
 pub(super) struct View {
     pub(super) greeting: Vec<String>,
@@ -58,7 +58,7 @@ impl View {
         self.log.push_back(line);
     }
 
-    /// Rates since the last call, `span` of the host's time ago.
+    /// Computes the rates since the last call, `span` of the host's time ago.
     pub(super) fn average(&mut self, span: Duration) {
         self.speed = self.status.at.since(self.earlier.at).as_secs_f64() / span.as_secs_f64();
         self.rates = Some(self.status.rates(&self.earlier));
@@ -99,7 +99,7 @@ impl View {
         let area = frame.area();
         let border = if area.height < WITH_BORDERS { 0 } else { 2 };
         let width = usize::from(area.width).saturating_sub(border);
-        // What is always there: the heading, one line of the log, the line to type into.
+        // Lines that are always present: the heading, one line of the log, the command line.
         let room = usize::from(area.height).saturating_sub(3 + 2 * border);
         let nodes = nodes::text(&self.status, self.rates.as_ref(), width, room);
         let is_roomy = room >= nodes.lines.len() + self.greeting.len() + LEAST_LOG;
@@ -130,7 +130,7 @@ impl View {
         Line::from(vec![format!("> {}_  ", self.input).into(), keys.dim()])
     }
 
-    /// As many of the last lines as fit; a long one is several.
+    /// As many of the last lines as fit; a long line is wrapped.
     fn log_lines(&self, area: Rect, border: usize) -> Vec<Line<'static>> {
         let inside = |length: u16| usize::from(length).saturating_sub(border);
         let (room, width) = (inside(area.height), inside(area.width).max(1));
@@ -186,7 +186,7 @@ mod tests {
         lines.map(|cells| format!("{}\n", text(cells).trim_end())).collect()
     }
 
-    /// Two nodes after a second, one of them with an error.
+    /// A view of two nodes after a second, one of them with an error.
     fn two() -> View {
         let mut view = view();
         let mut second = view.status.nodes[0].clone();

@@ -10,24 +10,26 @@ use super::outbox::Outbox;
 use super::session::{Action, Session};
 use crate::world::{PortId, World};
 
-/// Bytes of a client that are served in one step of the world: more frames than the bus takes in that time.
+/// Maximum number of a client's bytes to process in one step of the world: more frames than the bus carries in that
+/// time.
 const SHARE: usize = 1024;
 
-/// Frames of a client that may wait for the bus. While so many wait nothing more is read from it.
+/// Maximum number of a client's frames that wait for the bus. While the queue is full, nothing more is read from the
+/// client.
 const QUEUE: usize = 64;
 
-/// A client and how far its connection is.
+/// A client and the state of its connection.
 pub(super) struct Client {
     stream: TcpStream,
     session: Box<dyn Session>,
     port: PortId,
     outbox: Outbox,
-    /// There may be something to read, or room to write.
+    /// The host may have bytes to read, or space to write.
     readable: bool,
     writable: bool,
-    /// Nothing more comes from it; what it has sent before is still to go out.
+    /// The client sends no more; its earlier frames still go out.
     leaving: bool,
-    /// It takes nothing any more.
+    /// The client receives no more.
     deaf: bool,
 }
 
@@ -56,13 +58,13 @@ impl Client {
         client
     }
 
-    /// The host says that it can be read from or written to.
+    /// The host reports that the connection is readable or writable.
     pub(super) fn wake(&mut self, readable: bool, writable: bool) {
         self.readable |= readable;
         self.writable |= writable;
     }
 
-    /// Serves its share of what it has sent.
+    /// Processes the client's share of received bytes.
     pub(super) fn listen(&mut self, world: &mut World) {
         let has_room = self.outbox.has_room() && world.port(self.port).backlog() < QUEUE;
         if !self.readable || !has_room || self.leaving {
@@ -96,7 +98,7 @@ impl Client {
         }
     }
 
-    /// Tells it what was on the bus since the last call; returns how many frames it was too slow for.
+    /// Passes on the frames since the last call; returns the number of frames lost because the client was too slow.
     pub(super) fn tell(&mut self, world: &mut World, now: Instant) -> u64 {
         let mut lost = 0;
         while let Some(Stamped { at, frame }) = world.port(self.port).receive() {
@@ -122,12 +124,12 @@ impl Client {
         }
     }
 
-    /// The place of a client that is gone and has nothing more to send.
+    /// The port of a client that has left and has no more frames to send.
     pub(super) fn done(&self, world: &mut World) -> Option<PortId> {
         (self.leaving && world.port(self.port).backlog() == 0).then_some(self.port)
     }
 
-    /// Gives up what does not get onto the bus; returns how many frames that were.
+    /// Drops frames that the bus does not take; returns their number.
     pub(super) fn give_up(&self, world: &mut World) -> u64 {
         let now = world.now();
         world.port(self.port).give_up(now)

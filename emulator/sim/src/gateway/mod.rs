@@ -1,9 +1,9 @@
-//! Programs outside that take part in the bus: over TCP, or through a SocketCAN interface of the host.
+//! Network clients of the bus: over TCP, or through a SocketCAN interface of the host.
 //!
-//! Everything runs in the world's thread, between two of its steps, and nothing waits: a frame of a client enters the bus
-//! at one defined instant of virtual time. A client has a queue of its own in each direction, both of them bounded, and a
-//! share of each step. A client that sends faster than the bus takes it is not read from; one that does not read loses
-//! frames. What a client has sent before it closed its connection still goes out.
+//! All clients are served in the world's thread, between two of its steps, without waiting. So a frame of a client
+//! enters the bus at one defined instant of virtual time. Each client has a bounded queue in each direction, and a
+//! share of each step. The gateway stops reading from a client that sends faster than the bus; a client that does not
+//! read loses frames. Frames that a client has sent before it closed its connection still go out.
 
 mod client;
 mod outbox;
@@ -33,15 +33,15 @@ use crate::world::World;
 /// The name of the bus for clients.
 pub const BUS_NAME: &str = "vcan0";
 
-/// Clients that are accepted in one step of the world.
+/// Maximum number of clients to accept in one step of the world, for each port.
 const WELCOMED: usize = 16;
 
-/// What is spoken on a TCP port.
+/// The protocol of a TCP port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
     /// The protocol of the socketcand daemon.
     Socketcand,
-    /// The same, for the page in the browser: it only looks on when nodes boot.
+    /// The socketcand protocol for the page in the browser, which does not start nodes that boot.
     Page,
     /// The line protocol of LAWICEL adapters.
     Slcan,
@@ -55,7 +55,7 @@ pub struct Gateway {
     clients: BTreeMap<Token, Client>,
     #[cfg(target_os = "linux")]
     interface: Option<Interface>,
-    /// What the next connection is called.
+    /// The token of the last connection.
     next: Token,
     lost: u64,
 }
@@ -64,12 +64,12 @@ pub struct Gateway {
 struct Listener {
     socket: TcpListener,
     protocol: Protocol,
-    /// Somebody may wait to be accepted.
+    /// A client may wait to be accepted.
     knocked: bool,
 }
 
 impl Gateway {
-    /// No clients yet.
+    /// A gateway without clients.
     ///
     /// # Errors
     /// When the host cannot watch connections.
@@ -86,10 +86,11 @@ impl Gateway {
         })
     }
 
-    /// Serves a protocol. Returns the address, which tells the port when 0 was asked for.
+    /// Serves a protocol at an address. Returns the address with the actual port, which differs if port 0 was
+    /// requested.
     ///
     /// # Errors
-    /// When the address cannot be had; the message names it.
+    /// When the address is not available; the message names the address.
     pub fn listen(&mut self, address: SocketAddr, protocol: Protocol) -> Result<SocketAddr> {
         let name = self.name();
         let mut listen = || {
@@ -105,7 +106,7 @@ impl Gateway {
     /// Attaches a SocketCAN interface of the host.
     ///
     /// # Errors
-    /// When the host has no such interface; the message names it.
+    /// When the host has no such interface; the message names the interface.
     #[cfg(target_os = "linux")]
     pub fn attach_interface(&mut self, name: &str, world: &mut World) -> Result<()> {
         let interface = Interface::open(name, world);
@@ -116,25 +117,25 @@ impl Gateway {
     /// Attaches a SocketCAN interface of the host.
     ///
     /// # Errors
-    /// Always: only Linux has them.
+    /// Always: only Linux has SocketCAN interfaces.
     #[cfg(not(target_os = "linux"))]
     pub fn attach_interface(&mut self, name: &str, _: &mut World) -> Result<()> {
         anyhow::bail!("cannot open the CAN interface {name}: only Linux has SocketCAN")
     }
 
-    /// Frames that were lost because a client did not take them in time, or the bus did not take them from a client.
+    /// Number of lost frames: not read by a client in time, or not taken by the bus.
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Clients that are connected, or have something left to send.
+    /// Number of clients that are connected or still have frames to send.
     pub fn clients(&self) -> usize {
         self.clients.len()
     }
 
-    /// Lets clients come, go and send; what they send is requested at the world's present time.
+    /// Accepts clients and processes their input; their frames are requested at the current time of the world.
     pub fn poll(&mut self, world: &mut World) {
-        // Without a time limit of zero it would wait. A failure leaves everything for the next step.
+        // The time limit of zero prevents waiting. After a failure the events are handled in the next step.
         let _ = self.poll.poll(&mut self.events, Some(Duration::ZERO));
         for event in &self.events {
             if let Some(client) = self.clients.get_mut(&event.token()) {
@@ -153,7 +154,7 @@ impl Gateway {
         }
     }
 
-    /// Tells the clients what was on the bus since the last call, and lets go of those that have left.
+    /// Passes the frames since the last call to the clients, and removes the clients that have left.
     pub fn deliver(&mut self, world: &mut World) {
         let now = Instant::now();
         #[cfg(target_os = "linux")]
@@ -166,14 +167,14 @@ impl Gateway {
         });
     }
 
-    /// Accepts those who wait at the doors.
+    /// Accepts waiting clients.
     fn welcome(&mut self, world: &mut World) {
         let mut accepted = Vec::new();
         for listener in self.listeners.values_mut() {
             accepted.extend(std::iter::from_fn(|| listener.accept()).take(WELCOMED));
         }
         for (stream, protocol) in accepted {
-            // A client that is gone before it was served is not an event.
+            // A client that has left before it was served is no error.
             let _ = self.connect(stream, protocol, world);
         }
     }
@@ -191,7 +192,7 @@ impl Gateway {
         Ok(())
     }
 
-    /// A name that no connection had before.
+    /// A token that no connection had before.
     fn name(&mut self) -> Token {
         self.next.0 += 1;
         self.next
@@ -199,7 +200,8 @@ impl Gateway {
 }
 
 impl Listener {
-    /// The next who waits. Where the host has no room for more, those who wait are looked at again in the next step.
+    /// The next waiting client. If the host refuses for lack of resources, the waiting clients are accepted in a later
+    /// step.
     fn accept(&mut self) -> Option<(TcpStream, Protocol)> {
         let answer = self.knocked.then(|| self.socket.accept())?;
         self.knocked = !matches!(&answer, Err(error) if error.kind() == ErrorKind::WouldBlock);

@@ -1,35 +1,35 @@
-//! What waits for a client to read it: bounded, in order, some of it in segments that stand alone.
+//! Bytes that wait for a client to read them: bounded, in order, and partly in separate segments.
 
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Write};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// Bytes that may wait for a slow client. Like the queue of a kernel's CAN socket it loses frames that come on top.
+/// Maximum number of waiting bytes. Like a kernel's CAN socket, a full outbox drops further frames.
 const MOST: usize = 64 * 1024;
 
-/// An empty outbox keeps no more memory than this.
+/// Maximum memory of an empty outbox in bytes.
 const KEPT: usize = 1024;
 
-/// How long a segment stands alone, unless the client speaks before. TCP keeps no message boundaries, and python-can takes
-/// whatever one `recv` returns for the answer: nothing may follow the answer before the client has read it, which may take
-/// a while on a busy host.
+/// The pause after a separate segment, unless the client sends something earlier. TCP keeps no message boundaries, and
+/// python-can takes whatever one `recv` returns as the answer. So nothing may follow an answer before the client has
+/// read it, which may take long on a busy host.
 const SEGMENT_GAP: Duration = Duration::from_millis(250);
 
-/// Bytes on their way to one client.
+/// Bytes to send to one client.
 #[derive(Debug, Default)]
 pub(super) struct Outbox {
     waiting: VecDeque<u8>,
-    /// Bytes written since the client came.
+    /// Bytes written since the client connected.
     written: u64,
-    /// Places of the segments that stand alone, counted as `written` is.
+    /// Positions of the separate segments, on the same scale as `written`.
     segments: VecDeque<Range<u64>>,
-    /// The gap behind a segment ends here.
+    /// The end of the pause after a segment.
     silent_until: Option<Instant>,
 }
 
 impl Outbox {
-    /// Whether a further message is taken.
+    /// Whether the outbox accepts a further message.
     pub(super) fn has_room(&self) -> bool {
         self.waiting.len() < MOST
     }
@@ -38,27 +38,27 @@ impl Outbox {
         self.waiting.is_empty()
     }
 
-    /// Adds text that may be joined with what comes before and after.
+    /// Adds text that may be joined with the text before and after it.
     pub(super) fn stream(&mut self, text: &str) {
         self.waiting.extend(text.as_bytes());
     }
 
-    /// Adds text that the client gets in a segment of its own.
+    /// Adds text that the client gets in a separate segment.
     pub(super) fn segment(&mut self, text: &str) {
         let start = self.written + self.waiting.len() as u64;
         self.stream(text);
         self.segments.push_back(start..start + text.len() as u64);
     }
 
-    /// The client has spoken: it has read what was written.
+    /// The client has sent something, so it has read the last segment.
     pub(super) fn heard(&mut self) {
         self.silent_until = None;
     }
 
-    /// Writes what the client takes at `now`, a time of the host.
+    /// Writes as much as the client accepts at `now`, a time of the host.
     ///
     /// # Errors
-    /// What the connection answers; [`ErrorKind::WouldBlock`] when the client has to read first.
+    /// The error of the connection; [`ErrorKind::WouldBlock`] when the client has to read first.
     pub(super) fn flush(&mut self, to: &mut impl Write, now: Instant) -> io::Result<()> {
         while !self.is_empty() && self.silent_until.is_none_or(|end| end <= now) {
             let (front, _) = self.waiting.as_slices();
@@ -73,7 +73,7 @@ impl Outbox {
         Ok(())
     }
 
-    /// How many bytes may go in one write: up to the next segment, or to the end of the present one.
+    /// Number of bytes for one write: up to the next segment, or to the end of the current one.
     fn joined(&self) -> usize {
         let end = self.segments.front().map_or(u64::MAX, |segment| {
             if segment.start > self.written { segment.start } else { segment.end }
@@ -97,7 +97,7 @@ impl Outbox {
 mod tests {
     use super::*;
 
-    /// A client that takes this many bytes at once and blocks after so many writes.
+    /// A client that accepts this many bytes per write and blocks after so many writes.
     struct Narrow {
         width: usize,
         writes: usize,

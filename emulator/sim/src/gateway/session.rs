@@ -1,17 +1,17 @@
-//! What a protocol between the bus and a network client is made of.
+//! The interface between a client protocol and the bus.
 
 use canbus::{Frame, Time};
 
 use crate::port::Adapter;
 
-/// What a session wants done, in order.
+/// An action that a session requests; actions are carried out in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Action {
-    /// To the client, in a segment of its own: python-can compares what one `recv` returns.
+    /// Text to the client, in a separate segment, because python-can compares the bytes that one `recv` returns.
     Segment(String),
-    /// To the client, together with what comes before and after it.
+    /// Text to the client, joined with the text before and after it.
     Stream(String),
-    /// Go on the bus.
+    /// Attach an adapter to the bus.
     Attach(Adapter),
     /// Leave the bus.
     Detach,
@@ -39,6 +39,6 @@ pub(super) trait Session {
     /// Bytes have arrived from the client.
     fn on_bytes(&mut self, bytes: &[u8], out: &mut Vec<Action>);
 
-    /// A frame of somebody else's was on the bus; what to tell the client.
+    /// A frame of another participant was on the bus; returns the text for the client.
     fn on_frame(&mut self, frame: &Frame, at: Time) -> Option<String>;
 }

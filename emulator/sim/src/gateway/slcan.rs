@@ -1,5 +1,5 @@
-//! slcan: the line protocol of the LAWICEL CAN232 and CANUSB adapters ("CANUSB Manual", version 1.0,
-//! chapter 3), which python-can, slcand and many tools speak.
+//! slcan: the line protocol of the LAWICEL CAN232 and CANUSB adapters ("CANUSB Manual", version 1.0, chapter 3).
+//! python-can, slcand and many other tools use it.
 //!
 //! A command ends with a carriage return. Success is answered with a carriage return, refusal with a bell.
 
@@ -13,7 +13,7 @@ use crate::port::Adapter;
 const OK: &str = "\r";
 const BELL: &str = "\x07";
 
-/// A longer line is refused; the longest valid one has 26 bytes.
+/// Maximum length of a line; the longest valid line has 26 bytes.
 const MAX_LINE: usize = 64;
 
 /// Bit rates of S0 to S8 in bit/s.
@@ -26,7 +26,7 @@ pub(super) enum Command {
     BitRate(u32),
     /// `O`: go on the bus.
     Open,
-    /// `L`: go on the bus, only listening.
+    /// `L`: go on the bus in listen-only mode.
     Listen,
     /// `C`: leave the bus.
     Close,
@@ -42,7 +42,7 @@ pub(super) enum Command {
     TimeStamps(bool),
 }
 
-/// Reads one line without its carriage return; `None` when it is not a command of the protocol.
+/// Parses one line without its carriage return; `None` when the line is not a command of the protocol.
 pub(super) fn parse(line: &str) -> Option<Command> {
     let (name, rest) = line.split_at_checked(1)?;
     match (name, rest) {
@@ -109,7 +109,7 @@ fn format_frame(frame: &Frame, at: Time, stamped: bool) -> String {
     line
 }
 
-/// One client.
+/// The session of one client.
 #[derive(Debug)]
 pub(super) struct Slcan {
     bit_rate: u32,
@@ -119,7 +119,7 @@ pub(super) struct Slcan {
 }
 
 impl Slcan {
-    /// A client whose adapter runs at `bit_rate` (bit/s) until it chooses another.
+    /// A session whose adapter runs at `bit_rate` (bit/s) until the client chooses another rate.
     pub(super) fn new(bit_rate: u32) -> Slcan {
         Slcan { bit_rate, open: None, stamped: false, line: Vec::new() }
     }
@@ -131,7 +131,8 @@ impl Slcan {
         }
     }
 
-    /// The manual says for each command whether it is allowed while the channel is open; `None` is a refusal.
+    /// Carries out a command; `None` is a refusal. The manual states for each command whether it is allowed while the
+    /// channel is open.
     fn serve(&mut self, command: Command, out: &mut Vec<Action>) -> Option<()> {
         let mut reply = OK.to_owned();
         match (command, self.open) {
@@ -169,14 +170,14 @@ impl Session for Slcan {
     fn on_bytes(&mut self, bytes: &[u8], out: &mut Vec<Action>) {
         for &byte in bytes {
             match byte {
-                // An empty line is how clients clear the adapter's buffer; it is not answered.
+                // Clients send empty lines to clear the adapter's buffer; an empty line gets no answer.
                 b'\r' | b'\n' if self.line.is_empty() => {}
                 b'\r' => {
                     let line = std::mem::take(&mut self.line);
                     self.on_line(&line, out);
                 }
                 _ if self.line.len() < MAX_LINE => self.line.push(byte),
-                // The line is refused at its end.
+                // The line is too long; it is refused at its end.
                 _ => {}
             }
         }
@@ -280,7 +281,7 @@ mod tests {
             prop_assert_eq!(answers, 1);
         }
 
-        /// What one client sends is, letter by letter, what another receives.
+        /// The text that one client sends arrives unchanged at another client.
         #[test]
         fn a_frame_goes_through_unchanged(id in 0u32..0x2000_0000, extended: bool, remote: bool, bytes in prop::collection::vec(any::<u8>(), 0..=8)) {
             let id: Id = if extended { ExtendedId::new(id).unwrap().into() } else { StandardId::new(id as u16 & 0x7FF).unwrap().into() };

@@ -1,4 +1,4 @@
-//! A SocketCAN interface of the host as a client, so that candump and its kin see the bus.
+//! A SocketCAN interface of the host as a client, so that candump and similar tools see the bus.
 
 use std::collections::VecDeque;
 use std::io;
@@ -9,13 +9,13 @@ use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket};
 use crate::port::Adapter;
 use crate::world::{PortId, World};
 
-/// Frames that may wait for the interface. It loses what comes on top.
+/// Maximum number of frames that wait for the interface; further frames are lost.
 const MOST: usize = 1024;
 
-/// Frames of the interface that may wait for the bus. While so many wait nothing more is read from it.
+/// Maximum number of the interface's frames that wait for the bus. While the queue is full, nothing more is read.
 const QUEUE: usize = 64;
 
-/// An interface. Reading and writing share one socket, because a socket does not hear what it has sent itself.
+/// An interface. Reading and writing share one socket, because a socket does not receive the frames that it has sent.
 pub(super) struct Interface {
     socket: CanSocket,
     port: PortId,
@@ -23,7 +23,7 @@ pub(super) struct Interface {
 }
 
 impl Interface {
-    /// Opens an interface and gives it a place on the bus.
+    /// Opens an interface and a port on the bus.
     pub(super) fn open(name: &str, world: &mut World) -> io::Result<Interface> {
         let socket = CanSocket::open(name)?;
         socket.set_nonblocking(true)?;
@@ -32,7 +32,7 @@ impl Interface {
         Ok(Interface { socket, port, waiting: VecDeque::new() })
     }
 
-    /// Requests what the programs of the host have sent.
+    /// Sends the frames of the host's programs.
     pub(super) fn listen(&mut self, world: &mut World) {
         let now = world.now();
         while world.port(self.port).backlog() < QUEUE
@@ -42,7 +42,7 @@ impl Interface {
         }
     }
 
-    /// Tells the host what was on the bus; returns how many frames it was too slow for, or the bus did not take.
+    /// Passes frames to the host; returns the number of frames that the host or the bus did not take in time.
     pub(super) fn tell(&mut self, world: &mut World) -> u64 {
         let now = world.now();
         let mut lost = world.port(self.port).give_up(now);
@@ -61,7 +61,7 @@ impl Interface {
     }
 }
 
-/// `None` for an error frame, which tells of the host's interface and not of our bus.
+/// `None` for an error frame, which describes the host's interface and not this bus.
 fn from_host(frame: &CanFrame) -> Option<Frame> {
     match frame {
         CanFrame::Data(frame) => Frame::data(frame.id(), frame.data()),

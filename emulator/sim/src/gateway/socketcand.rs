@@ -10,10 +10,10 @@ use canbus::{ExtendedId, Frame, Id, StandardId, Time};
 use super::session::{Action, Session};
 use crate::port::Adapter;
 
-/// A message is refused above this length; the longest valid one has 47 bytes.
+/// Maximum length of a message; the longest valid message has 47 bytes.
 const MAX_MESSAGE: usize = 200;
 
-/// What a client asks for.
+/// A request of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Request {
     /// `< open vcan0 >`
@@ -22,7 +22,7 @@ pub(super) enum Request {
     RawMode,
     /// `< bcmmode >`: subscribed identifiers are reported.
     BcmMode,
-    /// `< echo >`: answered with itself.
+    /// `< echo >`: answered with the same message.
     Echo,
     /// `< send ID DLC BYTES >`, `< sendrtr ID DLC >`
     Send(Frame),
@@ -32,19 +32,19 @@ pub(super) enum Request {
     Unsubscribe(Id),
 }
 
-/// Why a message is refused; the text goes to the client in `< error .. >`.
+/// The reason for a refusal; its text goes to the client in `< error .. >`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Refused {
     /// Not `< word ... >`.
     #[error("not a message")]
     NotAMessage,
-    /// The word is not one of the protocol, or not one that this server offers.
+    /// The word is not part of the protocol, or not supported by this server.
     #[error("unknown command")]
     UnknownCommand,
-    /// The word is known, what follows is not.
+    /// The word is known, but its arguments are invalid.
     #[error("bad arguments")]
     BadArguments,
-    /// There is no bus of that name here.
+    /// No bus has this name.
     #[error("no such bus")]
     NoSuchBus,
     /// Only `open` and `echo` are possible before a bus is open.
@@ -52,7 +52,7 @@ pub(super) enum Refused {
     NotOpen,
 }
 
-/// Reads one message without its brackets.
+/// Parses one message without its brackets.
 pub(super) fn parse(text: &str) -> Result<Request, Refused> {
     let mut words = text.split_ascii_whitespace();
     let command = words.next().ok_or(Refused::NotAMessage)?;
@@ -65,7 +65,7 @@ pub(super) fn parse(text: &str) -> Result<Request, Refused> {
         ("echo", []) => Ok(Request::Echo),
         ("send", [id, dlc, bytes @ ..]) => parse_frame(id, dlc, bytes).map(Request::Send).ok_or(bad),
         ("sendrtr", [id, dlc]) => parse_remote(id, dlc).map(Request::Send).ok_or(bad),
-        // An interval other than zero asks for throttling, which only the kernel's broadcast manager offers.
+        // An interval other than zero requests throttling, which only the kernel's broadcast manager offers.
         ("subscribe", ["0", "0", id]) => parse_id(id).map(Request::Subscribe).ok_or(bad),
         ("unsubscribe", [id]) => parse_id(id).map(Request::Unsubscribe).ok_or(bad),
         ("open" | "rawmode" | "bcmmode" | "echo" | "send" | "sendrtr" | "subscribe" | "unsubscribe", _) => {
@@ -75,7 +75,7 @@ pub(super) fn parse(text: &str) -> Result<Request, Refused> {
     }
 }
 
-/// Up to three digits are a standard identifier, eight are an extended one.
+/// Up to three digits are a standard identifier, eight digits an extended identifier.
 fn parse_id(text: &str) -> Option<Id> {
     let value = hex(text)?;
     match text.len() {
@@ -96,14 +96,14 @@ fn parse_remote(id: &str, dlc: &str) -> Option<Frame> {
     Frame::remote(parse_id(id)?, u8::try_from(hex(dlc)?).ok()?)
 }
 
-/// Unlike `from_str_radix` this takes no sign.
+/// Unlike `from_str_radix`, this function accepts no sign.
 fn hex(text: &str) -> Option<u32> {
     let plain = text.bytes().all(|byte| byte.is_ascii_hexdigit());
     if plain { u32::from_str_radix(text, 16).ok() } else { None }
 }
 
-/// `< frame 123 1.000000 DEADBEEF >`, with two spaces before the bracket when the frame is empty, or
-/// `< rtr 123 1.000000 8 >`. In raw mode the bytes are contiguous, in broadcast-manager mode they are apart.
+/// `< frame 123 1.000000 DEADBEEF >`, with two spaces before the bracket for an empty frame, or `< rtr 123 1.000000 8
+/// >`. The bytes are contiguous in raw mode, and separated in broadcast-manager mode.
 fn format_frame(frame: &Frame, at: Time, separator: &str) -> String {
     let id = match frame.id() {
         Id::Standard(id) => format!("{:03X}", id.as_raw()),
@@ -116,7 +116,7 @@ fn format_frame(frame: &Frame, at: Time, separator: &str) -> String {
     format!("< frame {id} {at} {} >", bytes.join(separator))
 }
 
-/// How frames of the bus are reported to the client.
+/// The frames of the bus that are reported to the client.
 #[derive(Debug)]
 enum Mode {
     Closed,
@@ -125,7 +125,7 @@ enum Mode {
     Raw,
 }
 
-/// One client.
+/// The session of one client.
 #[derive(Debug)]
 pub(super) struct Socketcand {
     bus: &'static str,
@@ -135,12 +135,12 @@ pub(super) struct Socketcand {
 }
 
 impl Socketcand {
-    /// A client of the bus with this name and bit rate (bit/s).
+    /// A session on the bus with this name and bit rate (bit/s).
     pub(super) fn new(bus: &'static str, bit_rate: u32) -> Socketcand {
         Socketcand { bus, bit_rate, mode: Mode::Closed, input: Vec::new() }
     }
 
-    /// Acts on a message with its brackets, or on the noise before one.
+    /// Acts on a message with its brackets, or on other bytes before a message.
     fn on_message(&mut self, bytes: &[u8], out: &mut Vec<Action>) {
         let text = std::str::from_utf8(bytes).ok();
         let inner = text.and_then(|text| text.trim_ascii().strip_prefix('<')?.strip_suffix('>'));
@@ -179,7 +179,7 @@ fn change(mode: &mut Mode, to: Mode, out: &mut Vec<Action>) {
     out.push(Action::segment("< ok >"));
 }
 
-/// Standard and extended identifiers in one number.
+/// Standard and extended identifiers as one number.
 fn key(id: Id) -> u32 {
     match id {
         Id::Standard(id) => u32::from(id.as_raw()),
@@ -225,7 +225,7 @@ mod tests {
         Frame::data(StandardId::new(id).unwrap(), bytes).unwrap()
     }
 
-    /// The replies and frames that come out when a client sends `text`.
+    /// The actions that result when a client sends `text`.
     fn talk(session: &mut Socketcand, text: &str) -> Vec<Action> {
         let mut out = Vec::new();
         session.on_bytes(text.as_bytes(), &mut out);
@@ -307,7 +307,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever arrives, and however it is cut into segments, gives the same answers and at most one a message.
+        /// Any bytes, in any segments, give the same answers, and at most one answer for each message.
         #[test]
         fn any_bytes_are_served_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..600), cut in 0usize..600) {
             let (mut whole, mut halves) = (raw(), raw());
@@ -320,7 +320,7 @@ mod tests {
             prop_assert!(whole.input.len() <= MAX_MESSAGE);
         }
 
-        /// What a client sends is what the bus carries.
+        /// The bus carries the frame that the client sends.
         #[test]
         fn every_frame_can_be_sent(id in 0u32..0x2000_0000, extended: bool, bytes in prop::collection::vec(any::<u8>(), 0..=8)) {
             let id = if extended { Id::Extended(ExtendedId::new(id).unwrap()) } else { Id::Standard(StandardId::new(id as u16 & 0x7FF).unwrap()) };
@@ -330,7 +330,7 @@ mod tests {
             prop_assert_eq!(talk(&mut raw(), &text), [Action::Send(Frame::data(id, &bytes).unwrap())]);
         }
 
-        /// Every message that is not understood is answered with exactly one `< error .. >`.
+        /// Every invalid message is answered with exactly one `< error .. >`.
         #[test]
         fn every_message_is_answered(text in "[ -;=?-~]{0,80}") {
             let out = talk(&mut raw(), &format!("<{text}>"));

@@ -1,4 +1,4 @@
-//! The node on a board: what the firmware's tasks do around it.
+//! The node on a board: does the work of the firmware's tasks around the node.
 
 use std::collections::VecDeque;
 
@@ -12,14 +12,14 @@ use super::flash::{Flash, PAGE};
 use super::step::{Step, raw};
 
 const PAGES: Pages = Pages::new(0, PAGE);
-/// As the firmware's transmit queue.
+/// Frames in the transmit queue, as in the firmware.
 const ROOM: usize = 32;
 /// A chip whose temperature sensor is calibrated.
 const CHIP: ChipThermometer = ChipThermometer { offset: 24.6, slope: 444.0 };
-/// More requests than a call can leave.
+/// Limit of the requests that a call can leave.
 const REQUESTS: usize = 16;
 
-/// A transmit queue of limited room.
+/// A transmit queue with limited space.
 #[derive(Debug, Default)]
 pub(super) struct Queue {
     waiting: Vec<Frame>,
@@ -55,7 +55,7 @@ pub(super) struct Board {
     filters: [Vec<u16>; 2],
     actions: VecDeque<Action>,
     has_parameters: bool,
-    /// Whether it has started since the last step.
+    /// Whether the node has started since the last step.
     pub(super) has_started: bool,
 }
 
@@ -91,7 +91,7 @@ impl Board {
         board
     }
 
-    /// As the firmware's start. A power cut in it is a start of its own.
+    /// Powers on like the firmware. After a power cut during the start, the start begins again.
     fn power_on(&mut self, retained: Retained) {
         self.out.waiting.clear();
         self.actions.clear();
@@ -115,7 +115,7 @@ impl Board {
         self.start();
     }
 
-    /// Keeps what follows from a call of the services half.
+    /// Keeps the requests that a call of the services half has returned.
     fn keep(&mut self, next: Next) {
         self.actions.extend(next.action);
         self.has_parameters |= next.parameters;
@@ -132,7 +132,7 @@ impl Board {
         self.has_started = true;
     }
 
-    /// The rows of the personality that runs.
+    /// The rows of the dictionary of the current personality.
     pub(super) fn rows(&self) -> &'static [Object] {
         self.personality.rows()
     }
@@ -142,7 +142,7 @@ impl Board {
         &rows[usize::from(place) % rows.len()]
     }
 
-    /// The own node-ID, by the identifier of the SDO server.
+    /// The node-ID, derived from the identifier of the SDO server.
     pub(super) fn node_id(&self) -> Option<u16> {
         self.protocol.service_ids().find(|id| (0x601..=0x67F).contains(id)).map(|id| id - 0x600)
     }
@@ -151,12 +151,12 @@ impl Board {
         self.protocol.state()
     }
 
-    /// The frames that have left.
+    /// The frames that were sent.
     pub(super) fn sent(&mut self) -> Vec<Frame> {
         if self.out.is_congested { vec![] } else { std::mem::take(&mut self.out.waiting) }
     }
 
-    /// Does one step and all that follows from it at this instant.
+    /// Carries out one step and all its consequences at this instant.
     pub(super) fn take(&mut self, step: &Step) {
         self.has_started = false;
         match *step {
@@ -221,11 +221,11 @@ impl Board {
         let inputs = Inputs { analogue: *raw, position, digital: buttons };
         self.measurement.update(&inputs, self.protocol.snapshot_mut());
         let _ = self.protocol.publish(self.now, &mut self.out);
-        // A job may have waited for the values of new parameters.
+        // A store job may have waited for the values of new parameters.
         self.run_job();
     }
 
-    /// Polls and fulfils until there is nothing left to do now.
+    /// Polls and carries out requests until no more is due now.
     pub(super) fn settle(&mut self) {
         self.fulfil();
         for _ in 0..REQUESTS {
@@ -275,7 +275,7 @@ impl Board {
     }
 }
 
-/// As the firmware takes what is stored of the device.
+/// The setup from the stored device record, as the firmware reads it.
 fn stored(record: DeviceRecord, unless_stored: &Setup) -> Setup {
     Setup {
         personality: Personality::numbered(record.personality()).expect("one that was stored"),
@@ -289,12 +289,12 @@ fn pick(ids: &[u16], place: u8) -> u16 {
     if ids.is_empty() { 0 } else { ids[usize::from(place) % ids.len()] }
 }
 
-/// The request of an upload.
+/// The SDO request for an upload.
 pub(super) fn upload(row: &Object) -> [u8; 8] {
     request(0x40, row, [0; 4])
 }
 
-/// The request of an expedited download of as many bytes as the object has, or of four.
+/// The SDO request for an expedited download, with the length of the object or four bytes.
 pub(super) fn download(row: &Object, value: [u8; 4]) -> [u8; 8] {
     let unused = 4 - row.kind.size().clamp(1, 4);
     request(0x23 | unused << 2, row, value)

@@ -1,4 +1,4 @@
-//! A flash that the board and the store both hold, so that its power can be cut while the store writes.
+//! A flash that the board and the store share, so that the board can cut the power while the store writes.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -6,7 +6,7 @@ use std::rc::Rc;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use storage::mock::{MockFlash, PowerCut, Weak};
 
-/// Pages that a few saves fill.
+/// Page size: small, so that a few saves fill a page.
 pub(super) const PAGE: u32 = 4 * 1024;
 const ERASE: usize = PAGE as usize;
 
@@ -19,7 +19,7 @@ impl Flash {
         Flash(Rc::new(RefCell::new(MockFlash::new(2 * ERASE, 1))))
     }
 
-    /// Cuts the power in the middle of the operation that comes after so many more.
+    /// Cuts the power in the middle of an operation, after `operations` further operations.
     pub(super) fn cut_after(&self, operations: u8) {
         self.0.borrow_mut().cut_after(operations.into(), Weak::Random);
     }

@@ -1,4 +1,5 @@
-//! The whole node: frames, time, readings, resets and power cuts in any order, and the rules after every step.
+//! The complete node: frames, time, readings, resets and power cuts in any order, with a check of the rules after every
+//! step.
 
 mod board;
 mod flash;
@@ -12,7 +13,7 @@ use board::Board;
 use rules::Seen;
 use step::Step;
 
-/// Takes a personality and then steps.
+/// Decodes a personality and then steps.
 pub fn run(data: &[u8]) {
     let mut input = Unstructured::new(data);
     let Ok(personality) = input.choose(&Personality::ALL) else { return };

@@ -1,4 +1,4 @@
-//! What holds after every step, whatever it was.
+//! The rules that hold after every step.
 
 use canopen::dictionary::{Access, Object, Rule};
 use canopen::{CanId, Frame};
@@ -10,7 +10,7 @@ use super::step::Step;
 const LSS_RESPONSE: u16 = 0x7E4;
 const DOWNLOADED: u8 = 0x60;
 
-/// What a step can change of the rules.
+/// The state that a step can change and that the rules depend on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     state: State,
@@ -23,7 +23,7 @@ impl Seen {
     }
 }
 
-/// Checks what the board has done in a step.
+/// Checks the behaviour of the board in a step.
 pub(super) fn check(step: &Step, before: Seen, board: &mut Board) {
     let sent = board.sent();
     let after = Seen::of(board);
@@ -40,7 +40,8 @@ pub(super) fn check(step: &Step, before: Seen, board: &mut Board) {
     }
 }
 
-/// Only the master or a start leads to Operational or out of Stopped (CiA 301, 7.3.2.2; an error leads the other way).
+/// Only the master or a start leads to Operational or out of Stopped (CiA 301, 7.3.2.2); an error leads in the opposite
+/// direction.
 fn transition(step: &Step, before: Seen, after: Seen, board: &Board) {
     let is_told = matches!(step, Step::Nmt { .. } | Step::Frame { .. } | Step::Process { .. });
     let needs_a_cause =
@@ -49,7 +50,8 @@ fn transition(step: &Step, before: Seen, after: Seen, board: &Board) {
     assert!(after.state != State::Initialising || after.node_id.is_none(), "it waits for LSS only");
 }
 
-/// Which frames exist in which state: CiA 301, table 38. A step may change the state, so either counts.
+/// The allowed frames of each state (CiA 301, table 38). A step may change the state, so the state before or after must
+/// allow the frame.
 fn is_allowed(frame: &Frame, seen: [Seen; 2], board: &mut Board) {
     let is_own = |base: u16| seen.iter().any(|seen| seen.node_id.is_some_and(|id| base + id == frame.id()));
     let has = |allowed: fn(State) -> bool| seen.iter().any(|seen| allowed(seen.state));
@@ -69,16 +71,16 @@ fn is_allowed(frame: &Frame, seen: [Seen; 2], board: &mut Board) {
     }
 }
 
-/// Whether this is the COB-ID of EMCY, 1014h.
+/// Whether the frame has the COB-ID of EMCY from 1014h.
 fn is_emergency(frame: &Frame, board: &mut Board) -> bool {
     let cob_id = Object::new(0x1014, 0, "", canopen::dictionary::Type::Unsigned32, Access::ReadWrite);
     let after = Seen::of(board);
-    // A step that ended the services cannot be asked about them.
+    // The COB-ID cannot be read if the step has ended the services.
     !after.state.has_services()
         || read(&cob_id, after, board).is_some_and(|[a, b, ..]| u16::from_le_bytes([a, b]) == frame.id())
 }
 
-/// What was accepted is there.
+/// The value of an accepted write reads back.
 fn reads_back(row: &Object, value: [u8; 4], after: Seen, board: &mut Board) {
     if row.access == Access::WriteOnly || acts(row.rule) {
         return;
@@ -89,7 +91,7 @@ fn reads_back(row: &Object, value: [u8; 4], after: Seen, board: &mut Board) {
     assert_eq!(found, Some(&value[..size]), "{:04X}h:{} {:?}", row.index, row.sub, row.rule);
 }
 
-/// Whether a write is a command, after which something else is read.
+/// Whether a write is a command: the object then reads back another value.
 fn acts(rule: Rule) -> bool {
     matches!(
         rule,
@@ -110,7 +112,7 @@ fn read(row: &Object, seen: Seen, board: &mut Board) -> Option<[u8; 4]> {
     answer.data()[4..].try_into().ok()
 }
 
-/// An answer to a request about this row; of an upload, whatever its length.
+/// Whether the frame is an answer to a request for this row; the length of an upload does not matter.
 fn is_answer(frame: &Frame, seen: Seen, command: u8, row: &Object) -> bool {
     let [low, high] = row.index.to_le_bytes();
     let is_ours = seen.node_id.is_some_and(|id| 0x580 + id == frame.id());

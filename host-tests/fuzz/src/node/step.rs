@@ -1,45 +1,45 @@
-//! What the world can do to a node.
+//! The events that can happen to a node.
 
 use arbitrary::Arbitrary;
 use node::BusEvent;
 use profiles::board::RawSample;
 
-/// One thing that happens.
+/// One event.
 #[derive(Arbitrary, Debug)]
 pub(super) enum Step {
-    /// An SDO request, as its bytes.
+    /// An SDO request with arbitrary bytes.
     Sdo([u8; 8]),
     /// An SDO upload of a row of the dictionary.
     Read { row: u16 },
-    /// An expedited SDO download to a row of the dictionary, of the length that it has.
+    /// An expedited SDO download to a row of the dictionary, with the length of the object.
     Write { row: u16, value: [u8; 4] },
-    /// An NMT command that exists.
+    /// A defined NMT command.
     Nmt { command: u8, to_all: bool },
-    /// A frame with one of the identifiers that FIFO 0 takes.
+    /// A frame with one of the identifiers of FIFO 0.
     Process { place: u8, len: u8, remote: bool, data: [u8; 8] },
-    /// A frame with one of the identifiers that FIFO 1 takes.
+    /// A frame with one of the identifiers of FIFO 1.
     Service { place: u8, data: [u8; 8] },
     /// A frame with any identifier.
     Frame { id: u16, len: u8, remote: bool, data: [u8; 8] },
     /// An LSS request.
     Lss([u8; 8]),
-    /// A millisecond with other readings.
+    /// A millisecond with new readings.
     Sample { pressure: u32, supply: u32, temperature: u32, reference: u32, encoder: u16, buttons: [bool; 2] },
     /// A report of the CAN controller.
     Bus(Report),
-    /// The next deadline comes.
+    /// Time passes to the next deadline.
     Deadline,
-    /// Time passes, in us, whatever is due.
+    /// Time passes, in us, beyond any deadlines.
     Wait(u32),
-    /// The bus takes no frame any more, or takes them again.
+    /// The bus stops taking frames, or takes frames again.
     Congest(bool),
     /// Power off and on.
     PowerCycle,
-    /// The power will be cut, so many flash operations from now.
+    /// A power cut, after `after` further flash operations.
     PowerCut { after: u8 },
 }
 
-/// As [`BusEvent`].
+/// A [`BusEvent`] for the fuzzer.
 #[derive(Arbitrary, Clone, Copy, Debug)]
 pub(super) enum Report {
     Overrun,
@@ -61,7 +61,7 @@ impl From<Report> for BusEvent {
     }
 }
 
-/// The readings of a step. The sums are whatever the converter says.
+/// The readings of a step. The sums have any values.
 pub(super) fn raw(pressure: u32, supply: u32, temperature: u32, reference: u32) -> RawSample {
     let most = 16 * 4095;
     let [pressure, supply, temperature, reference] =

@@ -1,9 +1,10 @@
-//! Bugs as the authors of firmware make them, each seeded into the images as they are: what does the board say?
+//! Typical firmware bugs, each seeded into the finished images: does the emulated board report each of them?
 //!
-//! A row of [`table::STORES`] changes what the program stores into a register, as a wrong constant or a missing line would do; a row
-//! of [`table::CODE`] puts other instructions at the beginning of an interrupt handler while the program runs: at its start the bootloader
-//! finds the image changed. What the board says is everything by which an
-//! engineer notices on the bench: broken rules, faults and resets, accesses without a model, and what is wrong on the bus.
+//! A row of [`table::STORES`] changes a store of the program into a register, as a wrong constant or a missing line
+//! would do. A row of [`table::CODE`] replaces the first instructions of an interrupt handler while the program runs;
+//! before the start, the bootloader would detect the changed image. The report consists of everything that an engineer
+//! would notice on the bench: broken rules, faults and resets, accesses without a model, and wrong behaviour on the
+//! bus.
 
 mod table;
 
@@ -11,10 +12,10 @@ use crate::scenario::{Node, observe};
 use crate::support::world;
 use table::{CODE, Row, STORES};
 
-/// So that several processes share the work.
+/// Number of parts, so that several processes share the work.
 const PARTS: usize = 4;
 
-/// A row whose words the board does not say, and all that the board says instead.
+/// Runs a row; if the expected text is missing, returns the texts reported instead.
 fn silent(row: &Row) -> Option<String> {
     let said = observe(world(row.node.flags()), row.node, |world| row.seed(world), |world| row.patch(world));
     println!("{}: {}", row.name, said.join("; "));
@@ -22,7 +23,7 @@ fn silent(row: &Row) -> Option<String> {
     (!is_told).then(|| format!("{}: expected {:?} in {said:#?}", row.name, row.says))
 }
 
-/// Every bug of the table whose number has this rest.
+/// Checks every bug whose number in the table has this remainder.
 fn every_bug_shows(rest: usize) {
     let rows = STORES.iter().chain(CODE).enumerate().filter(|(number, _)| number % PARTS == rest);
     let silent: Vec<String> = rows.filter_map(|(_, row)| silent(row)).collect();
@@ -49,7 +50,7 @@ fn bugs_show_fourth_part() {
     every_bug_shows(3);
 }
 
-/// What shows a bug is the bug's.
+/// Without a seeded bug the board reports nothing, so that every report above comes from its bug.
 #[test]
 fn without_a_bug_the_board_says_nothing() {
     for node in [Node::Saving, Node::SlowFifo, Node::Encoder, Node::Absolute] {

@@ -1,4 +1,4 @@
-//! The bugs.
+//! The table of seeded bugs.
 
 use emulator::{Access, Bug};
 use object::{Object, ObjectSymbol};
@@ -7,7 +7,7 @@ use sim::world::World;
 use crate::scenario::Node;
 use crate::support::firmware;
 
-/// A bug and a part of what the board says of it.
+/// A bug, and a part of the text that the board reports.
 pub(super) struct Row {
     pub(super) name: &'static str,
     pub(super) node: Node,
@@ -15,23 +15,23 @@ pub(super) struct Row {
     pub(super) says: &'static str,
 }
 
-/// What is wrong in the program.
+/// The bug in the program.
 enum Does {
-    /// What it does with a register.
+    /// A wrong access to a register.
     Access(Bug),
-    /// What an interrupt handler begins with: halfwords of Thumb code.
+    /// The first instructions of an interrupt handler: halfwords of Thumb code.
     Code(&'static str, &'static [u16]),
 }
 
 impl Row {
-    /// Before the program starts.
+    /// Seeds the bug before the program starts.
     pub(super) fn seed(&self, world: &mut World) {
         if let Does::Access(bug) = self.does {
             world.machine(0).seed(bug);
         }
     }
 
-    /// While the program runs.
+    /// Seeds the bug while the program runs.
     pub(super) fn patch(&self, world: &mut World) {
         if let Does::Code(handler, code) = self.does {
             let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
@@ -40,7 +40,7 @@ impl Row {
     }
 }
 
-/// Where a function of the application begins.
+/// The address of a function in the application.
 fn address_of(function: &str) -> u32 {
     let elf = firmware();
     let file = object::File::parse(&*elf).unwrap();
@@ -60,7 +60,7 @@ const fn wrong(name: &'static str, register: u32, bits: u32, value: u32, says: &
     row(name, register, Access::Wrong { bits, value }, says)
 }
 
-/// The program does not look at bits of a register.
+/// The program ignores bits of a register.
 const fn unseen(name: &'static str, register: u32, bits: u32, says: &'static str) -> Row {
     row(name, register, Access::Unseen { bits }, says)
 }

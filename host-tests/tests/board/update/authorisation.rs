@@ -1,4 +1,4 @@
-//! The bootloader of an owner who wants to know who changes the program (2003h), with the real images.
+//! The bootloader of an owner who requires an authorisation for changes of the program (2003h), with the real images.
 
 use canopen::sdo::{Abort, Multiplexer};
 use host_tests::sdo::{Client, Failure};
@@ -24,7 +24,7 @@ const TRIAL_COMMAND: Multiplexer = Multiplexer { index: 0x2002, sub: 2 };
 /// NMT reset node.
 const RESET: u8 = 0x81;
 
-/// What 2003h:1 reads.
+/// Values of 2003h:1.
 const NO_KEY: u8 = 0;
 const CLOSED: u8 = 1;
 const OPEN: u8 = 2;
@@ -33,7 +33,7 @@ fn refused(abort: Abort) -> Failure {
     Failure::Refused(abort.code())
 }
 
-/// A node in its bootloader: there is no program that may be started.
+/// A node in its bootloader, without a program that may be started.
 fn empty() -> Bench {
     let mut bench = Bench::with(world_of("bootloader-guarded", "--bitrate 1000"), 1_000_000, 1);
     bench.run(SECOND);
@@ -41,7 +41,7 @@ fn empty() -> Bench {
     bench
 }
 
-/// A node that runs what its owner has signed.
+/// A node that runs a program signed by its owner.
 fn running() -> Bench {
     let mut bench = empty();
     let image = signed_by_owner(&version_a(), 0, 0);
@@ -59,7 +59,7 @@ fn challenge(bench: &mut Bench) -> [u8; 8] {
     bench.read(CHALLENGE).unwrap().try_into().unwrap()
 }
 
-/// What the holder of the key says to the challenge that the node has now.
+/// The response of the holder of the key to the node's current challenge.
 fn response(bench: &mut Bench) -> [u8; 8] {
     let key: AuthorisationKey = KEY.parse().unwrap();
     key.response(challenge(bench), bench.word(SERIAL_NUMBER))
@@ -106,13 +106,13 @@ fn a_machine_is_stopped_by_the_holder_of_the_key_alone_and_its_bootloader_is_ope
     bench.stop();
     assert_eq!(state(&mut bench), OPEN);
     bench.clear();
-    // A reset closes it: the program is as it was, and starts.
+    // A reset closes the node again: the program is unchanged, and starts.
     bench.tell(0, &[RESET, 1]);
     bench.identification_of_running();
     assert_eq!(state(&mut bench), CLOSED);
 }
 
-/// What somebody has recorded does not open the node again: not now, not after a reset, not after the power was off.
+/// A recorded response does not open the node again: not at once, not after a reset, not after a power cycle.
 #[test]
 fn what_was_heard_on_the_bus_opens_nothing_later() {
     let mut bench = running();
@@ -134,7 +134,7 @@ fn what_was_heard_on_the_bus_opens_nothing_later() {
     }
 }
 
-/// The node is stopped by the holder of the key, and reset.
+/// The holder of the key stops the node; old responses are refused in the bootloader. The node is then reset.
 fn assert_old_answers_open_no_bootloader(bench: &mut Bench, old: [u8; 8]) {
     let right = response(bench);
     answer(bench, right).unwrap();

@@ -1,4 +1,4 @@
-//! A master that follows CiA 302-3, and the images that it has.
+//! A master that follows CiA 302-3, and its images.
 
 use bsp::update_layout::LAYOUT;
 use canbus::{StandardId, Time};
@@ -24,17 +24,17 @@ pub(super) const BOOT: [u8; 4] = 0x424F_4F54_u32.to_le_bytes();
 pub(super) const STOP: u8 = 0;
 pub(super) const START: u8 = 1;
 pub(super) const CLEAR: u8 = 3;
-/// First address of the application's header, and what the bootloader may erase besides.
+/// First address of the application's header, and the other addresses that the bootloader may erase.
 pub(crate) const HEADER: u32 = 0x0802_0000;
-/// Of the other image.
+/// The version of image B.
 pub(super) const VERSION_B: Version = Version { major: 9, minor: 8, patch: 7 };
-/// How long a client waits for a response, the shortest that is known (python-canopen).
+/// The time-out of a client for a response, the shortest known (python-canopen).
 const TIME_OUT: Time = Time::from_millis(300);
-/// What the bootloader owes, whatever the flash does.
+/// The longest allowed response time of the bootloader, also while the flash is busy.
 pub(super) const PROMPT: Time = Time::from_millis(20);
 const STEP: Time = Time::from_micros(100);
 
-/// A master, the node it talks to, and the slowest answer it got.
+/// A master, its node, and the slowest answer so far.
 pub(crate) struct Bench {
     pub(super) world: World,
     master: Master,
@@ -49,7 +49,7 @@ impl Bench {
         Bench::with(world(flags), bit_rate, node)
     }
 
-    /// A master on the bus of a world that is there already.
+    /// A master on the bus of an existing world.
     pub(crate) fn with(mut world: World, bit_rate: u32, node: u8) -> Bench {
         let master = Master::join_at(&mut world, bit_rate);
         Bench { world, master, bit_rate, node, slowest: Time::ZERO, sent: Time::ZERO }
@@ -70,19 +70,19 @@ impl Bench {
         self.world.machine(0)
     }
 
-    /// How long something takes, in seconds.
+    /// The duration of a call in virtual seconds.
     pub(super) fn time(&mut self, what: impl FnOnce(&mut Bench)) -> f64 {
         let before = self.world.now();
         what(self);
         self.world.now().since(before).as_secs_f64()
     }
 
-    /// Of the master, in bit/s.
+    /// The bit rate of the master in bit/s.
     pub(super) fn bit_rate(&self) -> u32 {
         self.bit_rate
     }
 
-    /// The master leaves the bus, or comes back.
+    /// The master leaves the bus, or joins it again.
     pub(super) fn attach(&mut self, is_there: bool) {
         let adapter = Adapter { bit_rate: self.bit_rate, silent: false };
         self.world.port(self.master.port).attach(is_there.then_some(adapter));
@@ -110,13 +110,13 @@ impl Bench {
         Client::new(self).write(CONTROL, &[command])
     }
 
-    /// A frame that nobody answers, and time for what it does.
+    /// Sends a frame without an answer, and waits until its effect is complete.
     pub(super) fn tell(&mut self, id: u16, bytes: &[u8]) {
         self.master.send(&mut self.world, id, bytes);
         self.run(Time::from_millis(50));
     }
 
-    /// Into the bootloader, which answers next.
+    /// Switches to the bootloader, which gives the next answers.
     pub(super) fn stop(&mut self) {
         assert_eq!(self.command(STOP), Err(Failure::Silence), "not acknowledged");
         assert_eq!(self.read(DEVICE_TYPE).unwrap(), BOOT);
@@ -124,13 +124,13 @@ impl Bench {
         assert_eq!(self.word(IDENTIFICATION), 0);
     }
 
-    /// The status after a download that was refused: what was still to be sent of a block is answered too.
+    /// The status after a refused download; the remaining segments of a block are also answered.
     pub(super) fn settled(&mut self) -> Status {
         self.run(Time::from_millis(50));
         self.wait_for_flash()
     }
 
-    /// What lies in the application area, header and all.
+    /// The content of the application area, with the header.
     pub(super) fn application(&self) -> Vec<u8> {
         let area = LAYOUT.application();
         self.world.boards()[0].flash()[area.start() as usize..area.end() as usize].to_vec()
@@ -156,18 +156,18 @@ impl Bench {
         Client::new(self).write_blocks(DATA, image)
     }
 
-    /// Starts the program and waits until it says that it runs.
+    /// Starts the program and waits until it is running.
     pub(super) fn start(&mut self) -> u32 {
         self.command(START).unwrap();
         self.identification_of_running()
     }
 
-    /// Whether a program runs and says so.
+    /// Whether a program runs and reports this.
     pub(super) fn is_running(&mut self) -> bool {
         self.read(CONTROL) == Ok(vec![1])
     }
 
-    /// The identification of the program once it runs, within ten seconds.
+    /// Waits until the program runs, for ten seconds at most; returns its identification.
     pub(super) fn identification_of_running(&mut self) -> u32 {
         for _ in 0..100 {
             self.run(Time::from_millis(100));
@@ -178,7 +178,7 @@ impl Bench {
         panic!("the program does not run: 1F51h reads {:?}", self.read(CONTROL));
     }
 
-    /// The whole sequence of a master.
+    /// The complete update sequence of a master.
     pub(crate) fn update(&mut self, image: &Image) {
         self.stop();
         self.clear();
@@ -204,7 +204,7 @@ impl Channel for Bench {
     }
 
     fn wait(&mut self) -> Option<[u8; 8]> {
-        // What the client has queued must be on the wire before its patience counts.
+        // The client's time-out begins when its queued frames are on the wire.
         while self.world.port(self.master.port).backlog() > 0 {
             self.run(STEP);
             self.sent = self.world.now();
@@ -220,13 +220,13 @@ impl Channel for Bench {
     }
 }
 
-/// The application as it was built.
+/// The application as built.
 pub(super) fn version_a() -> Image {
     product::development_image(&firmware()).unwrap()
 }
 
-/// The same with another version and identification: what 100Ah reads is changed in the code, and a word is added, or as
-/// many as are wanted.
+/// The application with another version and identification: the version for 100Ah is changed in the code, and a word is
+/// added, or as many as requested.
 pub(super) fn version_b(length: usize) -> Image {
     let mut code = version_a().code;
     code.resize(length.max(code.len() + 4), 0xB0);
@@ -237,7 +237,7 @@ pub(super) fn version_b(length: usize) -> Image {
     signed(code, |_| ())
 }
 
-/// Code that was never meant to run, in an image that is good but for the change.
+/// Code that is not meant to run, in a valid image except for the change.
 pub(super) fn signed(code: Vec<u8>, change: impl FnOnce(&mut Description)) -> Image {
     let mut about = Description {
         product: product::PRODUCT,

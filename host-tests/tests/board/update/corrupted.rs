@@ -1,5 +1,5 @@
-//! Images that must not run, each downloaded to the bootloader on the board. The table of crate `update` is longer
-//! (`cargo test -p update --test corrupted`); this one shows that what the bus and the flash driver add keeps its promise.
+//! Invalid images, each downloaded to the bootloader on the board. The table of crate `update` is longer (`cargo test
+//! -p update --test corrupted`); this one shows the same for the bus and the flash driver.
 
 use bsp::update_layout::LAYOUT;
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -9,7 +9,7 @@ use update::{Description, HEADER_LEN, SIGNED_LEN};
 
 use super::bench::{Bench, signed, version_a};
 
-/// What it is, its bytes, and the code that 1F57h reads.
+/// The name of the fault, the bytes of the image, and the code in 1F57h.
 type Kind = (&'static str, Vec<u8>, u8);
 
 const UNKNOWN_FORMAT: u8 = 2;
@@ -21,7 +21,7 @@ const SIGNATURE: u8 = 67;
 const TRUNCATED: u8 = 68;
 const EXCESS: u8 = 69;
 
-/// Bytes of code: more than a block of 127 segments.
+/// Length of the code in bytes: more than a block of 127 segments.
 const LENGTH: usize = 2000;
 
 fn code() -> Vec<u8> {
@@ -42,7 +42,7 @@ fn bytes(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     bytes
 }
 
-/// With a header whose CRC is right again: what somebody does who has no key.
+/// An image with a changed header and a corrected CRC: the best that an attacker without a key can do.
 fn header(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     bytes(|bytes| {
         change(bytes);
@@ -143,7 +143,7 @@ fn a_bad_image_is_refused_with_its_code_and_the_old_application_starts() {
     assert_eq!(bench.start(), version_a().header.code_crc());
 }
 
-/// The counter that counts is that of an image that has run, so it takes two updates.
+/// Only the security counter of a confirmed image is in force, so the test takes two updates.
 #[test]
 fn an_image_with_a_lower_counter_is_refused() {
     const COUNTER: u8 = 66;

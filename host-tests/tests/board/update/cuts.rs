@@ -1,8 +1,8 @@
-//! The power goes, with the real bootloader. Crate `update` does the same with every outcome of a torn word; here it is the
-//! bootloader with its flash driver, on a flash that the emulator tears.
+//! Power cuts with the real bootloader. Crate `update` tests the same with every outcome of a torn word; this test runs
+//! the bootloader with its flash driver, on a flash that the emulator tears.
 //!
-//! B is a program of five words, so that all of its update can be cut at every operation; A is the real application, whose copy to
-//! where it is kept is cut here and there.
+//! B is a program of five words, so that its complete update can be cut at every operation. A is the real application;
+//! only some operations of the copy that keeps A are cut.
 
 use std::ops::Range;
 
@@ -13,18 +13,18 @@ use sign::image::Image;
 use super::bench::{Bench, CLEAR, STATUS, signed, version_a, version_b};
 use crate::support::SECOND;
 
-/// Where B leaves its mark when it runs: its own address, in RAM that the bootloader does not use.
+/// The address at which B stores its mark: in RAM that the bootloader does not use. The mark is this address.
 const MARK: u32 = 0x2001_0000;
-/// Never comes.
+/// An operation that is never reached.
 const NO_CUT: u64 = u64::MAX >> 1;
-/// The operations of the copy of B: a sector, the program, the mark that it is done.
+/// Operations of the copy of B: a sector erase, the words of the program, the mark of completion.
 const COPY: u64 = 1 + 133 + 1;
-/// Of so many cuts in the copy, two are followed by another one.
+/// Of this many cuts in the copy, two are followed by a second cut.
 const SECOND_CUTS: u64 = 7;
-/// The longest that a recovery takes: two erases, and a start.
+/// The longest recovery: two erases, and a start; in steps of 20 ms.
 const PATIENCE: u32 = 300;
 
-/// Stack pointer, reset vector, and `ldr r0, [pc, #4]`, `str r0, [r0]`, `b .` with the address of the mark (the code starts
+/// Stack pointer, reset vector, `ldr r0, [pc, #4]`, `str r0, [r0]`, `b .`, and the address of the mark (the code starts
 /// at 0802 0200h).
 fn small() -> Image {
     let words: [u32; 5] = [0x2000_4000, 0x0802_0209, 0x6000_4801, 0xBF00_E7FE, MARK];
@@ -37,7 +37,7 @@ enum Runs {
     B,
 }
 
-/// A node that is updated and loses its power, and what its flash held at first.
+/// A node that loses its power during an update, and the original content of its flash.
 struct Victim {
     bench: Bench,
     flash: Vec<u8>,
@@ -57,15 +57,15 @@ impl Victim {
         Victim { bench, flash, a, b, image }
     }
 
-    /// A again, as it was at first.
+    /// Restores A and the original flash.
     fn restore(&mut self) {
         self.bench.machine().set_flash(&self.flash).unwrap();
         self.bench.power_cycle();
         assert_eq!(self.wait(), Some(Runs::A));
     }
 
-    /// The whole sequence of a master that notices nothing, with a cut in that operation of the flash. The operations that
-    /// there were.
+    /// The complete update sequence of a master that ignores the power cut at flash operation `cut`. Returns the number
+    /// of operations.
     fn update(&mut self, cut: u64) -> u64 {
         let bench = &mut self.bench;
         bench.stop();
@@ -76,7 +76,7 @@ impl Victim {
         bench.machine().peripherals_mut().flash_mut().operations() - before
     }
 
-    /// Switches the power on, with another cut in the recovery. Whether it came to that operation.
+    /// Switches the power on, with another cut in the recovery. Returns whether the recovery reached that operation.
     fn cut_again(&mut self, second: u64) -> bool {
         self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(second);
         self.bench.power_cycle();
@@ -84,14 +84,14 @@ impl Victim {
         self.bench.machine().next_event() == Time::NEVER
     }
 
-    /// Switches the power on for good, and waits for what runs in the end.
+    /// Switches the power on without a further cut, and waits for the program that runs in the end.
     fn recover(&mut self) -> Option<Runs> {
         self.bench.machine().peripherals_mut().flash_mut().cut_power_at_operation(NO_CUT);
         self.bench.power_cycle();
         self.wait()
     }
 
-    /// What runs, if that is all of A, which answers, or all of B, which leaves its mark.
+    /// The running program: A, which answers, or B, which leaves its mark; `None` if the program is not complete.
     fn wait(&mut self) -> Option<Runs> {
         for _ in 0..PATIENCE {
             self.bench.run(Time::from_millis(20));
@@ -122,21 +122,21 @@ fn go_on_without_the_node(bench: &mut Bench, image: &[u8]) {
     });
 }
 
-/// Every one of so many operations is cut where not all are.
+/// Without `--thorough`, one of this many operations is cut.
 const SAMPLE: u64 = 10;
 
-/// Of the operations that keep A, one of so many is cut, but for those at either end.
+/// Of the operations that keep A, one of this many is cut, except for those at the begin and the end.
 const KEEPING_SAMPLE: u64 = 2001;
 const ENDS: u64 = 6;
 
-/// The operations that keep A, but for those at either end, of an update of so many.
+/// The operations that keep A, except for those at the begin and the end, in an update of `all` operations.
 fn keeping(all: u64) -> Range<u64> {
     let copy = all - COPY;
     let keeping = 4 + 1 + version_a().to_bytes().len() as u64 / 4 + 3;
     copy - keeping + ENDS..copy - ENDS
 }
 
-/// Whether the power is to go in this operation.
+/// Whether the power is cut in this operation.
 fn is_cut(cut: u64, keeping: &Range<u64>) -> bool {
     if keeping.contains(&cut) {
         ((cut - keeping.start) / 2).is_multiple_of(either(KEEPING_SAMPLE, KEEPING_SAMPLE / 10))
@@ -145,8 +145,8 @@ fn is_cut(cut: u64, keeping: &Range<u64>) -> bool {
     }
 }
 
-/// Cuts at every operation whose number has this rest by two, so that two processes share the work; at a tenth of them
-/// without `--thorough`.
+/// Cuts at every operation whose number has this remainder modulo two, so that two processes share the work; at a tenth
+/// of the operations without `--thorough`.
 fn cut_everywhere(rest: u64) {
     let mut victim = Victim::new();
     let all = victim.update(NO_CUT);
@@ -193,13 +193,13 @@ fn the_power_goes_at_every_odd_operation_of_an_update() {
     cut_everywhere(1);
 }
 
-/// Both are the real application here: whichever it is, it answers.
+/// Both programs are real applications here, so each of them answers.
 #[test]
 fn whenever_the_power_goes_the_node_comes_back_with_one_of_the_two() {
     let cuts = either(4, 8);
     let (a, b) = (version_a(), version_b(0));
     let words = (b.to_bytes().len() / 4) as u64;
-    // Clear, download, keeping A, the copy with its erases; the records in between.
+    // Operations: clear, download, keeping A, the copy with its erases, and the records in between.
     let all = 6 + words + 4 + 8 + words + 2 + words;
     let (mut old, mut new) = (0, 0);
     for cut in 0..cuts {

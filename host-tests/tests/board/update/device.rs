@@ -1,4 +1,4 @@
-//! The bootloader as a CANopen device: what each has, and what its program objects refuse.
+//! The bootloader as a CANopen device: its objects, and the writes that its program objects refuse.
 
 use canbus::Time;
 use canopen::sdo::Multiplexer;
@@ -11,7 +11,7 @@ const NMT: u16 = 0x000;
 const RESET_NODE: u8 = 0x81;
 const RESET_COMMUNICATION: u8 = 0x82;
 const HEARTBEAT: Multiplexer = Multiplexer { index: 0x1017, sub: 0 };
-/// Of SDO (CiA 301, table 22).
+/// SDO abort codes (CiA 301, table 22).
 const INVALID_VALUE: Failure = Failure::Refused(0x0609_0030);
 const COMMAND: Failure = Failure::Refused(0x0504_0001);
 const DEVICE_STATE: Failure = Failure::Refused(0x0800_0022);
@@ -98,7 +98,7 @@ fn lss_changes_its_bit_rate() {
 #[test]
 fn a_node_that_has_found_the_bit_rate_keeps_it() {
     let mut bench = Bench::new("--node 1:pressure@auto --bitrate 500", 500_000, 1);
-    // Somebody has to acknowledge while the node only listens.
+    // Another node must acknowledge frames while the node only listens.
     let _other = Master::join_at(&mut bench.world, 500_000);
     let found = (0..100).any(|_| bench.is_running());
     assert!(found, "the node has found the bit rate");
@@ -135,7 +135,7 @@ fn a_download_without_a_clear_is_refused_and_one_in_segments_is_taken() {
     assert_eq!(bench.read(CONTROL).unwrap(), [0]);
 }
 
-/// It refuses with the abort code at which clients go on in segments.
+/// The bootloader refuses a block upload with the abort code at which clients switch to segmented transfer.
 #[test]
 fn it_is_read_in_segments_and_not_in_blocks() {
     let mut bench = in_bootloader();

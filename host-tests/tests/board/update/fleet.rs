@@ -17,26 +17,26 @@ pub(super) use crate::adapter::Shared;
 use crate::adapter::run;
 use crate::support::{SECOND, world};
 
-/// A board that is switched off in one operation of its flash, and on again.
+/// A power failure of a board in one operation of its flash, and the return of the power.
 pub(super) struct Outage {
     board: usize,
-    /// The number of the operation.
+    /// The number of the flash operation.
     operation: u64,
-    /// When it comes back.
+    /// The instant at which the power returns.
     until: Option<Time>,
 }
 
 impl Outage {
     const LENGTH: Time = Time::from_millis(8_000);
 
-    /// When the flash of this board has done half of what the download of an image takes.
+    /// A failure halfway through the flash operations of an image's download.
     fn halfway(world: &Shared, board: usize, image: &Image) -> Outage {
         let words = image.to_bytes().len() as u64 / 4;
         let done = world.borrow_mut().machine(board).peripherals_mut().flash_mut().operations();
         Outage { board, operation: done + words / 2, until: None }
     }
 
-    /// Whether the board is back.
+    /// Whether the power has returned.
     fn is_over(&mut self, world: &mut World) -> bool {
         let now = world.now();
         let machine = world.machine(self.board);
@@ -66,13 +66,13 @@ pub(super) fn share(mut world: World) -> Shared {
     Rc::new(RefCell::new(world))
 }
 
-/// `nodectl update --force`, as A is the older version: what it reports, a line for each node in the order in which they
-/// were done.
+/// Runs `nodectl update --force` (A is the older version). Returns its reports, one for each node, in the order of the
+/// updates.
 pub(super) fn update(world: &Shared, nodes: &str, image: &Image, outage: Option<Outage>) -> Vec<Value> {
     try_update(world, nodes, image, outage, &[]).unwrap_or_else(|refusal| panic!("{refusal}"))
 }
 
-/// The same with more on the command line, or why it has failed.
+/// Runs the command with further arguments; returns the reports or the error.
 pub(super) fn try_update(
     world: &Shared,
     nodes: &str,
@@ -94,7 +94,7 @@ pub(super) fn try_update(
     Ok(printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
 }
 
-/// What is reported of a node.
+/// The expected report of a node.
 fn updated(node: u8, [from, to]: [&Image; 2]) -> Value {
     let version = |image: &Image| image.header.description().version.to_string();
     json!({
@@ -118,7 +118,8 @@ fn nodectl_updates_to_b_and_back() {
     assert_eq!(update(&world, "1", &a, None), [updated(1, [&b, &a])]);
 }
 
-/// The one gets its turn after the others, and is gone on with. Four nodes in a thorough run, else two.
+/// The failed node is updated after the others, and its download is continued. Four nodes in a thorough run, otherwise
+/// two.
 #[test]
 fn a_node_of_several_is_switched_off_halfway_and_gone_on_with() {
     let (nodes, off) = either((2, 1), (4, 2));

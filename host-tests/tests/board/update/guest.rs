@@ -1,5 +1,5 @@
-//! Two boards and a master on one bus. One board is damaged while the power is off: its neighbour notices nothing, and an
-//! update brings the damaged one back.
+//! Two boards and a master on one bus. One board is damaged while its power is off: its neighbour is not disturbed, and
+//! an update repairs the damaged board.
 
 use bsp::update_layout::LAYOUT;
 use canbus::Time;
@@ -13,18 +13,18 @@ use crate::support::SECOND;
 const PARAMETERS: u32 = 0x0800_8000;
 const PARAMETERS_LEN: usize = 0x8000;
 const FLASH: u32 = 0x0800_0000;
-/// Where the damaged board is, and its neighbour.
+/// Node-IDs of the damaged board and of its neighbour.
 const DAMAGED: u8 = 1;
 const NEIGHBOUR: u8 = 2;
-/// Where a board without a record is found.
+/// Node-ID of a board without a device record.
 const NOBODY: u8 = 126;
 
-/// How long the neighbour is watched.
+/// The time for which the neighbour is observed.
 fn span() -> Time {
     either(SECOND * 2, SECOND * 60)
 }
 
-/// What is damaged.
+/// The damaged part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Damage {
     Application,
@@ -34,9 +34,9 @@ enum Damage {
     /// Both pages of the store.
     Parameters,
     Staging,
-    /// An image that is to be copied, but is not good.
+    /// A pending image to copy that is not valid.
     Pending,
-    /// Application and record.
+    /// Application and device record.
     Both,
 }
 
@@ -75,12 +75,12 @@ impl Damage {
         }
     }
 
-    /// Whether the application starts all the same.
+    /// Whether the application starts in spite of the damage.
     fn is_harmless(self) -> bool {
         matches!(self, Damage::Staging | Damage::Pending)
     }
 
-    /// Whether the application starts, but not where it was.
+    /// Whether the application starts, but with another node-ID and bit rate.
     fn is_lost(self) -> bool {
         matches!(self, Damage::Record | Damage::Parameters)
     }
@@ -92,7 +92,7 @@ fn flip(bench: &mut Bench, address: u32) {
     bench.machine().write(address, &[byte[0] ^ 0x10]).unwrap();
 }
 
-/// The node-ID in the record that the factory has stored.
+/// The address of the node-ID in the device record that the factory has stored.
 fn record(bench: &mut Bench) -> u32 {
     let mut pages = vec![0; PARAMETERS_LEN];
     bench.machine().read(PARAMETERS, &mut pages).unwrap();
@@ -102,7 +102,7 @@ fn record(bench: &mut Bench) -> u32 {
     PARAMETERS + u32::try_from(at).unwrap()
 }
 
-/// A bus on which the first board was damaged with its power off, and has started again.
+/// A bus with a board that was damaged while its power was off and has started again.
 fn damaged(kbit: u32, damage: Damage) -> Bench {
     let nodes = "--node 1:pressure --node 2:pressure";
     let mut bench = Bench::new(&format!("--bitrate {kbit} {nodes}"), kbit * 1000, DAMAGED);
@@ -118,17 +118,17 @@ fn errors(bench: &Bench) -> u64 {
     bench.world.summary(1.0, 0).bus.errors
 }
 
-/// Whether the bootloader answers. A board that listens has to hear something first.
+/// Whether the bootloader answers. A listening board must first hear a frame.
 fn is_found(bench: &mut Bench) -> bool {
     (0..20).any(|_| bench.read(DEVICE_TYPE) == Ok(BOOT.to_vec()))
 }
 
-/// Frames of the neighbour go on coming, and nothing that it could complain of happens.
+/// The neighbour goes on sending frames, and no bus error occurs.
 #[test]
 fn a_damaged_board_does_not_disturb_its_neighbour_and_an_update_brings_it_back() {
     for (index, kbit) in [500, 1000].into_iter().enumerate() {
         let damages = Damage::ALL.into_iter().filter(|damage| !damage.is_lost());
-        // All of them at both bit rates in a thorough run, else every other one at each.
+        // All kinds at both bit rates in a thorough run, otherwise every other kind at each.
         for damage in damages.skip(either(index, 0)).step_by(either(2, 1)) {
             let mut bench = damaged(kbit, damage);
             let before = errors(&bench);
@@ -155,7 +155,8 @@ fn a_damaged_board_does_not_disturb_its_neighbour_and_an_update_brings_it_back()
     }
 }
 
-/// A record that says 250 kbit/s on a bus at 1 Mbit/s: a frame or two are destroyed, and the node is found where the bus is.
+/// A record with 250 kbit/s on a bus at 1 Mbit/s: one or two frames are destroyed, and the node then joins the bus at
+/// its bit rate.
 #[test]
 fn a_record_that_does_not_fit_the_bus_costs_two_frames_at_most() {
     let mut bench = Bench::new("--bitrate 1000 --node 1:pressure --node 2:pressure", 1_000_000, DAMAGED);
@@ -176,7 +177,7 @@ fn a_record_that_does_not_fit_the_bus_costs_two_frames_at_most() {
     assert!(is_found(&mut bench));
 }
 
-/// The application of a board without a record is a guest too.
+/// The application of a board without a device record also detects the bit rate of the bus.
 #[test]
 fn a_board_whose_record_is_damaged_comes_to_the_bus_where_the_bus_is() {
     for (index, kbit) in [500, 1000].into_iter().enumerate() {
@@ -192,8 +193,8 @@ fn a_board_whose_record_is_damaged_comes_to_the_bus_where_the_bus_is() {
     }
 }
 
-/// A board without record and application on a bus on which nobody speaks: it says nothing, and is found as 126 at 250 kbit/s by
-/// a master that comes.
+/// A board without record and application on a silent bus: it sends nothing, and a master finds it as node 126 at 250
+/// kbit/s.
 #[test]
 fn on_a_silent_bus_the_node_is_126_at_250_kbit_whenever_a_master_comes() {
     for seconds in [1, 10, 40] {

@@ -1,4 +1,4 @@
-//! The field update with the images as they are: the application, the bootloader, and a master that follows CiA 302-3.
+//! The field update with the real images: the application, the bootloader, and a master that follows CiA 302-3.
 
 mod authorisation;
 mod bench;
@@ -23,7 +23,7 @@ use crate::support::{SECOND, images, world_of};
 use bench::{BOOT, CONTROL, DEVICE_TYPE, IDENTIFICATION, PROMPT, START, signed, version_a, version_b};
 pub(crate) use bench::{Bench, HEADER};
 
-/// What 1F57h reads where the signature is not good.
+/// Code in 1F57h for an invalid signature.
 const SIGNATURE: u8 = 67;
 
 #[test]
@@ -40,10 +40,11 @@ fn a_node_is_updated_to_b_and_back() {
     assert_eq!(bench.world.summary(1.0, 0).bus.errors, 0);
 }
 
-/// All of it is on the wire, and the flash is erased and programmed: what does the node add? At one bit rate without `--thorough`.
+/// The update time compared with the time of the frames on the wire, including erase and programming. At one bit rate
+/// without `--thorough`.
 #[test]
 fn an_update_takes_what_the_wire_takes() {
-    /// Of 127.5 KiB in blocks of 127 at 116 bits a frame, nothing but the frames.
+    /// The times of the frames alone, for 127.5 KiB in blocks of 127 segments at 116 bits a frame.
     const WIRE: [(u32, f64); 3] = [(1000, 2.18), (500, 4.36), (250, 8.73)];
     let image = signed(noise(LAYOUT.longest_image() as usize - HEADER_LEN), |_| ()).to_bytes();
     for &(kbit, wire) in either(&WIRE[1..2], &WIRE[..]) {
@@ -64,13 +65,13 @@ fn an_update_takes_what_the_wire_takes() {
     }
 }
 
-/// Has as many stuff bits as code has, or more.
+/// Random bytes, which need at least as many stuff bits as code.
 fn noise(length: usize) -> Vec<u8> {
     let mut random = fastrand::Rng::with_seed(1);
     (0..length).map(|_| random.u8(..)).collect()
 }
 
-/// While every sector of both areas erases, and in everything between: download, check, signature, copy.
+/// Answers stay prompt while every sector of both areas is erased, and during download, check, signature and copy.
 #[test]
 fn every_answer_of_an_update_is_prompt() {
     let mut bench = Bench::running();
@@ -107,7 +108,8 @@ fn without_an_application_the_node_is_where_its_record_says() {
     assert_eq!(bench.identification_of_running(), version_a().header.code_crc());
 }
 
-/// Put there with a debugger: its sums are right, and nobody has signed it. Neither power nor a master starts it.
+/// An application written with a debugger: its checksums are right, but the signature is missing. Neither a power cycle
+/// nor a master starts it.
 #[test]
 fn an_application_that_nobody_has_signed_does_not_start() {
     let mut bench = Bench::running();
@@ -143,7 +145,7 @@ fn an_application_that_crashes_again_and_again_stays_reachable() {
     assert_eq!(bench.read(CONTROL).unwrap(), [1], "a crash after it was well counts for itself");
 }
 
-/// On a silent bus it listens for the bit rate, for however long: that does not make it well.
+/// On a silent bus the application listens for the bit rate for any time: this does not confirm the application.
 #[test]
 fn an_application_that_is_not_on_the_bus_does_not_confirm_itself() {
     const PC: u8 = 15;
@@ -157,8 +159,8 @@ fn an_application_that_is_not_on_the_bus_does_not_confirm_itself() {
     assert_eq!((bench.status().code, bench.status().detail), (70, 3));
 }
 
-/// The counter is not in the application area: neither damage there, nor an update, nor a debugger that programs that area, takes
-/// it back.
+/// The counter is outside of the application area. Neither damage there, nor an update, nor a debugger that programs
+/// that area resets the counter.
 #[test]
 fn the_security_counter_outlives_the_application() {
     const COUNTER: u8 = 66;
@@ -166,11 +168,11 @@ fn the_security_counter_outlives_the_application() {
     let [older, newer] = [1, 2].map(|counter| signed(code.clone(), |about| about.counter = counter));
     let mut bench = Bench::running();
     bench.update(&newer);
-    // Its counter holds from the first start after its confirmation on.
+    // The counter of an image is in force from the first start after its confirmation on.
     bench.run(SECOND * 10);
     bench.power_cycle();
     assert_eq!(bench.identification_of_running(), newer.header.code_crc());
-    // Neither the application nor what it could be copied from once more is whole.
+    // Neither the application nor the image to copy again is valid.
     for place in [HEADER, FLASH + LAYOUT.staging().start()] {
         bench.machine().write(place, &[0; 64]).unwrap();
     }
@@ -192,7 +194,7 @@ fn the_security_counter_outlives_the_application() {
     assert_eq!(bench.identification_of_running(), newer.header.code_crc());
 }
 
-/// The signature takes most.
+/// The check of the signature needs the most stack.
 #[test]
 fn the_bootloader_stays_within_the_bound_of_its_stack() {
     let mut bench = Bench::new("--bitrate 250", 250_000, 1);
@@ -205,14 +207,14 @@ fn the_bootloader_stays_within_the_bound_of_its_stack() {
     assert_bound(&bench.world, &["bootloader"]);
 }
 
-/// The linker holds the bootloader to its two sectors. Another compiler must not be what breaks that.
+/// The linker limits the bootloader to its two sectors. Another compiler must not break that limit.
 #[test]
 fn the_bootloader_fits_into_its_two_sectors() {
     const KIB: u64 = 1024;
     const SECTORS: Budget = Budget { what: "bootloader, bytes of flash", limit: 32 * KIB, width: 0 };
-    // The seal of a start and the second look at the signature took a part of the KiB that was kept free before.
+    // The seal of a start and the second check of the signature use a part of the KiB that was reserved before.
     const WITH_RESERVE: Budget = Budget { limit: 32 * KIB - 672, width: 2, ..SECTORS };
-    /// With a key for those who change the program.
+    /// With the key that authorises changes of the program.
     const GUARDED: Budget =
         Budget { what: "bootloader with 2003h, bytes of flash", limit: 32 * KIB - 96, width: 2 };
     let size = |bootloader: &str| {

@@ -1,4 +1,4 @@
-//! The bootloader as its owner builds it: two keys of the owner's, and not the feature `development`.
+//! The bootloader as built by its owner: two keys of the owner, without the feature `development`.
 
 use ed25519_dalek::SigningKey;
 use sign::image::Image;
@@ -10,9 +10,9 @@ use crate::support::{SECOND, world_of};
 
 /// The secret halves of the keys that `cargo xtask` builds this bootloader with.
 const OWNER: [[u8; 32]; 2] = [[0x42; 32], [0x43; 32]];
-/// What 1F57h reads after an image whose key is revoked.
+/// Code in 1F57h for an image with a revoked key.
 const REVOKED: u8 = 71;
-/// What 1F57h reads after an image that another key has signed.
+/// Code in 1F57h for an image signed with an unknown key.
 const SIGNATURE: u8 = 67;
 
 fn bench() -> Bench {
@@ -21,7 +21,7 @@ fn bench() -> Bench {
     bench
 }
 
-/// The same code in an image that names this key, and is signed with it.
+/// The code of an image in another image that names this key, and is signed with it.
 pub(super) fn signed_by_owner(image: &Image, key: u8, revokes: u8) -> Image {
     let about = Description { key, revokes, ..*image.header.description() };
     Image::sign(about, image.code.clone(), &SigningKey::from_bytes(&OWNER[usize::from(key)])).unwrap()
@@ -39,7 +39,7 @@ fn it_was_built_with_the_owner_s_keys() {
 #[test]
 fn it_takes_what_its_owner_has_signed_and_nothing_else() {
     let mut bench = bench();
-    // The application that the emulated board brings is signed with the development key: this bootloader does not start it.
+    // The application on the emulated board is signed with the development key: this bootloader does not start it.
     assert_eq!(bench.settled().code, SIGNATURE);
     bench.clear();
     assert!(bench.download(&version_b(0).to_bytes()).is_err() || bench.wait_for_flash().code != 0);
@@ -51,7 +51,7 @@ fn it_takes_what_its_owner_has_signed_and_nothing_else() {
     assert_eq!(bench.start(), image.header.code_crc());
 }
 
-/// The second key takes the first one's rights: from the first start after the confirmation of the image that says so.
+/// The second key revokes the first one: from the first start after the confirmation of the revoking image on.
 #[test]
 fn one_of_its_keys_revokes_the_other_one() {
     let mut bench = bench();
@@ -72,7 +72,7 @@ fn one_of_its_keys_revokes_the_other_one() {
     bench.stop();
     assert!(!take(&mut bench, &first));
     assert_eq!((bench.settled().code, bench.settled().detail), (REVOKED, 0));
-    // Nor does it start where a debugger has put it.
+    // The image does not start either when a debugger has written it.
     bench.machine().write(HEADER, &first.to_bytes()).unwrap();
     bench.power_cycle();
     bench.run(SECOND);

@@ -1,4 +1,4 @@
-//! A board whose bootloader is write protected and whose flash cannot be read, as `cargo xtask protect` leaves it.
+//! A board with a write-protected bootloader and a flash that cannot be read, as `cargo xtask protect` leaves it.
 
 use canbus::Time;
 use chip::{BusFault, Peripherals};
@@ -11,11 +11,11 @@ use crate::support::SECOND;
 /// Sectors 0 and 1.
 const BOOTLOADER: usize = 32 * 1024;
 
-/// A debug probe on the first board, which goes on running.
+/// A debug probe on the first board, which keeps running.
 struct Probe<'a>(&'a Shared);
 
 impl Probe<'_> {
-    /// What an access through a probe takes, and a quick one.
+    /// The duration of an access by a fast probe.
     fn pause(&self) {
         let mut world = self.0.borrow_mut();
         let next = world.now() + Time::from_millis(20);
@@ -46,7 +46,7 @@ fn a_protected_board_is_updated_to_b_and_back() {
     let world = boards(1);
     let before = world.borrow_mut().machine(0).flash();
     program(&mut Probe(&world), OptionBytes::FACTORY.with_bootloader(true).with_read_out(true)).unwrap();
-    // The protection of the flash takes effect with the power.
+    // The protection of the flash takes effect at power-on.
     let now = world.borrow().now();
     world.borrow_mut().machine(0).power_off();
     world.borrow_mut().machine(0).power_on(now);

@@ -1,4 +1,4 @@
-//! A new program is on trial, with the real images: what confirms it, and every way back to the one before.
+//! The trial of a new program, with the real images: its confirmation, and every return to the previous program.
 
 use canbus::Time;
 use canopen::sdo::Multiplexer;
@@ -22,7 +22,7 @@ const SAVE: Multiplexer = Multiplexer { index: 0x1010, sub: 1 };
 const HEARTBEAT: Multiplexer = Multiplexer { index: 0x1017, sub: 0 };
 const LAST_ERROR: Multiplexer = Multiplexer { index: 0x1003, sub: 1 };
 
-/// What 2002h:1 reads.
+/// Values of 2002h:1.
 const NONE: u8 = 0;
 const OPEN: u8 = 1;
 const BACK_AFTER_STARTS: u8 = 2;
@@ -36,7 +36,7 @@ fn state(bench: &mut Bench) -> u8 {
     bench.read(STATE).unwrap()[0]
 }
 
-/// A program with another instruction where the reset leads to.
+/// A program with another instruction at its reset address.
 fn broken(instruction: [u8; 2]) -> Image {
     const CODE: u32 = 0x0802_0200;
     let mut code = version_b(0).code;
@@ -46,7 +46,7 @@ fn broken(instruction: [u8; 2]) -> Image {
     signed(code, |_| ())
 }
 
-/// Everything of an update before the start of the new program.
+/// All steps of an update before the start of the new program.
 fn bring(bench: &mut Bench, image: &Image) {
     bench.stop();
     bench.clear();
@@ -54,13 +54,13 @@ fn bring(bench: &mut Bench, image: &Image) {
     assert_eq!(bench.wait_for_flash(), Status::GOOD);
 }
 
-/// Everything of an update but the talk with the new program.
+/// All steps of an update, without a dialogue with the new program.
 fn put(bench: &mut Bench, image: &Image) {
     bring(bench, image);
     bench.command(START).unwrap();
 }
 
-/// A runs again, and says why.
+/// Checks that A runs again, and reports the reason.
 fn assert_a_is_back(bench: &mut Bench, state_then: u8, detail: u16) {
     assert_eq!(bench.identification_of_running(), version_a().header.code_crc());
     assert_eq!(state(bench), state_then);
@@ -85,7 +85,7 @@ fn a_program_that_a_master_speaks_to_is_confirmed_after_ten_seconds_and_stays() 
     assert_eq!((state(&mut bench), bench.status()), (NONE, Status::GOOD));
 }
 
-/// It hangs, until the watchdog comes, or it faults at once.
+/// The program hangs until the watchdog resets the chip, or it faults at once.
 #[test]
 fn a_program_that_does_not_start_is_replaced_by_the_one_before_with_its_settings() {
     for instruction in [[0xFE, 0xE7], [0x00, 0xDE]] {
@@ -157,7 +157,7 @@ fn a_master_confirms_a_program_or_takes_it_back_and_nothing_is_stored_before() {
     assert_eq!(write(&mut bench, COMMAND, b"back"), Err(Failure::Refused(0x0800_0022)), "there is no trial");
 }
 
-/// One is confirmed, the other taken back, and neither knows of the other. What runs is another personality at each.
+/// One program is confirmed, the other one is withdrawn, independently. The two nodes have different personalities.
 #[test]
 fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
     let flags = "--bitrate 250 --node 1:pressure --node 2:encoder";
@@ -187,14 +187,14 @@ fn two_nodes_are_on_trial_at_once_at_250_kbit_s() {
     assert_eq!(bench.world.summary(1.0, 0).bus.errors, 0);
 }
 
-/// The power goes in the way back, here and there: A comes back whenever it is there again.
+/// Power cuts at some operations of the return: A runs after each of them.
 #[test]
 fn the_power_goes_on_the_way_back() {
     let mut bench = Bench::running();
     bench.update(&version_b(0));
     let flash = bench.machine().flash();
     let words = version_a().to_bytes().len() as u64 / 4;
-    // The mark, the erase, the image, and the two records.
+    // Operations: the mark, the erase, the words of the image, and the two records.
     let all = 1 + 1 + words + 4 + 1;
     let cuts = either(4, 40);
     for cut in (0..cuts).map(|number| 1 + number * all / cuts).chain([2, 3, all - 4, all]) {

@@ -1,11 +1,12 @@
-//! Loop-back mode: frames go round inside, without the bus and its acknowledgement (RM0390, bxCAN loop back mode).
+//! Loop-back mode: the controller receives its own frames, without the bus and its acknowledgement (RM0390, bxCAN loop
+//! back mode).
 
 use canbus::{Frame, Time, frame_bits};
 
 use super::modes::Mode;
 use super::{BxCan, INRQ, SLEEP};
 
-/// A frame on its way round.
+/// A frame in loop-back.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Loop {
     frame: Frame,
@@ -13,7 +14,7 @@ pub(super) struct Loop {
 }
 
 impl BxCan {
-    /// Sends the scheduled mailbox, if nothing is under way.
+    /// Sends the scheduled mailbox unless a frame is under way.
     pub(super) fn begin_loop(&mut self, at: Time) {
         if self.mode != Mode::Normal || !self.loops_back() || self.looped.is_some() {
             return;
@@ -25,7 +26,7 @@ impl BxCan {
         }
     }
 
-    /// The frame has come back.
+    /// The end of a frame in loop-back.
     pub(super) fn end_loop(&mut self, looped: &Loop) {
         self.transmitter.sent();
         self.status.sent();

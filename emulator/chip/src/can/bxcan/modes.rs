@@ -1,4 +1,4 @@
-//! Operating modes: initialisation, normal, sleep, and the way through bus-off (RM0390, bxCAN operating modes).
+//! Operating modes: initialisation, normal, sleep, and the recovery from bus-off (RM0390, bxCAN operating modes).
 
 use canbus::{Monitor, Time};
 
@@ -16,15 +16,15 @@ pub(super) enum Mode {
 }
 
 impl BxCan {
-    /// Whether it takes part in the traffic of the bus.
+    /// Whether the controller takes part in the traffic of the bus.
     pub(in crate::can) fn is_on_bus(&self) -> bool {
         self.mode == Mode::Normal && !self.loops_back() && self.clock > 0 && !self.status.is_bus_off()
     }
 
-    /// Since when it has been on the bus, or when it will be if the wire stays as it is.
+    /// The instant since which the controller is on the bus, or at which it will join the bus if no frame begins.
     pub(in crate::can) fn joins_at(&self) -> Option<Time> {
         let on_way = self.monitor.is_waiting() && !self.loops_back() && self.clock > 0;
-        // The wait to leave initialisation while bus-off is followed by another one.
+        // In bus-off, the wait that ends initialisation is followed by the wait for the recovery.
         let last = self.mode == Mode::Normal || !self.status.is_bus_off();
         (self.is_on_bus() || on_way && last).then(|| self.monitor.ready(self.bit()))
     }
@@ -50,7 +50,7 @@ impl BxCan {
         self.follow_requests(now);
     }
 
-    /// MCR.RESET: sleep mode, with the mailboxes empty. Bit timing, interrupt enables and filters stay.
+    /// MCR.RESET: sleep mode with empty mailboxes. Bit timing, interrupt enables and filters stay.
     fn master_reset(&mut self) {
         let enable = self.status.enable;
         self.status = Status::default();
@@ -63,7 +63,7 @@ impl BxCan {
         self.fifos = Default::default();
     }
 
-    /// Moves towards the mode that INRQ and SLEEP ask for (RM0390, bxCAN operating modes).
+    /// Moves towards the mode that INRQ and SLEEP request (RM0390, bxCAN operating modes).
     pub(super) fn follow_requests(&mut self, now: Time) {
         match (self.is_set(INRQ), self.is_set(SLEEP)) {
             // To leave sleep mode for initialisation, software has to clear SLEEP as well.
@@ -92,24 +92,24 @@ impl BxCan {
         self.mode = mode;
     }
 
-    /// In bus-off with ABOM the recovery begins by itself.
+    /// Begins the recovery from bus-off without software, if ABOM is set.
     pub(in crate::can) fn recover(&mut self, now: Time) {
         if self.status.is_bus_off() && self.is_set(ABOM) && !self.monitor.is_waiting() {
             self.monitor.wait(Monitor::BUS_OFF_SEQUENCES, now);
         }
     }
 
-    /// The wait for recessive bits is over: on the bus, or out of bus-off.
+    /// The wait for recessive bits is over: the controller joins the bus or leaves bus-off.
     pub(super) fn synchronised(&mut self, now: Time) {
         if self.mode == Mode::Normal {
             return self.status.recovered();
         }
         self.mode = Mode::Normal;
         self.status.awake();
-        // Software has set and cleared INRQ: that too begins the recovery.
+        // Software has set and cleared INRQ, which also begins the recovery.
         if self.status.is_bus_off() {
             self.monitor.wait(Monitor::BUS_OFF_SEQUENCES, now);
-            // Only now is it known when a frame that waits can begin.
+            // The earliest start of a waiting frame is known only now.
             self.poke = true;
         }
         self.begin_loop(now);
@@ -135,7 +135,7 @@ impl BxCan {
         }
     }
 
-    /// The wire is recessive until the next frame: a request to leave the bus can be followed now.
+    /// The wire is recessive until the next frame: the controller can now follow a request to leave the bus.
     pub(in crate::can) fn hear_idle(&mut self, since: Time) {
         self.monitor.idle(since);
         if self.is_set(INRQ) || self.is_set(SLEEP) {
