@@ -1,4 +1,4 @@
-//! The encoder: two channels and what is common to them.
+//! The encoder: two channels and their common state.
 
 use super::channel::{Channel, Pending};
 use super::supervision::{Conditions, Supervision, supported_warnings};
@@ -6,16 +6,16 @@ use super::{ChannelParameters, ChannelValues, Kept, KeptChannel, Limits, Paramet
 use crate::board::{Inputs, PositionInputs, PowerOn, RETAINED_WORDS, RawEncoder};
 use crate::profile::Chain;
 
-/// What the encoder gives for one sample.
+/// Output of the encoder for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Snapshot {
-    /// Sub-indexes 1 and 2 of the objects with channels; the first is also that of the objects without.
+    /// Values of channels 1 and 2 (sub-indexes 1 and 2). Objects without channels show channel 1.
     pub channels: [ChannelValues; 2],
     /// Operating status (6500h).
     pub operating_status: u16,
     /// Resolution of the first sensor (6501h).
     pub resolution: u32,
-    /// Revolutions that the first sensor tells apart (6502h).
+    /// Revolutions that the first sensor distinguishes (6502h).
     pub revolutions: u16,
     /// Alarms (6503h).
     pub alarms: u16,
@@ -25,22 +25,22 @@ pub struct Snapshot {
     pub supported_warnings: u16,
     /// Operating time (6508h) in 0.1 h.
     pub operating_time: u32,
-    /// What is reported as an emergency.
+    /// The faults to be reported as emergencies.
     pub conditions: Conditions,
 }
 
-/// The whole chain with its state.
+/// The whole measuring chain with its state.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     channels: [Option<Channel>; 2],
-    /// The operating time, and what the channels have not taken back yet.
+    /// The operating time, and the retained positions that no channel has taken over yet.
     kept: Kept,
-    /// Nobody has said yet which sensors there are.
+    /// No parameters have been applied yet, so the sensors are not known.
     is_new: bool,
     supervision: Supervision,
     limits: Limits,
     acknowledge: Pending,
-    /// What depends on parameters alone.
+    /// The part of the snapshot that depends on parameters alone.
     fixed: Snapshot,
 }
 
@@ -51,8 +51,8 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// An encoder after power-on. It gives no position until parameters are applied: the first ones say which sensor it
-    /// was that left its position.
+    /// An encoder after power-on. There is no position until parameters are applied: the first parameters tell whether
+    /// the retained positions belong to these sensors.
     #[must_use]
     pub fn new(start: Start) -> Encoder {
         Encoder {
@@ -66,7 +66,7 @@ impl Encoder {
         }
     }
 
-    /// Processes what was read in one millisecond.
+    /// Processes the readings of one millisecond.
     pub fn sample(&mut self, raw: &RawEncoder) -> Snapshot {
         let mut snapshot = Snapshot::default();
         self.measure(raw, &mut snapshot);
@@ -93,7 +93,7 @@ impl Encoder {
         snapshot.operating_time = time.tenths();
     }
 
-    /// The stored form of what is to outlive a loss of power, in its place.
+    /// Writes the retained state to `words`, in its stored form.
     pub(crate) fn retain_in(&self, words: &mut [u32; RETAINED_WORDS]) {
         let (places, rest) = words.as_chunks_mut::<{ KeptChannel::WORDS }>();
         for ((place, channel), before) in places.iter_mut().zip(&self.channels).zip(&self.kept.channels) {
@@ -105,7 +105,7 @@ impl Encoder {
         rest.iter_mut().zip(self.kept.operating_time.to_words()).for_each(|(to, from)| *to = from);
     }
 
-    /// What is to outlive a loss of power: see [`Kept`].
+    /// The state to be retained through a loss of power: see [`Kept`].
     #[must_use]
     #[inline(never)]
     pub fn kept(&self) -> Kept {
@@ -128,7 +128,8 @@ impl Chain for Encoder {
     }
 
     fn apply(&mut self, parameters: &Parameters) {
-        // What was kept and stored is for the first parameters: a channel that is switched off and on again starts afresh.
+        // Retained positions are for the first parameters only: a channel that is switched off and on again starts
+        // afresh.
         let kept = core::mem::take(&mut self.kept.channels);
         let is_new = core::mem::take(&mut self.is_new);
         for ((channel, own), kept) in self.channels.iter_mut().zip(&parameters.channels).zip(&kept) {

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::board::RawEncoder;
 
-/// What a channel gives for one sample.
+/// Output of a channel for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChannelValues {
     /// Position value (6004h, 6020h).
@@ -24,18 +24,18 @@ pub struct ChannelValues {
     pub area: u8,
     /// Offset value (6509h, 650Ch).
     pub offset: i32,
-    /// What is known about the sensor: bits `SENSOR_..`.
+    /// State of the sensor: bits `SENSOR_..`.
     pub sensor_state: u8,
-    /// How far the commissioning diagnostic is.
+    /// Progress of the commissioning diagnostic.
     pub commissioning: Progress,
-    /// [`Command::count`] of the last preset that this position knows of.
+    /// [`Command::count`] of the last preset that this position includes.
     pub presets: u8,
-    /// Where the readings of the sensor would be as a position: [`position`](ChannelValues::position), but for readings that
-    /// are not believed.
+    /// The position that the readings of the sensor would give: equal to [`position`](ChannelValues::position) unless
+    /// the readings are rejected as implausible.
     pub reading: u32,
 }
 
-/// The commands that were carried out, and the one that waits.
+/// The counter of the commands that were taken, and the command that waits.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pending {
     count: u8,
@@ -61,7 +61,7 @@ impl Pending {
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     input: Input,
-    /// Of the sensor, for what is kept of it.
+    /// Resolution of the sensor, saved with the retained position.
     resolution: u32,
     position: Position,
     speedometer: Speedometer,
@@ -75,7 +75,8 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    /// A channel that has not measured yet, with what it kept. The offset belongs to the scale of the parameters.
+    /// A channel that has not measured yet, with its retained position. `offset` belongs to the scale of the
+    /// parameters.
     #[inline(never)]
     pub(super) fn new(
         all: &Parameters,
@@ -104,12 +105,12 @@ impl Channel {
         channel
     }
 
-    /// Whether it is one of this sensor: another sensor needs another channel.
+    /// Whether the channel belongs to this sensor: another sensor needs another channel.
     pub(super) fn is_of(&self, sensor: &Sensor) -> bool {
         sensor.is_like(self.input.sensor())
     }
 
-    /// Takes over parameters, from the next sample on.
+    /// Takes over parameters; they act from the next sample on.
     #[inline(never)]
     pub(super) fn apply(&mut self, all: &Parameters, own: &ChannelParameters, sensor: Sensor) {
         let scale = all.scale(&sensor);
@@ -166,13 +167,13 @@ impl Channel {
         }
     }
 
-    /// Where the readings would be as a position.
+    /// The position that the readings would give, were they accepted.
     fn reading(&self, position: u32) -> u32 {
         let there = self.input.doubtful();
         there.map_or(position, |there| self.position.scale().value(there.shaft(), self.position.offset()))
     }
 
-    /// What outlives a loss of power with a battery.
+    /// The state to be retained in the memory with the battery.
     pub(super) fn kept(&self) -> KeptChannel {
         let kind = self.input.sensor().kind;
         let (trust, needs_memory) = (Trust::from_bits(self.input.trust()), self.input.needs_memory());
@@ -184,7 +185,7 @@ impl Channel {
         }
     }
 
-    /// The same in its stored form, in its place.
+    /// Writes the same state to `words`, in its stored form.
     #[inline]
     pub(super) fn retain(&self, words: &mut [u32; KeptChannel::WORDS]) {
         match self.input.tracker() {

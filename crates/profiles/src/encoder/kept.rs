@@ -1,8 +1,9 @@
-//! What outlives a loss of power with a battery, and what a start without one knows.
+//! State of the encoder that is retained through a loss of power.
 //!
-//! The firmware copies [`Kept`] to the backup SRAM after every sample, for that does not wear. To the parameter store goes
-//! what must outlive a battery: the offset, which is a parameter (650Ch) and is stored with every preset, and
-//! [`Lasting`], now and then. So a start without a battery knows that there was a position, and that it is lost.
+//! The firmware copies [`Kept`] to the backup SRAM after every sample, because the backup SRAM does not wear. Data that
+//! must survive an empty battery goes to the parameter store: the offset, which is a parameter (650Ch) and is stored
+//! with every preset, and now and then [`Lasting`]. A start with an empty battery therefore knows that there was a
+//! position and that it is lost.
 
 use super::SensorType;
 use super::input::{Found, Left};
@@ -11,10 +12,10 @@ use crate::board::{LASTING_WORDS, RETAINED_WORDS, Retained};
 
 /// Milliseconds in a tenth of an hour.
 const TENTH: u32 = 360_000;
-/// 6508h saturates here: one more would mean that there is no operating time.
+/// Last value of 6508h: one more (FFFF FFFFh) would mean that the operating time is not available.
 const LAST: u32 = u32::MAX - 1;
 
-/// The time for which the encoder has worked: object 6508h.
+/// The operating time of the encoder: object 6508h.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OperatingTime {
     tenths: u32,
@@ -33,7 +34,7 @@ impl OperatingTime {
         self.tenths
     }
 
-    /// A millisecond later.
+    /// Counts a millisecond.
     pub(super) fn tick(&mut self) {
         self.millis = self.millis.saturating_add(1);
         if self.millis >= TENTH {
@@ -42,16 +43,16 @@ impl OperatingTime {
     }
 }
 
-/// What one channel keeps. It is taken back by a channel whose sensor is still the same.
+/// Retained state of one channel. Only a channel with the same sensor takes it over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KeptChannel {
     /// Code of the sensor's type, 0 for a channel that has no position.
     kind: u8,
-    /// Steps per turn of a shaft, nm of a rod.
+    /// Steps per turn of a shaft, nm per step of a linear encoder.
     resolution: u32,
     total: i64,
     trust: Trust,
-    /// The sensor alone does not tell where it is, though its type does.
+    /// The code may have wrapped, so the reading alone does not tell the position, though the sensor is absolute.
     needs_memory: bool,
 }
 
@@ -62,13 +63,14 @@ impl KeptChannel {
         KeptChannel { kind: kind.code(), resolution, total, trust, needs_memory }
     }
 
-    /// A channel that has no position yet, and one that has lost it.
+    /// A channel that has no position yet or, with `lost`, one that has lost its position.
     pub(super) fn unread((lost, needs_memory): (bool, bool)) -> KeptChannel {
         let trust = Trust { lost, ..Trust::default() };
         KeptChannel { trust, needs_memory, ..KeptChannel::default() }
     }
 
-    /// What is known of the sensor: nothing of one that does not go on from where it was left, or of another one.
+    /// The retained knowledge of this sensor: none for another sensor, or for a type that does not continue from its
+    /// last position.
     pub(super) fn found(&self, kind: SensorType, resolution: u32) -> Found {
         let Trust { lost, .. } = self.trust;
         if self.kind == 0 {
@@ -83,31 +85,31 @@ impl KeptChannel {
     }
 }
 
-/// What is to be kept.
+/// Retained state of the encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kept {
-    /// Of each channel.
+    /// State of each channel.
     pub channels: [KeptChannel; 2],
     /// Operating time (6508h).
     pub operating_time: OperatingTime,
 }
 
-/// What the memory had when the power came back.
+/// Content of the memories when the power came back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// Nothing yet: the first start.
+    /// Both memories are empty: the first start.
     #[default]
     First,
-    /// This.
+    /// The backup SRAM has kept this state.
     Kept(Kept),
-    /// Nothing any more. The parameter store has this.
+    /// The backup SRAM is empty; the parameter store has this.
     Lost(Lasting),
-    /// Something that is no longer right. The parameter store has this.
+    /// The backup SRAM is damaged; the parameter store has this.
     Damaged(Lasting),
 }
 
 impl Start {
-    /// By what the board has found: in the memory that a battery keeps, and in the parameter store.
+    /// The start that follows from the content of the backup SRAM and of the parameter store.
     #[must_use]
     pub fn of(retained: Retained, stored: Option<[u32; LASTING_WORDS]>) -> Start {
         match (retained, stored.map(Lasting::from_words)) {
@@ -120,7 +122,7 @@ impl Start {
         }
     }
 
-    /// What a start goes on from.
+    /// The retained state with which a start begins.
     #[must_use]
     pub fn kept(&self) -> Kept {
         match *self {
@@ -131,8 +133,8 @@ impl Start {
     }
 }
 
-/// What the parameter store holds, in its own record: that there has been a start, the operating time, and which sensors
-/// need a memory though their type does not.
+/// Record of the encoder in the parameter store: its presence says that there was a start before. It holds the
+/// operating time, and which absolute sensors need retained memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lasting {
     /// Operating time in 0.1 h.
@@ -140,16 +142,16 @@ pub struct Lasting {
     needs_memory: [bool; 2],
 }
 
-/// Tenths of an hour between two times that are stored, at least.
+/// Shortest time between two stores, in tenths of an hour.
 const INTERVAL: u32 = 10;
-/// Of the time since the start, the part that may be lost with the power: one in so many.
+/// In a long run the interval is the run divided by this number, so a loss of power costs at most this part of the run.
 const PART: u32 = 8;
 
 impl Lasting {
     /// Nothing is known, and everything may have been lost.
     const UNKNOWN: Lasting = Lasting { tenths: 0, needs_memory: [true; 2] };
 
-    /// Of the words that a profile retains.
+    /// Takes the record from the retained words.
     #[must_use]
     pub fn of(retained: &[u32; RETAINED_WORDS]) -> Lasting {
         let Kept { channels: [first, second], operating_time } = Kept::from_words(retained);
@@ -163,14 +165,15 @@ impl Lasting {
         [self.tenths, u32::from(first) | u32::from(second) << 1]
     }
 
-    /// From the stored form; any words are something.
+    /// From the stored form. Every content is valid.
     #[must_use]
     pub fn from_words([tenths, flags]: [u32; LASTING_WORDS]) -> Lasting {
         Lasting { tenths: tenths.min(LAST), needs_memory: [flags & 1 != 0, flags & 2 != 0] }
     }
 
-    /// Whether it is worth a write to the parameter store that has `stored`, in a run that began with `start`: at once when
-    /// a sensor needs its memory now, else once an hour, and less and less often in a long run.
+    /// Whether the record should be stored now, when the parameter store holds `stored` and the run began with `start`.
+    /// It is stored at once when a sensor starts or ceases to need retained memory, else once an hour, and more rarely
+    /// in a long run.
     #[must_use]
     pub fn is_due(self, stored: Lasting, start: Lasting) -> bool {
         let run = self.tenths.saturating_sub(start.tenths);
@@ -184,15 +187,15 @@ impl Lasting {
     }
 }
 
-/// Words of a channel.
+/// Words per channel.
 const CHANNEL: usize = 4;
 const _: () = assert!(Kept::WORDS == 2 * CHANNEL + 2);
 
 impl Kept {
-    /// Words of its stored form.
+    /// Words of the stored form.
     pub const WORDS: usize = RETAINED_WORDS;
 
-    /// The form to be stored. It has no check of its own: whoever stores it adds one.
+    /// The stored form. It has no checksum: the caller adds one.
     #[must_use]
     #[inline(never)]
     pub fn to_words(&self) -> [u32; Kept::WORDS] {
@@ -201,7 +204,7 @@ impl Kept {
         [a0, a1, a2, a3, b0, b1, b2, b3, tenths, millis]
     }
 
-    /// From the stored form. Any words are something; a channel that fits no sensor is not used.
+    /// From the stored form. Every content is valid: a channel that fits no sensor is not used.
     #[must_use]
     pub fn from_words(words: &[u32; Kept::WORDS]) -> Kept {
         let ([first, second], &[tenths, millis]) = words.as_chunks() else { return Kept::default() };
@@ -209,7 +212,7 @@ impl Kept {
         Kept { channels, operating_time: OperatingTime { tenths, millis } }
     }
 
-    /// The later of both operating times: the memory may be that of another life.
+    /// Takes the later of the two operating times: the retained memory may be older than the parameter store.
     fn with(mut self, stored: Lasting) -> Kept {
         if stored.tenths > self.operating_time.tenths {
             self.operating_time = OperatingTime { tenths: stored.tenths, millis: 0 };

@@ -4,12 +4,12 @@ use super::{Scale, Shaft};
 
 /// A scale, the offset, and the position at which the present turn starts.
 ///
-/// The start of the next turn follows from that of this one by an addition, so that a sample needs no division.
+/// The start of the next turn is the start of this one plus the units in a turn, so a sample needs no division.
 #[derive(Clone, Copy, Debug)]
 pub struct Position {
     scale: Scale,
     offset: i32,
-    /// The scale of the last preset, and its offset.
+    /// The scale and the offset of the last preset.
     home: (Scale, i32),
     /// Units in a turn, modulo the range.
     per_turn: u32,
@@ -18,7 +18,7 @@ pub struct Position {
 }
 
 impl Position {
-    /// A position with an offset of which [`Scale::offset_for`] once said that it belongs to this scale.
+    /// A position with an offset that [`Scale::offset_for`] has given for this scale.
     #[must_use]
     pub fn new(scale: Scale, offset: i32) -> Position {
         Position {
@@ -56,7 +56,7 @@ impl Position {
         self.scale.add(self.start, self.scale.within(step))
     }
 
-    /// Makes the value `preset` where the shaft is; a value outside of the range changes nothing.
+    /// Makes the value `preset` at the present place of the shaft. A value outside of the range changes nothing.
     #[inline(never)]
     pub fn preset(&mut self, preset: u32, shaft: Shaft) {
         if let Some(offset) = self.scale.offset_for(preset, shaft) {
@@ -64,8 +64,8 @@ impl Position {
         }
     }
 
-    /// Takes another scale. The same units counted the other way leave the value as it is. In other units the offset has
-    /// lost its meaning and is 0, until the units are again those of the last preset. CiA 406 is silent about all of it.
+    /// Takes another scale. A change of direction alone keeps the value. In other units the offset has lost its
+    /// meaning: it is 0 until the units of the last preset come back. CiA 406 is silent about both.
     #[inline(never)]
     pub fn rescale(&mut self, scale: Scale, shaft: Shaft) {
         if scale == self.scale {
@@ -96,7 +96,7 @@ mod tests {
     }
 
     proptest! {
-        /// With additions it is what it is with divisions.
+        /// Additions give the same value as divisions.
         #[test]
         fn agrees_with_the_scale(
             scale in any_scale(), offset: i32, start in -(1_i64 << 50)..1 << 50, walk in any_walk(),

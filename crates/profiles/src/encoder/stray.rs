@@ -1,29 +1,30 @@
-//! Readings of an absolute encoder that lie where the shaft cannot be.
+//! Implausible readings of an absolute encoder: positions that the shaft cannot have reached.
 //!
-//! A reading further from the last good one than the sensor can move is not taken over. How long the new place lasts says
-//! nothing: a code that has jumped stays where it is. So what counts is where the shaft would be now, which follows from
-//! how the readings go on moving. The readings are believed again when they are back there. Where the first odd reading
-//! was no jump but the movement gone too fast, nothing leads back but a reference.
+//! A reading further from the last good one than the sensor can move is rejected. The time for which the new position
+//! lasts proves nothing, because a code that has jumped stays where it is. The expected position is therefore followed
+//! instead: it moves by the same steps as the rejected readings. Readings are accepted again when they are back at the
+//! expected position. If the cause was too fast a movement and not a jump, only a preset or reference ends the
+//! rejection.
 
-/// Readings that are not believed.
+/// State while readings are rejected.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stray {
-    /// Bits of a reading that the code does not have.
+    /// Number of bits of a reading that the code does not use.
     unused: u32,
     /// The last reading.
     word: u32,
-    /// What the sensor would read where the shaft should be.
+    /// The reading expected at the position that the shaft should have.
     expected: u32,
     /// The last movement that was possible.
     step: i32,
     /// The readings have jumped away and may jump back.
     has_jumped: bool,
-    /// How many there were.
+    /// Number of rejected readings.
     readings: u32,
 }
 
 impl Stray {
-    /// The reading `word` came after the good one `last`, when the sensor moved `step` in a millisecond.
+    /// Starts with the reading `word` after the good one `last`, when the sensor moved `step` in a millisecond.
     pub(super) fn new(bits: u32, last: u32, step: i32, word: u32, fastest: u32) -> Stray {
         let unused = 32 - bits.clamp(1, 32);
         let expected = last.wrapping_add_signed(step);
@@ -36,17 +37,17 @@ impl Stray {
         self.word
     }
 
-    /// How many there were.
+    /// Number of rejected readings.
     pub(super) fn readings(&self) -> u32 {
         self.readings
     }
 
-    /// A millisecond without a reading.
+    /// Counts a millisecond without a reading.
     pub(super) fn skip(&mut self) {
         self.expected = self.expected.wrapping_add_signed(self.step);
     }
 
-    /// Takes a reading; whether it can be believed again.
+    /// Takes a reading. Returns whether readings can be accepted again.
     pub(super) fn is_back(&mut self, word: u32, fastest: u32) -> bool {
         let moved = between(self.word, word, self.unused);
         if moved.unsigned_abs() <= fastest {
