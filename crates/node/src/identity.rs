@@ -1,4 +1,4 @@
-//! The identity of the device as the parameter store has it, and whether the record could be read.
+//! The identity of the device in the parameter store, and whether the record could be read.
 
 use embedded_storage::nor_flash::ReadNorFlash;
 use storage::{DeviceRecord, Group, Health, View};
@@ -6,12 +6,12 @@ use storage::{DeviceRecord, Group, Health, View};
 use crate::Fault;
 use crate::fault::{BOOT_DATA, OLDER_BOOT_DATA};
 
-/// The device record as the node starts with it.
+/// The device record at the start of the node.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
-    /// Node-ID, bit rate and personality; `None` where nothing is stored or nothing can be read.
+    /// Node-ID, bit rate and personality; `None` if nothing is stored or nothing can be read.
     pub record: Option<DeviceRecord>,
-    /// The fault to be told once the node has booted up (EMCY 6301h); `None` where the record is what was stored last.
+    /// The fault to be reported after the boot-up message (EMCY 6301h); `None` if the last stored record was read.
     pub fault: Option<&'static Fault>,
 }
 

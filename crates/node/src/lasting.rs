@@ -1,5 +1,6 @@
-//! What the parameter store holds that nobody asks for: what a start without a battery has to know of the positions. It lies
-//! behind the device record, in the same value: facts of the device, which no 1011h touches.
+//! Record about the retained state, which no object shows: the data about positions that a start with an empty battery
+//! needs. It is stored behind the device record, in the same value. Both are facts of the device, which 1011h does not
+//! affect.
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use profiles::board::{LASTING_WORDS, RETAINED_WORDS};
@@ -8,7 +9,7 @@ use storage::{Change, DeviceRecord, Error, Group, Loaded, Store, View};
 
 /// The bytes of a device record.
 type Device = [u8; DeviceRecord::LEN];
-/// The bytes of a value of the group: the device record, and what lies behind it.
+/// The bytes of a stored value: the device record, and the record about the retained state.
 type Value = [u8; DeviceRecord::ROOM];
 
 /// Bytes behind the device record.
@@ -16,23 +17,23 @@ const TAIL: usize = 4 * LASTING_WORDS;
 const WHOLE: usize = DeviceRecord::LEN + TAIL;
 const _: () = assert!(WHOLE <= DeviceRecord::ROOM);
 
-/// Keeps it up to date.
+/// Keeps the stored record up to date.
 #[derive(Debug)]
 pub struct LastingRecord {
-    /// As it is stored, or could not be.
+    /// The record as stored, or as it was when storing it last failed.
     stored: Option<Lasting>,
-    /// As this run has found it.
+    /// The record at the start of this run.
     start: Option<Lasting>,
 }
 
 impl LastingRecord {
-    /// Goes on from what [`read`](LastingRecord::read) has found.
+    /// Continues from the result of [`read`](LastingRecord::read).
     #[must_use]
     pub fn new(found: Option<[u32; LASTING_WORDS]>) -> LastingRecord {
         LastingRecord { stored: found.map(Lasting::from_words), start: None }
     }
 
-    /// The stored value; `None` where nothing is stored, or nothing that can be read.
+    /// The stored record; `None` if nothing is stored, or nothing that can be read.
     pub fn read<F: ReadNorFlash>(view: &mut View<F>) -> Option<[u32; LASTING_WORDS]> {
         let mut value: Value = [0; DeviceRecord::ROOM];
         let loaded = view.load(Group::Device, &mut value);
@@ -41,8 +42,8 @@ impl LastingRecord {
         Some(words.map(u32::from_le_bytes))
     }
 
-    /// Stores what has changed in the words that a profile retains, when it is worth a write: see [`Lasting::is_due`].
-    /// `device` is the device record as it is stored or would be. Whether it has written.
+    /// Stores changes of the words that a profile retains when they are due: see [`Lasting::is_due`]. `device` is the
+    /// device record, as stored or as it would be stored. Returns whether the store was written.
     ///
     /// # Errors
     /// Errors of [`Store::save`]. The next due time tries again.
@@ -67,7 +68,7 @@ impl LastingRecord {
     }
 }
 
-/// Replaces the device record, and leaves what lies behind it.
+/// Replaces the device record, and keeps the bytes behind it.
 pub(crate) fn replace_device<F: NorFlash>(
     device: Device,
     store: &mut Store<F>,
@@ -100,7 +101,7 @@ mod tests {
     /// Node 5 at 250 kbit/s.
     const DEVICE: Device = [5, 1, 250, 0];
 
-    /// The words of a profile that has worked for so many tenths of an hour.
+    /// The retained words of a profile with this operating time in tenths of an hour.
     fn retained(tenths: u32) -> [u32; RETAINED_WORDS] {
         let mut words = [0; RETAINED_WORDS];
         words[RETAINED_WORDS - 2] = tenths;

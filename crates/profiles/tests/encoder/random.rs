@@ -1,4 +1,4 @@
-//! Anything at all: nothing overflows (tests run with overflow checks), and values stay in their ranges.
+//! Random inputs: nothing overflows (tests run with overflow checks), and values stay in their ranges.
 
 use profiles::board::{Board, RawEncoder, SsiFrame};
 use profiles::profile::Chain;
@@ -120,7 +120,7 @@ proptest! {
         }
     }
 
-    /// Whatever was kept, a start with it and with the same parameters keeps the same.
+    /// A start with any retained state and the same parameters retains the same state again.
     #[test]
     fn keeping_loses_nothing(parameters in any_parameters(), samples in prop::collection::vec(any_raw(), 0..20)) {
         let mut encoder = Encoder::default();
