@@ -1,22 +1,23 @@
-//! What a start tells of the battery behind the backup SRAM. The voltage of the battery is not measured.
+//! State of the backup SRAM's battery, as found at a start. The voltage of the battery is not measured.
 
 use crate::kept::Found;
 use crate::reset_cause::ResetCause;
 
-/// State of the battery as a start can tell it.
+/// State of the battery at a start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Battery {
-    /// The main supply never went: nothing can be said.
+    /// The main supply was never off, so the battery is not tested.
     #[default]
     Unknown,
-    /// The main supply was gone, and the memory has outlived that.
+    /// The main supply was off, and the battery has kept the memory.
     Holds,
-    /// The main supply was gone, and the memory with it: there is no battery, or it is empty, or the board is new.
+    /// The main supply was off, and the memory was lost: there is no battery, the battery is empty, or the board is
+    /// new.
     Lost,
 }
 
 impl Battery {
-    /// From the cause of the reset and what the memory had.
+    /// The state that follows from the cause of the reset and the content of the memory.
     #[must_use]
     pub fn after(cause: ResetCause, found: &Found) -> Battery {
         match found {
