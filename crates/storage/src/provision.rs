@@ -1,4 +1,4 @@
-//! Writing the device record of a new board, for the factory and for `cargo sim`.
+//! Writes the device record of a new board, for the factory and for `cargo sim`.
 
 use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
 
@@ -10,7 +10,7 @@ use crate::page::Pages;
 use crate::store::Store;
 use crate::view::View;
 
-/// Erases both pages, whatever they hold, and stores a device record.
+/// Erases both pages, whatever their content, and stores a device record.
 ///
 /// # Errors
 /// Errors of [`View::open`], [`Store::prepare`] and [`Store::save`].
@@ -27,7 +27,7 @@ pub fn provision<F: NorFlash>(
     store.save(&[Change::Set { group: Group::Device, version: DeviceRecord::VERSION, value }])
 }
 
-/// Reads one group from a dump of the flash. To read several, or their health, use a [`View`] of a [`Memory`].
+/// Reads one group from a dump of the flash. For several groups or their health use a [`View`] of a [`Memory`].
 ///
 /// # Errors
 /// Errors of [`View::open`] and [`View::load`].

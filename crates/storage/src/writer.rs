@@ -1,4 +1,4 @@
-//! Programming one transaction, word after word.
+//! Programs one transaction, word after word.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -47,7 +47,7 @@ impl From<Content> for Record<'_> {
 /// The records of a transaction; groups without one stay as they are.
 pub(crate) type Records<'a> = PerGroup<Option<Record<'a>>>;
 
-/// Bytes that a transaction takes up. Values are at most [`crate::MAX_VALUE`] long.
+/// Size of a transaction in bytes. Values have at most [`crate::MAX_VALUE`] bytes.
 pub(crate) fn size(records: &Records<'_>, format: Format) -> u32 {
     format.head() + records_size(records, format) + format.tail()
 }
@@ -57,16 +57,16 @@ fn records_size(records: &Records<'_>, format: Format) -> u32 {
     records.map(|record| format.record_head() + format.body(record.len())).sum()
 }
 
-/// Where the next unit goes.
+/// Programs units at consecutive places.
 pub(crate) struct Writer<'f, F> {
     flash: &'f mut F,
     page: Page,
     at: u32,
-    /// Check of the transaction.
+    /// Checksum of the transaction.
     check: Check,
-    /// Check of the record under way.
+    /// Checksum of the present record.
     record_check: Check,
-    /// The words of a unit that is not full yet, and zeros.
+    /// The words of an incomplete unit, followed by zeros.
     unit: [u8; LARGEST_UNIT as usize],
     filled: u32,
 }
@@ -77,8 +77,8 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Writer { flash, page, at, check, record_check, unit: [0; LARGEST_UNIT as usize], filled: 0 }
     }
 
-    /// Programs a transaction. It counts from the commit word on; the closing mark after it says that the commit word
-    /// is whole. The caller has made sure that it fits.
+    /// Programs a transaction. The transaction counts from the commit word on; the closing mark after the commit word
+    /// proves that the commit word is complete. The caller has checked that the transaction fits.
     pub(crate) fn transaction(
         &mut self,
         generation: u16,
@@ -124,7 +124,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.fill()
     }
 
-    /// The value and zeros up to a whole word.
+    /// Writes the value, and zeros up to a whole word.
     fn value(&mut self, value: &[u8]) -> Result<(), Error<F::Error>> {
         for chunk in value.chunks(WORD as usize) {
             let mut word = [0; WORD as usize];
@@ -134,7 +134,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// A value that is in flash already: no buffer is needed to move it.
+    /// Copies a value that is already in flash, so a move needs no buffer.
     fn copy(&mut self, slot: &Slot) -> Result<(), Error<F::Error>> {
         let end = slot.data + in_words(slot.len);
         for at in (slot.data..end).step_by(WORD as usize) {
@@ -144,7 +144,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// Zeros up to the end of the unit. The commit word vouches for them too.
+    /// Writes zeros up to the end of the unit. The commit word covers them too.
     fn fill(&mut self) -> Result<(), Error<F::Error>> {
         while self.filled > 0 {
             self.word(0)?;
@@ -152,14 +152,14 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// A word that the check of the record and the commit word vouch for.
+    /// Writes a word that is covered by the check of the record and by the commit word.
     fn word(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         self.check.add(word);
         self.record_check.add(word);
         self.put(word)
     }
 
-    /// A word in a unit of its own.
+    /// Writes a word in a unit of its own.
     pub(crate) fn program(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         self.put(word)?;
         while self.filled > 0 {
@@ -168,7 +168,8 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 
-    /// Puts a word into the unit. One unit a call to the driver: between two calls the core runs whatever is due.
+    /// Puts a word into the unit. One unit per call of the driver: between two calls the core runs other tasks that are
+    /// due.
     fn put(&mut self, word: u32) -> Result<(), Error<F::Error>> {
         let place = self.unit.iter_mut().skip(self.filled as usize);
         place.zip(word.to_le_bytes()).for_each(|(to, byte)| *to = byte);

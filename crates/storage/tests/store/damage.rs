@@ -1,6 +1,6 @@
-//! Flash content that no power cut explains: flipped bits, overwritten stretches, half erased and foreign pages.
-//! Whatever is read of a group must have been saved once, and must not claim to be newer than it is. Only the group whose
-//! record is damaged is affected.
+//! Flash content that no power cut explains: flipped bits, overwritten ranges, half erased and foreign pages. Every
+//! value read must have been saved once, and must not claim to be newer than it is. Only the group with the damaged
+//! record is affected.
 
 use std::cell::RefCell;
 
@@ -32,7 +32,7 @@ impl Device {
         Device { flash, saves }
     }
 
-    /// All saves in one page, the other one is clean.
+    /// All saves are in one page, and the other page is clean.
     fn on_one_page() -> Device {
         use Group::{Application, Calibration, Communication, Device as Identity};
         Device::new(vec![
@@ -49,7 +49,8 @@ impl Device {
         ])
     }
 
-    /// The same and so much more that the last saves are in the other page, with the old one not erased yet.
+    /// The same device with so many more saves that the last ones are in the other page; the old page is not erased
+    /// yet.
     fn just_moved() -> Device {
         let Device { mut saves, .. } = Device::on_one_page();
         saves.extend((10..17).map(|version| vec![set(Group::Application, version, 34)]));
@@ -62,14 +63,14 @@ impl Device {
         replay(&mut self.saves.iter())
     }
 
-    /// Damages a copy and checks what is read from it.
+    /// Damages a copy and checks the values read from it.
     fn check(&self, honest: bool, damage: impl FnOnce(&mut Flash)) -> [Health; 4] {
         let mut flash = self.flash.clone();
         damage(&mut flash);
         self.check_read(&mut flash, honest).1
     }
 
-    /// The same, and that a start mends it.
+    /// The same, with a check that a start repairs the store.
     fn check_and_mend(&self, honest: bool, damage: impl FnOnce(&mut Flash)) {
         let mut flash = self.flash.clone();
         damage(&mut flash);
@@ -125,7 +126,7 @@ fn a_flipped_bit_in_the_newest_save_falls_back_to_the_one_before() {
     assert_eq!((model, health), (before, [Health::Good, Health::Good, Health::FellBack, Health::Good]));
 }
 
-/// Where the value of a save of one group is in the page, by its bytes.
+/// The place of a group's saved value in the page, found by its bytes.
 fn place(flash: &Flash, (_, value): &(Group, crate::model::Value)) -> usize {
     let (_, value) = value.as_ref().unwrap();
     let bytes = flash.bytes();
@@ -133,13 +134,13 @@ fn place(flash: &Flash, (_, value): &(Group, crate::model::Value)) -> usize {
     found.next_back().expect("it is stored")
 }
 
-/// What is to be said of the groups when a record of one of them is damaged.
+/// The expected health of all groups when a record of one group is damaged.
 fn only(group: Group, health: Health) -> [Health; 4] {
     Group::ALL.map(|other| if other == group { health } else { Health::Good })
 }
 
-/// Every group and every kind of damage: the newest of several records, one that a newer one has replaced, and the only one.
-/// The other groups are saved together with it, before it and after it.
+/// Every group and every kind of damage: the newest of several records, an older record, and the only record. The other
+/// groups are saved together with the group, before it and after it.
 #[test]
 fn only_the_group_whose_record_is_damaged_is_affected() {
     for group in Group::ALL {
@@ -176,11 +177,12 @@ fn only_the_group_whose_record_is_damaged_is_affected() {
     }
 }
 
-/// A bit of what holds the records together (marks, heads and commit words of the transactions) is nobody's: nothing is lost.
+/// A damaged bit outside of the records (in marks, heads and commit words of the transactions) belongs to no group:
+/// nothing is lost.
 #[test]
 fn a_flipped_bit_between_the_records_costs_nothing() {
     let device = Device::on_one_page();
-    // The first transaction: clean, left, begin and contents before the records.
+    // The part before the records of the first transaction: clean, left, begin and contents.
     let before_the_records = 0..16;
     let end = device.flash.bytes()[..512].iter().rposition(|&byte| byte != 0xFF).unwrap();
     for byte in before_the_records.chain(end - 7..=end) {
@@ -209,7 +211,7 @@ fn an_overwritten_stretch_is_noticed_or_harmless() {
                 1 => 0x00,
                 _ => 0xFF,
             };
-            // Cells that return to the erased value look like a save that was cut: older, but still whole.
+            // Cells that return to the erased value look like a save that was cut: the values are older but whole.
             device.check_and_mend(seed % 3 != 2, |flash| {
                 (at..1024.min(at + len))
                     .enumerate()
@@ -260,8 +262,8 @@ fn a_copy_of_a_transaction_inside_a_value_is_never_taken_for_one() {
     let copy = vec![(Group::Application, Some((3, page[8..100].to_vec())))];
     let device = Device::new(vec![first, vec![set(Group::Device, 2, 4)], copy]);
     let before = replay(&mut device.saves[..2].iter());
-    // The copying save begins behind one that names every group and one of a single record. With its contents and the head of
-    // its record damaged the search for the next one enters the value.
+    // The save with the copy follows one that names every group and one with a single record. With its contents and the
+    // head of its record damaged, the search for the next record enters the value.
     let copying = 8 + (8 + 16 + 3 * 12 + 8) + (8 + 16 + 8);
     for at in copying + 4..copying + 8 {
         let mut flash = device.flash.clone();
@@ -280,7 +282,7 @@ fn a_length_that_leads_out_of_the_page_is_damage() {
     let room = (512 - 8 - 5 * 4) / 4;
     for words in (room + 1..room + 10).chain([1000, u16::MAX]) {
         let mut flash = device.flash.clone();
-        // The contents of the first transaction, beside their complement.
+        // The contents of the first transaction, with their complement.
         let head = [words.to_le_bytes(), (!words).to_le_bytes()].concat();
         (512 + 12..).zip(head).for_each(|(at, to)| flash.disturb(at, |_| to));
         assert_eq!(read(&mut flash, PAGES).0, device.newest());
@@ -309,7 +311,7 @@ fn the_closing_mark_of_a_move_is_not_needed_once_the_old_page_says_that_it_was_l
     assert_eq!(health, [Health::Good; 4]);
 }
 
-/// A flash that the test can reach while a store has it.
+/// A flash that the test can access while a store uses it.
 struct Shared<'a>(&'a RefCell<Flash>);
 
 impl ErrorType for Shared<'_> {
@@ -350,7 +352,7 @@ fn a_value_that_decays_while_the_store_runs_is_neither_read_nor_moved() {
     assert_eq!(store.load(Group::Communication, &mut [0; 300]), Err(Error::Corrupt));
     assert_eq!(store.load(Group::Device, &mut [0; 4]), Ok(Some(Loaded { version: 1, len: 4 })));
     let before = flash.borrow().programmed();
-    // Does not fit the page any more, so it would take the decayed groups along.
+    // The save does not fit the page any more, so it would move the decayed groups too.
     let moving = store.save(&as_changes(&vec![set(Group::Application, 3, 124)]));
     assert_eq!(moving, Err(Error::Corrupt));
     assert_eq!(flash.borrow().programmed(), before);

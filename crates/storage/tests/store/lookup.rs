@@ -1,4 +1,4 @@
-//! The device record as a bootloader finds it, beside what the store says.
+//! The device record found by the bootloader's search, compared with the store.
 
 use crate::model::{as_changes, noise, set, start};
 use storage::mock::{MockFlash, Weak};
@@ -26,7 +26,7 @@ fn there_is_none_where_none_was_saved() {
     assert_eq!(device_record(&mut flash, Pages::new(0, 4096)), None, "pages beyond the flash");
 }
 
-/// Through many moves from page to page.
+/// The record is found through many moves from page to page.
 #[test]
 fn it_is_the_one_that_was_saved_last() {
     let mut flash = Flash::new(1024, 0);
@@ -39,7 +39,7 @@ fn it_is_the_one_that_was_saved_last() {
     }
 }
 
-/// Whatever the store says after a cut, the bootloader says the same once the store has started.
+/// After a cut, the bootloader finds the same record as the store, once the store has started.
 #[test]
 fn after_a_cut_it_is_the_old_or_the_new_one_and_what_the_store_says_later() {
     let mut cuts = 0;
@@ -66,7 +66,7 @@ fn after_a_cut_it_is_the_old_or_the_new_one_and_what_the_store_says_later() {
     assert!(cuts > 500);
 }
 
-/// A bit that flips costs the newest record at most; what is found was saved once.
+/// A flipped bit costs the newest record at most; every record found was saved once.
 #[test]
 fn a_bit_that_flips_makes_no_record_that_was_never_saved() {
     let mut flash = Flash::new(1024, 0);

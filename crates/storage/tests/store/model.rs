@@ -1,4 +1,4 @@
-//! The plain model that the store is compared with, and what runs both.
+//! The plain model of the store, and functions that run both.
 
 use storage::mock::{MockFlash, PowerCut};
 use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};
@@ -6,16 +6,16 @@ use storage::{Change, Error, Group, Health, MAX_VALUE, Pages, Store, View};
 /// A version and a value, or nothing.
 pub(crate) type Value = Option<(u16, Vec<u8>)>;
 
-/// What should be stored, in the order of [`Group::ALL`].
+/// The values that should be stored, in the order of [`Group::ALL`].
 pub(crate) type Model = [Value; 4];
 
-/// What a save changes.
+/// The changes of a save.
 pub(crate) type Changes = Vec<(Group, Value)>;
 
 /// Nothing stored.
 pub(crate) const EMPTY: Model = [None, None, None, None];
 
-/// One thing that a device does.
+/// One action of a device.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// One save.
@@ -62,7 +62,7 @@ fn as_change((group, value): &(Group, Value)) -> Change<'_> {
     }
 }
 
-/// What the flash holds, and how far it is to be trusted.
+/// The stored values, and their health.
 pub(crate) fn read<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
@@ -76,7 +76,7 @@ pub(crate) fn read<const ERASE: usize, const WORD: usize>(
     (value, Group::ALL.map(|group| view.health(group)))
 }
 
-/// What the flash holds when nothing may be doubtful.
+/// The stored values, in a flash in which nothing may be doubtful.
 pub(crate) fn read_good<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
@@ -86,8 +86,8 @@ pub(crate) fn read_good<const ERASE: usize, const WORD: usize>(
     model
 }
 
-/// Opens and prepares the store and takes the steps. Returns the states that the flash may be in then: one, or two
-/// when the power was cut in a save.
+/// Opens and prepares the store and takes the steps. Returns the states that the flash may then be in: one, or two if
+/// the power was cut during a save.
 pub(crate) fn run<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
@@ -115,7 +115,7 @@ pub(crate) fn run<const ERASE: usize, const WORD: usize>(
     vec![model]
 }
 
-/// Start-up, unless the power is cut.
+/// Starts the store, unless the power is cut.
 pub(crate) fn start<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,
@@ -127,7 +127,8 @@ pub(crate) fn start<const ERASE: usize, const WORD: usize>(
     }
 }
 
-/// Power comes back: one of the `allowed` states is read, `prepare` keeps it, and it is read ever after.
+/// Restores the power: one of the `allowed` states must be read, `prepare` must keep it, and all later reads must
+/// return it.
 pub(crate) fn recover<const ERASE: usize, const WORD: usize>(
     flash: &mut MockFlash<ERASE, WORD>,
     pages: Pages,

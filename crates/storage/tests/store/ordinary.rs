@@ -1,4 +1,4 @@
-//! The store without accidents, and with a flash that does not do what it is told.
+//! The store in normal use, and with a flash that fails.
 
 use crate::model::{EMPTY, after, as_changes, noise, read_good, restore, set, start};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
@@ -128,7 +128,7 @@ fn a_flash_that_programs_other_words_than_the_pages_say_is_refused() {
 
 #[test]
 fn the_generation_of_the_pages_may_wrap() {
-    // Pages so small that every save moves.
+    // Pages so small that every save causes a move.
     let pages = Pages::new(0, 80);
     let mut flash = MockFlash::<80, 4>::new(160, 0);
     for count in 0..=66_000_u32 {
@@ -143,7 +143,7 @@ fn the_generation_of_the_pages_may_wrap() {
     assert!(flash.erases()[0] > 32_768);
 }
 
-/// A flash in which one word keeps a bit that should be programmed, as a worn-out cell does.
+/// A flash with one word in which a bit cannot be programmed, as in a worn-out cell.
 struct Worn {
     flash: Memory<Vec<u8>>,
     at: u32,
@@ -180,7 +180,7 @@ impl NorFlash for Worn {
     }
 }
 
-/// Stores with one such word each. The clean mark is all that `prepare` needs.
+/// Stores with one such word each. `prepare` needs the clean mark only.
 fn worn_stores() -> impl Iterator<Item = Store<Worn>> {
     (0..1024).step_by(4).filter_map(|at| {
         let worn = Worn { flash: Memory(vec![0xFF; 1024]), at };

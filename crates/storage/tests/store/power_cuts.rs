@@ -1,5 +1,5 @@
-//! The power is cut at every single operation of a long scenario, and again at every operation of the recovery; on a flash
-//! that programs words of four bytes, as the STM32F4 does, and on one that programs words of eight, as the STM32G4 and L4 do.
+//! Power cuts at every single operation of a long scenario, and again at every operation of the recovery; on a flash
+//! that programs words of four bytes (STM32F4), and on one that programs words of eight (STM32G4, L4).
 
 use crate::model::{
     EMPTY, Model, Step, after, as_changes, noise, read_good, recover, restore, run, set, start,
@@ -7,7 +7,7 @@ use crate::model::{
 use storage::mock::{MockFlash, Weak};
 use storage::{Group, Pages};
 
-/// Small pages make page moves frequent; two erase units a page make erases that are cut between units.
+/// Small pages make page moves frequent. With two erase units per page, an erase can be cut between the units.
 const fn pages(word: usize) -> Pages {
     Pages::new(256, 256).with_words(word as u32)
 }
@@ -57,7 +57,7 @@ fn without_a_cut_the_scenario_moves_pages_and_agrees_with_the_model<const WORD: 
     assert!(flash.erases()[2..6].iter().all(|&erases| erases >= 2), "{:?}", flash.erases());
 }
 
-/// Every state of flash that a cut in the scenario can leave, with the states that may be read from it.
+/// Every state of the flash that a cut in the scenario can leave, with the states that may be read.
 fn cut_everywhere<const WORD: usize>(mut check: impl FnMut(Flash<WORD>, Vec<Model>)) -> u32 {
     let total = operations_of(|flash| drop(run(flash, pages(WORD), &scenario(), EMPTY)), &flash::<WORD>(0));
     for operation in 0..total {

@@ -1,4 +1,4 @@
-//! Random lives of a device against the model; proptest shrinks what fails. The seed is fixed.
+//! Random histories of a device, compared with the model; proptest shrinks failures. The seed is fixed.
 
 use crate::model::{Changes, EMPTY, Step, noise, recover, run};
 use proptest::collection::vec;
@@ -11,7 +11,7 @@ const fn pages(word: usize) -> Pages {
     Pages::new(512, 512).with_words(word as u32)
 }
 
-/// What a device does until the power is cut, when, and how the weak bits read then.
+/// The steps of a device until the power cut, the operation of the cut, and how weak bits read afterwards.
 type Life = (Vec<Step>, u32, Weak);
 
 fn changes() -> impl Strategy<Value = Changes> {
