@@ -1,8 +1,8 @@
-//! Field update of the application over CAN (CiA 302-3), safe against a power cut at any moment and against images that
-//! are damaged, for another device, too old, or not signed. docs/update.md has the format of an image, the states, and
-//! what a cut at each point does.
+//! Field update of the application over CAN (CiA 302-3), safe against a power cut at any moment, and against images
+//! that are damaged, for another device, too old, or not signed. docs/update.md describes the format of an image, the
+//! states, and the effect of a cut at each point.
 //!
-//! The bootloader asks [`boot`] at every start, and gives an [`Updater`] the commands of the master and a [`Flash`]:
+//! The bootloader calls [`boot`] at every start, and gives an [`Updater`] the commands of the master and a [`Flash`]:
 //!
 //! ```
 //! use update::{Decision, Flash, Header, Next, Start, Status, Stay, Target, Updater, boot};
