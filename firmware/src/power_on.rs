@@ -1,4 +1,4 @@
-//! The position through a loss of power: back from the memory that a battery keeps.
+//! The position after a loss of power, restored from the battery-backed memory.
 
 use core::mem::MaybeUninit;
 
@@ -10,7 +10,8 @@ use profiles::board::{LASTING_WORDS, PowerOn, Retained};
 
 use crate::configuration;
 
-/// Makes the measurement in its place. Not inlined: the stack on which the value is made is free again after it.
+/// Makes the measurement in its place. Not inlined, so that the stack on which the value is made is free again
+/// afterwards.
 #[inline(never)]
 pub(crate) fn make(
     place: &'static mut MaybeUninit<Measurement>,
@@ -22,7 +23,7 @@ pub(crate) fn make(
     place.write(Measurement::new(personality, &power_on(cause, found, stored)))
 }
 
-/// Whether the battery has failed; what the start tells of the battery is in the log as well.
+/// Whether the battery has failed; the state of the battery is also logged.
 fn battery_failed(cause: ResetCause, found: &Found) -> bool {
     let battery = Battery::after(cause, found);
     match battery {
@@ -35,10 +36,10 @@ fn battery_failed(cause: ResetCause, found: &Found) -> bool {
     battery == Battery::Lost
 }
 
-/// What the board knows when the power comes.
+/// State of the board at power-on.
 ///
-/// Memory without a trace of a copy is that of a new board, and after a loss of power that of one without a battery, or with
-/// an empty one. The parameter store tells the two apart: a new board has no record of the positions.
+/// An empty backup SRAM means a new board or, after a loss of power, a board with no battery or an empty one. The
+/// parameter store distinguishes the two: a new board has no record of the positions.
 fn power_on(cause: ResetCause, found: &Found, stored: Option<[u32; LASTING_WORDS]>) -> PowerOn {
     let retained = match found {
         Found::Nothing => Retained::Nothing,
