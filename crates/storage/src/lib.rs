@@ -70,14 +70,17 @@
 //!
 //! | word | meaning |
 //! |---|---|
-//! | clean | `PRM2`, programmed when the erase of the page has run to its end; without it the erase may have been cut |
+//! | clean | `PRM2`, programmed when the erase of the page is complete; without it the erase may have been cut |
 //! | left | 0 once the store has moved on to the other page |
-//! | begin | 0, not looked at. Programming zeros over a half programmed word is sound, so if a cut leaves no trace of this first word, the next save may start at it again |
-//! | generation | the same in all records of a page, counts the uses of pages: the page with the later one is in use. It wraps after 65,536; as the two are never far apart, the order is that of their difference |
+//! | begin | 0, ignored. If a cut leaves this word reading as erased, the next save may program its zeros again |
+//! | generation | equal in all records of a page; counts the uses of pages, so the page with the later one is in use |
 //! | contents | number of words of records in 12 bits, and the groups of the records in 4 |
 //! | check | CRC-32 over the offset of the record in the page and the words of the record before the check |
-//! | commit | CRC-32 (ISO HDLC) over the offset of the transaction in the page and all its words but begin; all ones are stored as 0. From this word on the transaction counts |
-//! | closed | 0: the commit word is whole, not just lucky to read well after a cut |
+//! | commit | CRC-32 (ISO HDLC) over the offset of the transaction and all its words but begin; all ones are stored as 0 |
+//! | closed | 0: the commit word is complete, and does not read well after a cut only by chance |
+//!
+//! A transaction counts from its commit word on. The generation wraps after 65,536; the two pages are never far apart, so
+//! the sign of their difference gives the order.
 //!
 //! A number with its complement cannot become another number in a power cut, because a half-programmed word lacks zeros
 //! in either half.

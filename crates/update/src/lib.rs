@@ -31,9 +31,9 @@
 //! |---|---|---|
 //! | 1F51h = 3 | [`Updater::clear`], then [`Updater::poll`] | busy, then 0 |
 //! | download to 1F50h begins | [`Updater::begin`] | 0, or 4 without a clear before |
-//! | its bytes | [`Updater::receive`] | 0, or why the header is refused |
-//! | it ends | [`Updater::finish`], then [`Updater::poll`] | busy while it is checked, then 0 or why it is refused |
-//! | 1F51h = 1, or at once | [`Updater::install`], then [`Updater::poll`], then [`boot`] | busy while it is copied, then 0 |
+//! | bytes of the download | [`Updater::receive`] | 0, or the refusal of the header |
+//! | end of the download | [`Updater::finish`], then [`Updater::poll`] | busy during the check, then 0 or the refusal |
+//! | 1F51h = 1, or at once | [`Updater::install`], [`Updater::poll`], then [`boot`] | busy during the copy, then 0 |
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]

@@ -1,10 +1,13 @@
 //! The record in the last bytes of staging, and a record of the same form in the last bytes of the kept image.
 //!
-//! | place | in staging: whether the image there is to be copied | beside the kept image: whether it may have to come back |
+//! | place | in staging | in the area of the kept image |
 //! |---|---|---|
-//! | eight bytes | magic, programmed when the staged image has passed every check | the same when the copy of the application is whole |
-//! | a word | 0: the magic is whole, not just lucky to read well after a cut. From this word on the image is to be copied | 0: the same; from this word on there is a way back |
-//! | a word | 0: it was copied, and need not be again while the application is whole | 0: the way back is not needed any more |
+//! | eight bytes | magic: the staged image has passed every check | magic: the copy of the application is complete |
+//! | a word | 0: the magic is complete, and the image is pending to be copied | 0: the magic is complete |
+//! | a word | 0: the image was copied | 0: the kept image is no longer needed |
+//!
+//! The second place proves that the magic does not read well after a cut only by chance. From this word on the staged
+//! image must be copied, and the kept image can be restored.
 //!
 //! A word is the unit of programming, 4 or 8 bytes. The two words that decide are zeros, because zeros may be
 //! programmed once more over a word that a cut left half programmed, and are then final. To revoke a record, zeros are

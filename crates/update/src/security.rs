@@ -1,10 +1,10 @@
 //! The least security counter and the revoked keys, which no image may undo. They have an area of their own, which is
 //! programmed and never erased: a bit that is 0 stays 0, so the counter only rises and a key stays revoked.
 //!
-//! | mark | it is set |
+//! | mark | meaning if set |
 //! |---|---|
-//! | 0 to 7 | key number so much is revoked |
-//! | 7 + n | an image with the security counter n has run: no image with a lower one runs again |
+//! | 0 to 7 | the key with this number is revoked |
+//! | 7 + n | an image with the security counter n has run, so no image with a lower counter may run |
 //!
 //! A mark is set if either of its two words is 0; the second word is half the area behind the first. The counter is the
 //! place of the highest mark, so a step of any size needs one mark only. A word that a power cut left half programmed

@@ -5,10 +5,13 @@
 //! kept image is *pending*; confirming means to program *done* there. The marks of the trial are in front of the commit
 //! record of staging, and an update erases them together with staging:
 //!
-//! | mark | it is set |
+//! | mark | set |
 //! |---|---|
-//! | 0 to 2 | at each start that nobody asked for: after a crash, the watchdog, or power-on |
-//! | 3 | the trial is withdrawn: nobody has confirmed the image in time, or a master wants the one before. Also when the way back begins: marks that a cut left half programmed decide nothing any more |
+//! | 0 to 2 | at each unrequested start: after a crash, the watchdog, or power-on |
+//! | 3 | when the trial is withdrawn: no confirmation in time, or the command of a master |
+//!
+//! Mark 3 is also set before the previous image is restored, so that marks which a cut left half programmed no longer
+//! matter.
 //!
 //! The trial is lost with mark 3, or with all of the marks 0 to 2. A mark is a word of zeros, like those of the record.
 //! The trial concerns one image only: an application that a debugger has written since is not on trial.

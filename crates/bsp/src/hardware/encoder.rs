@@ -1,9 +1,9 @@
 //! The incremental encoder: TIM4 counts every edge of A and B, and DMA1 copies the count at two events of TIM3.
 //!
-//! | event of TIM3 | stream | what the copy is |
+//! | event of TIM3 | stream | copied count |
 //! |---|---|---|
-//! | update, which starts a scan of the ADC | 2 | the count at the start of each scan, in step with the buffer of the ADC |
-//! | capture on channel 2, the index at PB5 | 5 | the count at the last index |
+//! | update, which starts a scan of the ADC | 2 | at the start of each scan, in step with the buffer of the ADC |
+//! | capture on channel 2, the index at PB5 | 5 | at the last index |
 //!
 //! Hardware alone decides at which instant the count is taken, as for the ADC, and no interrupt is needed.
 //!

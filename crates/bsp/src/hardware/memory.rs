@@ -67,8 +67,8 @@ pub fn parameter_pages() -> &'static [u8; 2 * PARAMETER_PAGE as usize] {
     unsafe { &*(parameters().start as *const _) }
 }
 
-/// The flash that an update may program: the security counter and the revoked keys, the application with its header, staging, and the
-/// kept image.
+/// The flash that an update may program: the security counter and the revoked keys, the application with its header,
+/// staging, and the kept image.
 pub(super) fn updatable() -> Range<u32> {
     // SAFETY: only the addresses are used.
     unsafe { region(&_updatable_start, &_updatable_end) }

@@ -45,8 +45,8 @@ struct SamplingTime {
     cycles: u32,
 }
 
-/// 28 cycles suit a source below 15 kohm, 480 give the internal sensors the 10 us they need (STM32F446 datasheet, 6.3.22 to
-/// 6.3.24).
+/// 28 cycles are enough for a source below 15 kohm; 480 cycles give the internal sensors the necessary 10 us (STM32F446
+/// datasheet, 6.3.22 to 6.3.24).
 const EXTERNAL: SamplingTime = SamplingTime { code: 2, cycles: 28 };
 const INTERNAL: SamplingTime = SamplingTime { code: 7, cycles: 480 };
 /// Cycles of the successive approximation, 12 bits.

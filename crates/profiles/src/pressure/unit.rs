@@ -1,4 +1,5 @@
-//! Physical units of the process value, object 6131h (CiA 303-2 codes, and the codes A0h.. that CiA leaves to profiles).
+//! Physical units of the process value, object 6131h (codes of CiA 303-2, and codes from A0h on, which CiA leaves to
+//! profiles).
 
 use super::precise::Precise;
 
