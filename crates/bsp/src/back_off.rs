@@ -10,8 +10,8 @@ const FIRST: Duration = Duration::from_millis(50);
 const LONGEST: Duration = Duration::from_millis(3_200);
 /// Time on the bus without a bus-off after which the waiting time starts again at `FIRST`.
 const GOOD: Duration = Duration::from_millis(10_000);
-/// Time for the recovery of the controller, which takes 141 ms at 10 kbit/s. A node that is still off the bus afterwards
-/// has failed again.
+/// Time for the recovery of the controller, which takes 141 ms at 10 kbit/s. A node that is still off the bus
+/// afterwards has failed again.
 const WAY_BACK: Duration = Duration::from_millis(200);
 
 /// The waiting times of a node.

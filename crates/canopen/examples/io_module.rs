@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! io_module --eds FILE            writes its data sheet
-//! io_module HOST:PORT BUS NODE    runs on a bus of a socketcand server, such as `cargo sim -- --socketcand 127.0.0.1:29536`
+//! io_module HOST:PORT BUS NODE    runs on a bus of a socketcand server, such as
+//!                                 `cargo sim -- --socketcand 127.0.0.1:29536`
 //! ```
 //!
 //! The process is simulated on standard input and output: `inputs 5` and `analogue 1200` set the connected signals, and

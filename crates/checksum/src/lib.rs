@@ -1,5 +1,5 @@
-//! CRC-32 (ISO HDLC, as in Ethernet and zip), four bits at a time. The crate `crc` either needs a table of 1 KiB, for which
-//! an image has no room, or works without a table, and the CRC of an application then takes 0.1 s at every start.
+//! CRC-32 (ISO HDLC, as in Ethernet and zip), four bits at a time. The crate `crc` either needs a table of 1 KiB, for
+//! which an image has no room, or works without a table, and the CRC of an application then takes 0.1 s at every start.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,5 +1,5 @@
-//! Identity of the product, object 1018h, for firmware, bootloader, data sheets and signed images. Change this file to build
-//! a product of your own.
+//! Identity of the product, object 1018h, for firmware, bootloader, data sheets and signed images. Change this file to
+//! build a product of your own.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(clippy::pedantic)]
@@ -16,6 +16,6 @@ pub const fn code(personality: u8) -> u32 {
     personality as u32 + 1
 }
 
-/// Product code in the bootloader and in the header of an image. An image has all personalities, so this code identifies
-/// the board; it is that of the first personality.
+/// Product code in the bootloader and in the header of an image. An image has all personalities, so this code
+/// identifies the board; it is that of the first personality.
 pub const BOARD: u32 = code(0);

@@ -146,7 +146,7 @@ macro_rules! personalities {
 
         /// All parameters of the measurement, as one consistent set.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        #[allow(clippy::large_enum_variant)] // There is one of them.
+        #[allow(clippy::large_enum_variant)] // A node has a single value of this type.
         pub enum Parameters {
             $(#[doc = concat!($description, ".")]
             $Name($crate::profile::Parameters<$module::Objects>),)+
@@ -167,7 +167,7 @@ macro_rules! personalities {
 
         /// All measured values of one millisecond, as one consistent set.
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
-        #[allow(clippy::large_enum_variant)] // There is one of them.
+        #[allow(clippy::large_enum_variant)] // A node has a single value of this type.
         pub enum Snapshot {
             /// Nothing has been measured yet.
             #[default]
@@ -191,7 +191,7 @@ macro_rules! personalities {
 
         /// The chain of a personality.
         #[derive(Clone, Debug)]
-        #[allow(clippy::large_enum_variant)] // There is one of them.
+        #[allow(clippy::large_enum_variant)] // A node has a single value of this type.
         enum AnyChain {
             $($Name(<$module::Objects as $crate::profile::Profile>::Chain),)+
         }

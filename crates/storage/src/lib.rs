@@ -76,11 +76,11 @@
 //! | generation | equal in all records of a page; counts the uses of pages, so the page with the later one is in use |
 //! | contents | number of words of records in 12 bits, and the groups of the records in 4 |
 //! | check | CRC-32 over the offset of the record in the page and the words of the record before the check |
-//! | commit | CRC-32 (ISO HDLC) over the offset of the transaction and all its words but begin; all ones are stored as 0 |
+//! | commit | CRC-32 (ISO HDLC) over the transaction's offset and all its words but begin; all ones are stored as 0 |
 //! | closed | 0: the commit word is complete, and does not read well after a cut only by chance |
 //!
-//! A transaction counts from its commit word on. The generation wraps after 65,536; the two pages are never far apart, so
-//! the sign of their difference gives the order.
+//! A transaction counts from its commit word on. The generation wraps after 65,536; the two pages are never far apart,
+//! so the sign of their difference gives the order.
 //!
 //! A number with its complement cannot become another number in a power cut, because a half-programmed word lacks zeros
 //! in either half.

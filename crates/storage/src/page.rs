@@ -94,7 +94,7 @@ impl StoredRecord {
 }
 
 impl Page {
-    #[inline(never)] // Many places, little room.
+    #[inline(never)] // Many callers, and little room in flash.
     pub(crate) fn word<F: ReadNorFlash>(self, flash: &mut F, at: u32) -> Result<u32, F::Error> {
         let mut bytes = [0; WORD as usize];
         flash.read(self.start + at, &mut bytes)?;

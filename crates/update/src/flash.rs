@@ -81,7 +81,7 @@ pub(crate) fn read_step<F: Flash>(
 }
 
 /// Whether all bytes have this value.
-#[inline(never)] // Many places, little room.
+#[inline(never)] // Many callers, and little room in flash.
 pub(crate) fn all_are(bytes: &[u8], value: u8) -> bool {
     bytes.iter().all(|byte| *byte == value)
 }

@@ -146,8 +146,8 @@ impl<F: Flash> Updater<F> {
     /// Begins a download to 1F50h. `size` in bytes, if the client has announced it.
     ///
     /// # Errors
-    /// [`Refusal::NotCleared`] without an [`Updater::clear`] before, [`Refusal::TooLong`], [`Refusal::Unspecified`] while
-    /// busy.
+    /// [`Refusal::NotCleared`] without an [`Updater::clear`] before, [`Refusal::TooLong`], [`Refusal::Unspecified`]
+    /// while busy.
     pub fn begin(&mut self, size: Option<u32>) -> Result<(), Refusal> {
         self.not_busy()?;
         if !matches!(self.state, State::Cleared) {

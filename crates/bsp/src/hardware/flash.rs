@@ -149,8 +149,8 @@ impl Flash {
         Err(Error::Busy)
     }
 
-    /// Empties the data cache, which may hold words from before the operation (RM0390, 3.4.2). The cache must be off for
-    /// this.
+    /// Empties the data cache, which may hold words from before the operation (RM0390, 3.4.2). The cache must be off
+    /// for this.
     pub(super) fn forget_cached(&mut self) {
         let was_on = self.0.acr().read().dcen().bit_is_set();
         self.0.acr().modify(|_, w| w.dcen().clear_bit());

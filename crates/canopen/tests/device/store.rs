@@ -194,11 +194,11 @@ fn values_that_no_longer_fit_are_refused_as_a_whole_and_reported() {
         &[0x17, 0x10, 1, 1, 2, 0, 0],             // no such sub-index
         &[0x06, 0x10, 0, 1, 2, 0, 0],             // another size
         &[0x29, 0x10, 1, 1, 1, 255],              // above its limit
-        &[0x00, 0x61, 0, 1, 2, 0, 0],             // of another group
-        &[0x00, 0x1A, 1, 1, 4, 8, 0, 0xFF, 0x67], // a mapping of what is not there
+        &[0x00, 0x61, 0, 1, 2, 0, 0],             // object of another group
+        &[0x00, 0x1A, 1, 1, 4, 8, 0, 0xFF, 0x67], // a mapping of an object that does not exist
         &[0x17, 0x10, 0],                         // cut
         &[0x17, 0x10, 0, 2, 2, 0, 0],             // cut
-        &[0x17, 0x10, 0, 0, 2],                   // a run of nothing
+        &[0x17, 0x10, 0, 0, 2],                   // an empty run
         &[0x17, 0x10, 0, 5, 0],
     ];
     for misfit in misfits {

@@ -10,7 +10,7 @@ pub use objects::device_name;
 /// # Panics
 /// During compilation, for a code of more than 32 bits.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // What is cut off is looked at.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // The cut-off bits are checked.
 pub const fn device_type(code: i64) -> Object {
     assert!(code as u32 as i64 == code, "a device type has 32 bits");
     objects::device_type(code as u32)
@@ -38,7 +38,7 @@ pub const SERVICES: &[Object] = canopen::rows!(
 /// # Panics
 /// During compilation, for any other number.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // It is 0 to 2.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // The value is 0 to 2.
 pub const fn error_behaviour(device_error: i64) -> [Object; 3] {
     assert!(0 <= device_error && device_error <= 2, "1029h:2 takes 0 to 2");
     objects::error_behaviour(device_error as u8)

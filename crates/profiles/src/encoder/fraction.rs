@@ -28,7 +28,7 @@ impl Fraction {
     ///
     /// The approximation is less than 2^-32 too small and the value is below 2^32, so the unrounded estimate is less
     /// than 1 too small. Rounded down, the estimate is the result or the result minus 1; the remainder tells which.
-    #[allow(clippy::cast_possible_truncation)] // The part is at most `value`.
+    #[allow(clippy::cast_possible_truncation)] // The fractional part is at most `value`.
     pub(super) fn of(self, value: u32) -> u32 {
         let whole = value.wrapping_mul(self.whole);
         let value = u64::from(value);

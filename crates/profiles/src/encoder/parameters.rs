@@ -179,7 +179,7 @@ impl Parameters {
     /// Units of 6030h per native step and second: measuring units of a shaft, speed measuring steps of a linear
     /// encoder.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // 24 bits are more than the 15 of the result.
+    #[allow(clippy::cast_precision_loss)] // The result has 15 bits, less than 24.
     pub fn speed_factor(&self, sensor: &Sensor) -> f32 {
         if let Some(nanometres) = self.way(sensor) {
             // A step of 6005h:2 is 0.01 mm/s: 10 000 nm/s.

@@ -69,7 +69,7 @@ impl Speedometer {
     }
 
     /// Takes the movement up to now, once a millisecond; returns steps per second.
-    #[allow(clippy::cast_precision_loss)] // 24 bits are more than the 15 of the result.
+    #[allow(clippy::cast_precision_loss)] // The result has 15 bits, less than 24.
     pub fn update(&mut self, count: u32) -> f32 {
         self.now = self.now.wrapping_add(1);
         let silence = self.now.wrapping_sub(self.last.time);

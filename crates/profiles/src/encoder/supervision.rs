@@ -65,7 +65,7 @@ impl Default for Limits {
 
 /// Fault conditions for emergency messages (CiA 406, 5.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[allow(clippy::struct_excessive_bools)] // Each is a fault of its own.
+#[allow(clippy::struct_excessive_bools)] // Each field is a separate fault.
 pub struct Conditions {
     /// 2110h, input current too high.
     pub current: bool,

@@ -27,7 +27,7 @@ impl Devices {
     /// The types as listed in 6000h, in the order of the bits and followed by zeros, and their number. The type equals
     /// bits 16 to 31 of 1000h in a device with one virtual device only.
     #[must_use]
-    #[inline(never)] // This crate is compiled for speed, and a choice is in no hurry.
+    #[inline(never)] // This crate is compiled for speed, and the choice is not urgent.
     pub fn types(self) -> ([u16; Devices::KINDS], usize) {
         let (mut types, mut count) = ([0; Devices::KINDS], 0);
         for (bit, code) in [0x0600, 0x0A00, 0x0200, 0x0300].into_iter().enumerate() {

@@ -116,7 +116,7 @@ pub struct LoadUnit {
 impl LoadUnit {
     /// A unit that has not measured yet, in a chip with this temperature sensor.
     #[must_use]
-    #[inline(never)] // Called once, from several places.
+    #[inline(never)] // Several callers, of which one runs.
     pub fn new(chip: ChipThermometer, parameters: &Parameters) -> LoadUnit {
         let filter = Filter::new(parameters.filter_type, parameters.filter_constant);
         let recovery = Recovery::default();

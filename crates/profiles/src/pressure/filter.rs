@@ -1,7 +1,7 @@
 //! Filters on the field value, objects 61A0h and 61A1h.
 //!
-//! The state has twice the digits of single precision ([`Precise`]). With a constant of 255, single precision would drop
-//! increments below 255 units of the last place, and the output would stop short of its target.
+//! The state has twice the digits of single precision ([`Precise`]). With a constant of 255, single precision would
+//! drop increments below 255 units of the last place, and the output would stop short of its target.
 
 use super::precise::Precise;
 

@@ -87,7 +87,7 @@ pub struct Transmitter {
 impl Transmitter {
     /// A chain that has not measured yet, in a chip with this temperature sensor.
     #[must_use]
-    #[inline(never)] // Called once, from several places.
+    #[inline(never)] // Several callers, of which one runs.
     pub fn new(chip: ChipThermometer, parameters: &Parameters) -> Transmitter {
         Transmitter {
             chip,
