@@ -5,8 +5,10 @@ use core::mem::MaybeUninit;
 use bsp::reset_cause::ResetCause;
 use bsp::update_layout::LAYOUT;
 use bsp::{ParameterFlash, Sums, board, crash, factory, memory, retained};
-use node::{BitRate, Fault, Identity, LastingRecord, NodeId, Parameters, Personality, Protocol, Setup};
-use profiles::board::{ChipThermometer, LASTING_WORDS, RawSample};
+use node::{
+    BitRate, Fault, Identity, NodeId, Parameters, Personality, Protocol, Setup, StoredPositionRecord,
+};
+use profiles::board::{ChipThermometer, POSITION_RECORD_WORDS, RawSample};
 use storage::{DeviceRecord, Error, Pages, Store, View};
 use update::{Authorisation, Trial};
 
@@ -30,7 +32,7 @@ pub(crate) struct Loaded {
     /// The prepared store; `None` if nothing can be stored.
     pub(crate) store: Option<Store<ParameterFlash>>,
     /// The stored record about the retained state.
-    pub(crate) lasting: Option<[u32; LASTING_WORDS]>,
+    pub(crate) position_record: Option<[u32; POSITION_RECORD_WORDS]>,
 }
 
 /// Makes the protocol in its place, with its stored data. Without a working store, the node runs with its defaults.
@@ -43,7 +45,15 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
             let protocol = make(place, &setup);
             let parameters = protocol.load_defaults();
             let rate = Rate::Missing;
-            return Loaded { protocol, parameters, setup, rate, boot_data: None, store: None, lasting: None };
+            return Loaded {
+                protocol,
+                parameters,
+                setup,
+                rate,
+                boot_data: None,
+                store: None,
+                position_record: None,
+            };
         }
     };
     let Identity { record, fault } = Identity::read(&mut view);
@@ -51,12 +61,12 @@ pub(crate) fn load(flash: ParameterFlash, place: &'static mut MaybeUninit<Protoc
     let rate = record.map_or(Rate::Missing, |_| Rate::of(setup.bit_rate));
     let protocol = make(place, &setup);
     let parameters = protocol.load(&mut view);
-    let lasting = LastingRecord::read(&mut view);
+    let position_record = StoredPositionRecord::read(&mut view);
     let mut store = prepare(view);
     if let Some(store) = &mut store {
         protocol.set_trial(Trial::read(&mut store.flash().trial(), &LAYOUT));
     }
-    Loaded { protocol, parameters, setup, rate, boot_data: fault, store, lasting }
+    Loaded { protocol, parameters, setup, rate, boot_data: fault, store, position_record }
 }
 
 /// Not inlined, so that the stack on which the value is made is free again for reading the flash.

@@ -62,7 +62,7 @@ mod app {
         BackupMemory, Board, Buttons, Clock, FrontEnd, Reading, ReceiveQueue, Receiver, TimeInterrupt,
         Transmitter, Watchdog,
     };
-    use node::{LastingRecord, Measurement, Parameters, Protocol, StoreJob};
+    use node::{Measurement, Parameters, Protocol, StoreJob, StoredPositionRecord};
     use profiles::board::{Board as Surroundings, Inputs, RETAINED_WORDS};
 
     use crate::configuration::Loaded;
@@ -113,10 +113,10 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let lost: &'static Losses = cx.local.lost;
         let board = Board::start(cx.device, lost);
-        let Loaded { protocol, parameters, setup, rate, boot_data, store, lasting } =
+        let Loaded { protocol, parameters, setup, rate, boot_data, store, position_record } =
             configuration::load(board.parameters, cx.local.protocol);
         let job = cx.local.job.write(StoreJob::new(setup.personality));
-        let storage = StorageTask::new(store, job, LastingRecord::new(lasting));
+        let storage = StorageTask::new(store, job, StoredPositionRecord::new(position_record));
         let crashed = configuration::report_start(&setup, board.reset_cause);
         let start_up_faults = StartUpFaults { crashed, no_store: !storage.is_working(), boot_data };
         let watchdog_reset = board.reset_cause == ResetCause::IndependentWatchdog;
@@ -144,8 +144,8 @@ mod app {
                 cx.local.measurement_place,
                 setup.personality,
                 board.reset_cause,
-                &board.found,
-                lasting,
+                &board.backup_state,
+                position_record,
             ),
             transmitter: board.transmitter,
             time: board.time,

@@ -5,7 +5,7 @@ use bsp::Clock;
 use bsp::ParameterFlash;
 use bsp::update_layout::LAYOUT;
 use canopen::sdo::Abort;
-use node::{LastingRecord, StoreJob, Verdict};
+use node::{StoreJob, StoredPositionRecord, Verdict};
 use profiles::board::RETAINED_WORDS;
 use storage::Store;
 use update::Trial;
@@ -18,7 +18,7 @@ pub(crate) struct StorageTask {
     /// `None` if the flash could not be prepared, so that nothing can be stored.
     store: Option<Store<ParameterFlash>>,
     job: &'static mut StoreJob,
-    lasting: LastingRecord,
+    position_record: StoredPositionRecord,
 }
 
 /// The words retained by the last sample; `None` if the profile retains nothing.
@@ -28,9 +28,9 @@ impl StorageTask {
     pub(crate) fn new(
         store: Option<Store<ParameterFlash>>,
         job: &'static mut StoreJob,
-        lasting: LastingRecord,
+        position_record: StoredPositionRecord,
     ) -> StorageTask {
-        StorageTask { store, job, lasting }
+        StorageTask { store, job, position_record }
     }
 
     /// Whether the store works.
@@ -42,7 +42,7 @@ impl StorageTask {
     pub(crate) fn keep(&mut self, retained: &Retained, node: &mut impl Shared) {
         if let (Some(store), Some(words)) = (&mut self.store, retained) {
             let device = node.call(|protocol, _| protocol.device_record());
-            match self.lasting.keep(words, &device, store) {
+            match self.position_record.keep(words, &device, store) {
                 Ok(true) => defmt::info!("the record of the positions is stored"),
                 Ok(false) => {}
                 Err(_) => defmt::error!("the record of the positions is not stored"),

@@ -1,6 +1,6 @@
 //! State of the backup SRAM's battery, as found at a start. The voltage of the battery is not measured.
 
-use crate::kept::Found;
+use crate::backup_copies::BackupState;
 use crate::reset_cause::ResetCause;
 
 /// State of the battery at a start.
@@ -19,11 +19,11 @@ pub enum Battery {
 impl Battery {
     /// The state that follows from the cause of the reset and the content of the memory.
     #[must_use]
-    pub fn after(cause: ResetCause, found: &Found) -> Battery {
+    pub fn after(cause: ResetCause, found: &BackupState) -> Battery {
         match found {
             _ if !cause.is_power_loss() => Battery::Unknown,
-            Found::Kept(_) => Battery::Holds,
-            Found::Nothing | Found::Damaged => Battery::Lost,
+            BackupState::Intact(_) => Battery::Holds,
+            BackupState::Nothing | BackupState::Damaged => Battery::Lost,
         }
     }
 }
@@ -31,19 +31,19 @@ impl Battery {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kept::CAPACITY;
+    use crate::backup_copies::CAPACITY;
 
     #[test]
     fn only_a_loss_of_power_tells_something() {
-        let kept = Found::Kept([0; CAPACITY]);
+        let kept = BackupState::Intact([0; CAPACITY]);
         for cause in [ResetCause::PowerOn, ResetCause::BrownOut] {
             assert_eq!(Battery::after(cause, &kept), Battery::Holds);
-            assert_eq!(Battery::after(cause, &Found::Nothing), Battery::Lost);
-            assert_eq!(Battery::after(cause, &Found::Damaged), Battery::Lost);
+            assert_eq!(Battery::after(cause, &BackupState::Nothing), Battery::Lost);
+            assert_eq!(Battery::after(cause, &BackupState::Damaged), Battery::Lost);
         }
         for cause in [ResetCause::Software, ResetCause::IndependentWatchdog, ResetCause::Pin] {
             assert_eq!(Battery::after(cause, &kept), Battery::Unknown);
-            assert_eq!(Battery::after(cause, &Found::Nothing), Battery::Unknown);
+            assert_eq!(Battery::after(cause, &BackupState::Nothing), Battery::Unknown);
         }
     }
 }

@@ -9,6 +9,7 @@
 #![deny(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 pub mod back_off;
+pub mod backup_copies;
 pub mod battery;
 pub mod bit_rate_detection;
 pub mod bit_timing;
@@ -21,7 +22,6 @@ pub mod filters;
 pub mod flash_area;
 pub mod guest;
 pub mod handover;
-pub mod kept;
 pub mod losses;
 pub mod mailbox;
 pub mod oversampling;

@@ -62,10 +62,10 @@ impl PackedGroups {
 }
 
 /// The group of the parameter store that holds a group of the dictionary.
-pub(crate) const fn record_of(group: Group) -> storage::Group {
+pub(crate) const fn record_of(group: Group) -> storage::ParameterGroup {
     match group {
-        Group::Communication => storage::Group::Communication,
-        Group::Application => storage::Group::Application,
-        Group::Calibration => storage::Group::Calibration,
+        Group::Communication => storage::ParameterGroup::Communication,
+        Group::Application => storage::ParameterGroup::Application,
+        Group::Calibration => storage::ParameterGroup::Calibration,
     }
 }

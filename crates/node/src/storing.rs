@@ -26,8 +26,8 @@ impl Protocol {
         self.parameters()
     }
 
-    /// The device record, as stored or as it would be stored, which [`LastingRecord`](crate::LastingRecord) writes
-    /// together with its own record.
+    /// The device record, as stored or as it would be stored, which
+    /// [`StoredPositionRecord`](crate::StoredPositionRecord) writes together with its own record.
     #[must_use]
     pub fn device_record(&self) -> [u8; storage::DeviceRecord::LEN] {
         self.device.application().configured.encode()

@@ -8,7 +8,7 @@ pub const DIGITAL_OUTPUTS: usize = 2;
 /// Number of words that the battery retains through a loss of power.
 pub const RETAINED_WORDS: usize = 10;
 /// Number of words in the record that the parameter store holds about the retained words.
-pub const LASTING_WORDS: usize = 2;
+pub const POSITION_RECORD_WORDS: usize = 2;
 
 /// All readings of one millisecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,7 +134,7 @@ pub struct PowerOn {
     /// The state that the battery has kept while the main supply was off.
     pub retained: Retained,
     /// The record in the parameter store about the retained state; `None` on a board that has never been started.
-    pub stored: Option<[u32; LASTING_WORDS]>,
+    pub stored: Option<[u32; POSITION_RECORD_WORDS]>,
     /// The main supply was off, and the battery has not kept the memory: the battery is empty or missing, or the board
     /// is new. `false` also if the main supply was never off, because then the battery was not needed.
     pub battery_failed: bool,

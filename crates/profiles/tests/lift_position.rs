@@ -237,7 +237,7 @@ fn the_way_outlives_a_loss_of_power() {
     car.preset(10_000).unwrap();
     (0..8000).for_each(|_| _ = car.drive(FAST));
     let before = car.position();
-    car.units = PositionUnits::new(profiles::encoder::Start::Kept(car.units.kept()));
+    car.units = PositionUnits::new(profiles::encoder::Start::Retained(car.units.retained_state()));
     car.apply();
     assert_eq!(car.position(), before);
 }

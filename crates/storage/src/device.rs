@@ -1,4 +1,5 @@
-//! The value of [`Group::Device`](crate::Group::Device): the data that a node needs before it can go on the bus.
+//! The value of [`ParameterGroup::Device`](crate::ParameterGroup::Device): the data that a node needs before it can go
+//! on the bus.
 
 /// Node-ID, bit rate and personality. A value of this type is always valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 /// A set of parameters that is saved, restored and loaded as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
+pub enum ParameterGroup {
     /// Node-ID, bit rate and personality, set by LSS (CiA 305) and by the factory. See [`crate::DeviceRecord`].
     Device,
     /// Communication parameters, 1000h to 1FFFh (1010h sub-index 2).
@@ -13,22 +13,27 @@ pub enum Group {
     Calibration,
 }
 
-impl Group {
+impl ParameterGroup {
     /// Every group, in the order of the records in a transaction.
-    pub const ALL: [Group; 4] = [Group::Device, Group::Communication, Group::Application, Group::Calibration];
+    pub const ALL: [ParameterGroup; 4] = [
+        ParameterGroup::Device,
+        ParameterGroup::Communication,
+        ParameterGroup::Application,
+        ParameterGroup::Calibration,
+    ];
 
     /// The number of the group in flash. A number is never reused for another purpose.
     pub(crate) const fn id(self) -> u8 {
         match self {
-            Group::Device => 1,
-            Group::Communication => 2,
-            Group::Application => 3,
-            Group::Calibration => 4,
+            ParameterGroup::Device => 1,
+            ParameterGroup::Communication => 2,
+            ParameterGroup::Application => 3,
+            ParameterGroup::Calibration => 4,
         }
     }
 
-    pub(crate) fn from_id(id: u8) -> Option<Group> {
-        Group::ALL.into_iter().find(|group| group.id() == id)
+    pub(crate) fn from_id(id: u8) -> Option<ParameterGroup> {
+        ParameterGroup::ALL.into_iter().find(|group| group.id() == id)
     }
 }
 
@@ -51,20 +56,20 @@ pub enum Change<'a> {
     /// Gives the group this value.
     Set {
         /// The group.
-        group: Group,
+        group: ParameterGroup,
         /// Version of the value's layout; `load` returns it so that the caller can migrate or refuse old data.
         version: u16,
         /// The value, at most [`crate::MAX_VALUE`] bytes. It may be empty.
         value: &'a [u8],
     },
     /// Removes the stored value of the group, so that the caller's defaults are in use (1011h).
-    Restore(Group),
+    Restore(ParameterGroup),
 }
 
 impl Change<'_> {
     /// The changed group.
     #[must_use]
-    pub fn group(&self) -> Group {
+    pub fn group(&self) -> ParameterGroup {
         match *self {
             Change::Set { group, .. } | Change::Restore(group) => group,
         }
@@ -88,11 +93,11 @@ impl GroupSet {
     pub(crate) const NONE: GroupSet = GroupSet(0);
     pub(crate) const ALL: GroupSet = GroupSet(0xF);
 
-    pub(crate) fn contains(self, group: Group) -> bool {
+    pub(crate) fn contains(self, group: ParameterGroup) -> bool {
         self.0 & GroupSet::bit(group) != 0
     }
 
-    pub(crate) fn insert(&mut self, group: Group) {
+    pub(crate) fn insert(&mut self, group: ParameterGroup) {
         self.0 |= GroupSet::bit(group);
     }
 
@@ -101,7 +106,7 @@ impl GroupSet {
         GroupSet(self.0 & !other.0)
     }
 
-    fn bit(group: Group) -> u8 {
+    fn bit(group: ParameterGroup) -> u8 {
         1 << (group.id() - 1)
     }
 }
@@ -111,35 +116,35 @@ impl GroupSet {
 pub(crate) struct PerGroup<T>([T; 4]);
 
 impl<T> PerGroup<T> {
-    pub(crate) fn from_fn(mut make: impl FnMut(Group) -> T) -> PerGroup<T> {
-        PerGroup(Group::ALL.map(&mut make))
+    pub(crate) fn from_fn(mut make: impl FnMut(ParameterGroup) -> T) -> PerGroup<T> {
+        PerGroup(ParameterGroup::ALL.map(&mut make))
     }
 
-    pub(crate) fn get(&self, group: Group) -> &T {
+    pub(crate) fn get(&self, group: ParameterGroup) -> &T {
         let [device, communication, application, calibration] = &self.0;
         match group {
-            Group::Device => device,
-            Group::Communication => communication,
-            Group::Application => application,
-            Group::Calibration => calibration,
+            ParameterGroup::Device => device,
+            ParameterGroup::Communication => communication,
+            ParameterGroup::Application => application,
+            ParameterGroup::Calibration => calibration,
         }
     }
 
-    pub(crate) fn get_mut(&mut self, group: Group) -> &mut T {
+    pub(crate) fn get_mut(&mut self, group: ParameterGroup) -> &mut T {
         let [device, communication, application, calibration] = &mut self.0;
         match group {
-            Group::Device => device,
-            Group::Communication => communication,
-            Group::Application => application,
-            Group::Calibration => calibration,
+            ParameterGroup::Device => device,
+            ParameterGroup::Communication => communication,
+            ParameterGroup::Application => application,
+            ParameterGroup::Calibration => calibration,
         }
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (Group, &T)> {
-        Group::ALL.into_iter().zip(&self.0)
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (ParameterGroup, &T)> {
+        ParameterGroup::ALL.into_iter().zip(&self.0)
     }
 
-    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (Group, &mut T)> {
-        Group::ALL.into_iter().zip(&mut self.0)
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (ParameterGroup, &mut T)> {
+        ParameterGroup::ALL.into_iter().zip(&mut self.0)
     }
 }

@@ -5,7 +5,7 @@ use embedded_storage::nor_flash::NorFlash;
 use crate::device::DeviceRecord;
 use crate::error::Error;
 use crate::format::{CLEAN, Format, MARK};
-use crate::group::{Change, Group, Health, Loaded, PerGroup};
+use crate::group::{Change, Health, Loaded, ParameterGroup, PerGroup};
 use crate::page::Page;
 #[cfg(doc)]
 use crate::page::Pages;
@@ -51,7 +51,7 @@ impl<F: NorFlash> Store<F> {
         }
         let old = *store.current();
         if old.generation.is_some() && !old.can_grow() {
-            store.move_on(&store.kept())?;
+            store.move_on(&store.existing())?;
             store.erase(old.page)?;
         }
         Ok(store)
@@ -70,7 +70,7 @@ impl<F: NorFlash> Store<F> {
         let too_long =
             |change: &Change<'_>| matches!(change, Change::Set { value, .. } if value.len() > MAX_VALUE);
         let mut new = PerGroup::from_fn(|group| last_change(changes, group));
-        let whole = PerGroup::from_fn(|group| new.get(group).or(*self.kept().get(group)));
+        let whole = PerGroup::from_fn(|group| new.get(group).or(*self.existing().get(group)));
         // A value that does not fit a page alone could never be moved, so it is refused although there is still room
         // for it.
         if changes.iter().any(too_long) || size(&whole, self.format()) > self.current().page.room() {
@@ -91,7 +91,7 @@ impl<F: NorFlash> Store<F> {
 
     /// Removes values that are already stored: a master that saves after every start does not wear the flash.
     fn drop_unchanged(&mut self, records: &mut Records<'_>) -> Result<(), F::Error> {
-        for group in Group::ALL {
+        for group in ParameterGroup::ALL {
             let is_same = match (records.get(group), self.current_content(group)) {
                 (Some(Record::Set { version, value }), Content::Value(slot)) if slot.version == *version => {
                     self.view.holds(&slot, value)?
@@ -108,7 +108,7 @@ impl<F: NorFlash> Store<F> {
 
     /// The content of the group that the next start would read. Values in a damaged page do not count, because the page
     /// will be rewritten.
-    fn current_content(&self, group: Group) -> Content {
+    fn current_content(&self, group: ParameterGroup) -> Content {
         let entry = self.view.state.groups.get(group);
         if entry.suspect { Content::Unnamed } else { entry.content }
     }
@@ -117,7 +117,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// Errors of [`View::load`].
-    pub fn load(&mut self, group: Group, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
+    pub fn load(&mut self, group: ParameterGroup, buf: &mut [u8]) -> Result<Option<Loaded>, Error<F::Error>> {
         self.view.load(group, buf)
     }
 
@@ -131,7 +131,7 @@ impl<F: NorFlash> Store<F> {
 
     /// The [`View::health`] at the opening of the view, even after `prepare` has repaired the store.
     #[must_use]
-    pub fn health(&self, group: Group) -> Health {
+    pub fn health(&self, group: ParameterGroup) -> Health {
         self.view.health(group)
     }
 
@@ -162,7 +162,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// A record of the present state of every group.
-    fn kept(&self) -> Records<'static> {
+    fn existing(&self) -> Records<'static> {
         PerGroup::from_fn(|group| Some(Record::from(self.view.state.groups.get(group).content)))
     }
 
@@ -179,7 +179,7 @@ impl<F: NorFlash> Store<F> {
     /// Writes the records, which name every group, as the first transaction of the other page. From its commit on, that
     /// page is in use.
     fn move_on(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
-        self.verify_kept(records)?;
+        self.verify_existing(records)?;
         let old = *self.current();
         let generation = old.generation.map_or(0, |generation| generation.wrapping_add(1));
         self.write(self.other().page, self.format().first(), generation, records)?;
@@ -190,9 +190,9 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Checks values again before they are copied: a value that has decayed since it was read must not get a new CRC.
-    fn verify_kept(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
+    fn verify_existing(&mut self, records: &Records<'_>) -> Result<(), Error<F::Error>> {
         for (_, record) in records.iter() {
-            if let Some(Record::Kept(slot)) = record {
+            if let Some(Record::Existing(slot)) = record {
                 self.view.verify(slot)?;
             }
         }
@@ -227,6 +227,6 @@ impl<F: NorFlash> Store<F> {
     }
 }
 
-fn last_change<'a>(changes: &[Change<'a>], group: Group) -> Option<Record<'a>> {
+fn last_change<'a>(changes: &[Change<'a>], group: ParameterGroup) -> Option<Record<'a>> {
     changes.iter().rev().find(|change| change.group() == group).map(|&change| Record::from(change))
 }

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::error::Error;
 use crate::format::{Check, Contents, Format, KIND_RESTORED, KIND_VALUE, LARGEST_UNIT, MARK, WORD, in_words};
-use crate::group::{Change, Group, GroupSet, PerGroup};
+use crate::group::{Change, GroupSet, ParameterGroup, PerGroup};
 use crate::page::Page;
 use crate::scan::{Content, Slot};
 
@@ -12,7 +12,7 @@ use crate::scan::{Content, Slot};
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Record<'a> {
     Set { version: u16, value: &'a [u8] },
-    Kept(Slot),
+    Existing(Slot),
     Restored,
 }
 
@@ -20,7 +20,7 @@ impl Record<'_> {
     fn len(&self) -> u32 {
         match self {
             Record::Set { value, .. } => u32::try_from(value.len()).unwrap_or(u32::MAX),
-            Record::Kept(slot) => slot.len,
+            Record::Existing(slot) => slot.len,
             Record::Restored => 0,
         }
     }
@@ -38,7 +38,7 @@ impl<'a> From<Change<'a>> for Record<'a> {
 impl From<Content> for Record<'_> {
     fn from(content: Content) -> Self {
         match content {
-            Content::Value(slot) => Record::Kept(slot),
+            Content::Value(slot) => Record::Existing(slot),
             Content::Restored | Content::Unnamed => Record::Restored,
         }
     }
@@ -103,9 +103,14 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.program(MARK)
     }
 
-    fn record(&mut self, group: Group, record: &Record<'_>, generation: u16) -> Result<(), Error<F::Error>> {
+    fn record(
+        &mut self,
+        group: ParameterGroup,
+        record: &Record<'_>,
+        generation: u16,
+    ) -> Result<(), Error<F::Error>> {
         let (kind, version) = match *record {
-            Record::Set { version, .. } | Record::Kept(Slot { version, .. }) => (KIND_VALUE, version),
+            Record::Set { version, .. } | Record::Existing(Slot { version, .. }) => (KIND_VALUE, version),
             Record::Restored => (KIND_RESTORED, 0),
         };
         self.record_check = Check::new(self.at);
@@ -116,7 +121,7 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         self.fill()?;
         match *record {
             Record::Set { value, .. } => self.value(value)?,
-            Record::Kept(slot) => self.copy(&slot)?,
+            Record::Existing(slot) => self.copy(&slot)?,
             Record::Restored => {}
         }
         let check = core::mem::replace(&mut self.record_check, Check::new(0));

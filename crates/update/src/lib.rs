@@ -55,6 +55,7 @@ mod authorisation;
 mod boot;
 mod copy;
 mod crashes;
+mod download;
 mod erase;
 mod flash;
 mod header;
@@ -62,7 +63,6 @@ mod image;
 pub mod key;
 #[cfg(feature = "mock")]
 pub mod mock;
-mod receive;
 mod record;
 mod refusal;
 mod seal;

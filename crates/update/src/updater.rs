@@ -2,11 +2,11 @@
 
 use crate::area::{Area, Layout};
 use crate::copy::Copy;
+use crate::download::Download;
 use crate::erase::Erase;
 use crate::flash::Flash;
 use crate::header::Header;
 use crate::image::{self, FullCheck};
-use crate::receive::Receiver;
 use crate::record::{Commit, Record};
 use crate::refusal::Refusal;
 use crate::status::Status;
@@ -58,7 +58,7 @@ enum State {
     Idle,
     Clearing(Erase),
     Cleared,
-    Receiving(Receiver),
+    Receiving(Download),
     Checking(FullCheck, Plan),
     Committed,
     /// The destination of the image with this header is being erased.
@@ -156,7 +156,7 @@ impl<F: Flash> Updater<F> {
         if size.is_some_and(|size| size > self.target.layout.longest_image()) {
             return self.refuse(Refusal::TooLong);
         }
-        self.state = State::Receiving(Receiver::new());
+        self.state = State::Receiving(Download::new());
         self.settle(Ok(()))
     }
 

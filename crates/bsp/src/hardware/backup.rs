@@ -3,7 +3,7 @@
 use stm32f4xx_hal::pac::{CRC, PWR};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use crate::kept::{Checksum, Content, Found, Keeper, Slots};
+use crate::backup_copies::{BackupCopies, BackupState, Checksum, Content, Slots};
 use crate::losses::{Event, Losses};
 
 /// Start of the 4 KiB (RM0390, table 1; RM0090, table 1).
@@ -11,10 +11,10 @@ const BASE: *const Slots = 0x4002_4000 as *const Slots;
 
 const _: () = assert!(size_of::<Slots>() <= 4096);
 
-/// The memory with two copies of its content: see [`Keeper`].
+/// The memory with two copies of its content: see [`BackupCopies`].
 pub struct BackupMemory {
     power: PWR,
-    keeper: Keeper<'static, CrcUnit>,
+    copies: BackupCopies<'static, CrcUnit>,
     losses: &'static Losses,
 }
 
@@ -52,7 +52,7 @@ impl BackupMemory {
         crc: CRC,
         losses: &'static Losses,
         rcc: &mut Rcc,
-    ) -> (BackupMemory, Found) {
+    ) -> (BackupMemory, BackupState) {
         PWR::enable(rcc);
         rcc.ahb1enr().modify(|_, w| w.bkpsramen().set_bit());
         protect(&power, false);
@@ -61,15 +61,15 @@ impl BackupMemory {
         // SAFETY: the memory exists, is on and aligned, and any bits in it are valid numbers. `power` is given to this
         // function only, and once, so nothing else refers to the memory.
         let slots = unsafe { &*BASE };
-        let (keeper, found) = Keeper::open(slots, CrcUnit::new(crc, rcc));
-        (BackupMemory { power, keeper, losses }, found)
+        let (copies, found) = BackupCopies::open(slots, CrcUnit::new(crc, rcc));
+        (BackupMemory { power, copies, losses }, found)
     }
 
     /// Writes the older copy. The memory is write protected except during this call. A write that fails is counted
     /// ([`Event::BackupWrite`]); the newer copy stays valid, and the next write goes to the same place.
     pub fn write(&mut self, content: &Content) {
         protect(&self.power, false);
-        let is_kept = self.keeper.write(content);
+        let is_kept = self.copies.write(content);
         protect(&self.power, true);
         if !is_kept {
             self.losses.count(Event::BackupWrite);

@@ -19,8 +19,8 @@ use super::ssi::{self, Ssi};
 use super::time_base::{self, Alarm, TimeInterrupt};
 use super::transmit::Transmitter;
 use super::watchdog::StartUpWatchdog;
+use crate::backup_copies::BackupState;
 use crate::bit_timing::APB1_HZ;
-use crate::kept::Found;
 use crate::losses::Losses;
 use crate::reset_cause::ResetCause;
 
@@ -54,7 +54,7 @@ pub struct Board {
     /// The backup SRAM.
     pub backup: BackupMemory,
     /// Content of the backup SRAM at the start.
-    pub found: Found,
+    pub backup_state: BackupState,
     /// The digital inputs.
     pub buttons: Buttons,
     /// The digital outputs.
@@ -104,7 +104,7 @@ impl Board {
             data: gpiob.pb14,
         };
         let ssi = Ssi::new(absolute, losses, &mut rcc);
-        let (backup, found) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
+        let (backup, backup_state) = BackupMemory::open(device.PWR, device.CRC, losses, &mut rcc);
         let buttons = Buttons::new(gpioc.pc13, gpioc.pc10);
         let lamps = Lamps::new(gpioc.pc0, gpioc.pc1);
         let led = Led::new(gpioa.pa5);
@@ -120,7 +120,7 @@ impl Board {
             front_end,
             ssi,
             backup,
-            found,
+            backup_state,
             buttons,
             lamps,
             led,

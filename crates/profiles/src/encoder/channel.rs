@@ -2,12 +2,12 @@
 
 use super::area::area_state;
 use super::commissioning::Commissioning;
-use super::input::{Input, Left};
+use super::input::{Input, LastPosition};
 use super::reference::Trust;
 use super::speed::speed_value;
 use super::{
-    Area, CamChannel, ChannelParameters, Command, KeptChannel, Module, Parameters, Position, Progress, Scale,
-    Sensor, Speedometer,
+    Area, CamChannel, ChannelParameters, Command, Module, Parameters, Position, Progress, RetainedChannel,
+    Scale, Sensor, Speedometer,
 };
 use crate::board::RawEncoder;
 
@@ -82,14 +82,14 @@ impl Channel {
         all: &Parameters,
         own: &ChannelParameters,
         sensor: Sensor,
-        kept: &KeptChannel,
+        retained: &RetainedChannel,
         offset: i32,
     ) -> Channel {
         let scale = all.scale(&sensor);
         let resolution = sensor.resolution();
-        let found = kept.found(sensor.kind, resolution);
+        let start = retained.start_position(sensor.kind, resolution);
         let mut channel = Channel {
-            input: Input::new(sensor, &scale, all.module.offset, found),
+            input: Input::new(sensor, &scale, all.module.offset, start),
             resolution,
             position: Position::new(scale, offset),
             speedometer: Speedometer::new(0),
@@ -174,27 +174,27 @@ impl Channel {
     }
 
     /// The state to be retained in the memory with the battery.
-    pub(super) fn kept(&self) -> KeptChannel {
+    pub(super) fn retained(&self) -> RetainedChannel {
         let kind = self.input.sensor().kind;
         let (trust, needs_memory) = (Trust::from_bits(self.input.trust()), self.input.needs_memory());
-        let kept = |left| KeptChannel::new(kind, self.resolution, left);
-        match (self.input.tracker(), self.input.left()) {
-            (Some(tracker), _) => kept(Left { total: tracker.total(), trust, needs_memory }),
-            (None, Some(left)) => kept(left),
-            (None, None) => KeptChannel::unread((trust.lost, needs_memory)),
+        let retained = |last| RetainedChannel::new(kind, self.resolution, last);
+        match (self.input.tracker(), self.input.last()) {
+            (Some(tracker), _) => retained(LastPosition { total: tracker.total(), trust, needs_memory }),
+            (None, Some(last)) => retained(last),
+            (None, None) => RetainedChannel::unread((trust.lost, needs_memory)),
         }
     }
 
     /// Writes the same state to `words`, in its stored form.
     #[inline]
-    pub(super) fn retain(&self, words: &mut [u32; KeptChannel::WORDS]) {
+    pub(super) fn retain(&self, words: &mut [u32; RetainedChannel::WORDS]) {
         match self.input.tracker() {
             Some(tracker) => {
                 let kind = self.input.sensor().kind;
                 let (trust, needs_memory) = (self.input.trust(), self.input.needs_memory());
-                *words = KeptChannel::words(kind, self.resolution, tracker.total(), trust, needs_memory);
+                *words = RetainedChannel::words(kind, self.resolution, tracker.total(), trust, needs_memory);
             }
-            None => *words = self.kept().to_words(),
+            None => *words = self.retained().to_words(),
         }
     }
 }

@@ -3,8 +3,8 @@
 use crate::board::RawEncoder;
 use core::num::{NonZeroU32, NonZeroU64};
 
+use super::implausible::ImplausibleReadings;
 use super::reference::{Marks, Reference, Trust};
-use super::stray::Stray;
 use super::{Fault, Scale, Sensor, Tracker};
 
 /// Sensor state: the encoder does not answer.
@@ -54,7 +54,7 @@ pub(super) struct Observation {
 
 /// The position at the last loss of power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Left {
+pub(super) struct LastPosition {
     /// Steps from the origin.
     pub(super) total: i64,
     /// How far the position can be trusted.
@@ -65,9 +65,9 @@ pub(super) struct Left {
 
 /// Retained knowledge of a sensor at start.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Found {
+pub(super) struct StartPosition {
     /// The retained position.
-    pub(super) left: Option<Left>,
+    pub(super) last: Option<LastPosition>,
     /// A position should have been retained, and was lost.
     pub(super) lost: bool,
 }
@@ -78,7 +78,7 @@ pub(super) struct Input {
     sensor: Sensor,
     /// Distance from the zero of the sensor to the zero of the encoder (650Ah:1).
     offset: i32,
-    left: Option<Left>,
+    last: Option<LastPosition>,
     reference: Reference,
     /// The code wraps before the position does, so the number of wraps matters.
     comes_round: bool,
@@ -91,27 +91,27 @@ pub(super) struct Input {
     /// Steps moved in the last millisecond with a good reading.
     step: i32,
     /// Readings rejected as implausible.
-    stray: Option<Stray>,
+    implausible: Option<ImplausibleReadings>,
     /// Number of coming samples in which the sensor may have moved further than in a millisecond.
     gap: u8,
 }
 
 impl Input {
     /// A sensor that has not been read yet.
-    pub(super) fn new(sensor: Sensor, scale: &Scale, offset: i32, found: Found) -> Input {
-        let Found { left, lost } = found;
-        let trust = left.map_or(Trust { lost, ..Trust::default() }, |left| left.trust);
+    pub(super) fn new(sensor: Sensor, scale: &Scale, offset: i32, start: StartPosition) -> Input {
+        let StartPosition { last, lost } = start;
+        let trust = last.map_or(Trust { lost, ..Trust::default() }, |last| last.trust);
         Input {
             sensor,
             offset,
-            left,
+            last,
             reference: Reference::new(marks(&sensor, scale), trust),
             comes_round: comes_round(&sensor, scale),
-            needs_memory: left.is_some_and(|left| left.needs_memory),
+            needs_memory: last.is_some_and(|last| last.needs_memory),
             tracker: None,
             missed: 0,
             step: 0,
-            stray: None,
+            implausible: None,
             gap: 0,
         }
     }
@@ -140,8 +140,8 @@ impl Input {
     pub(super) fn refer(&mut self) {
         let correction = self.reference.preset();
         if let Some(tracker) = &mut self.tracker {
-            if let Some(stray) = self.stray.take() {
-                tracker.follow(stray.word());
+            if let Some(implausible) = self.implausible.take() {
+                tracker.follow(implausible.word());
             }
             tracker.correct(correction);
         }
@@ -150,7 +150,7 @@ impl Input {
     /// The position by rejected readings or by a rejected index; `None` while nothing is rejected.
     #[inline]
     pub(super) fn doubtful(&self) -> Option<Tracker> {
-        let is_believed = self.stray.is_none() && self.reference.state() & SENSOR_INDEX == 0;
+        let is_believed = self.implausible.is_none() && self.reference.state() & SENSOR_INDEX == 0;
         if is_believed { None } else { self.as_read() }
     }
 
@@ -158,8 +158,8 @@ impl Input {
     fn as_read(&self) -> Option<Tracker> {
         let correction = self.reference.correction();
         let mut tracker = self.tracker?;
-        if let Some(stray) = self.stray {
-            tracker.follow(stray.word());
+        if let Some(implausible) = self.implausible {
+            tracker.follow(implausible.word());
         }
         tracker.correct(correction);
         Some(tracker)
@@ -183,7 +183,7 @@ impl Input {
     /// position counts as lost.
     #[inline]
     pub(super) fn trust(&self) -> u8 {
-        self.reference.trust() | if self.stray.is_some() { Trust::LOST } else { 0 }
+        self.reference.trust() | if self.implausible.is_some() { Trust::LOST } else { 0 }
     }
 
     /// Whether only retained memory tells how often the code has wrapped.
@@ -193,8 +193,8 @@ impl Input {
     }
 
     /// The retained position, until the sensor has been read.
-    pub(super) fn left(&self) -> Option<Left> {
-        self.left
+    pub(super) fn last(&self) -> Option<LastPosition> {
+        self.last
     }
 
     /// Takes a sample.
@@ -231,9 +231,9 @@ impl Input {
     fn is_plausible(&mut self, word: u32) -> bool {
         let fastest = self.sensor.fastest;
         let Some(tracker) = &self.tracker else { return true };
-        let is_back = match &mut self.stray {
+        let is_back = match &mut self.implausible {
             _ if fastest == 0 => true,
-            Some(stray) => stray.is_back(word, fastest),
+            Some(implausible) => implausible.is_back(word, fastest),
             // The longer there was no reading, the further the sensor may have moved.
             None if self.missed == 0 && self.gap == 0 => tracker.distance(word).unsigned_abs() <= fastest,
             None => {
@@ -243,16 +243,17 @@ impl Input {
             }
         };
         if is_back {
-            self.stray = None;
-        } else if self.stray.is_none() {
-            self.stray = Some(Stray::new(self.sensor.bits(), tracker.word(), self.step, word, fastest));
+            self.implausible = None;
+        } else if self.implausible.is_none() {
+            self.implausible =
+                Some(ImplausibleReadings::new(self.sensor.bits(), tracker.word(), self.step, word, fastest));
         }
         is_back
     }
 
     /// Keeps the position where it was before the readings jumped.
     fn stay(&self) -> Observation {
-        let lasts = self.stray.is_some_and(|stray| stray.readings() > TOLERATED_MISSES);
+        let lasts = self.implausible.is_some_and(|implausible| implausible.readings() > TOLERATED_MISSES);
         let error = if lasts { SENSOR_POSITION_ERROR } else { 0 };
         Observation { state: SENSOR_IMPLAUSIBLE | error | self.reference.state(), ..Observation::default() }
     }
@@ -277,8 +278,8 @@ impl Input {
     }
 
     fn miss(&mut self, state: u8) -> Observation {
-        if let Some(stray) = &mut self.stray {
-            stray.skip();
+        if let Some(implausible) = &mut self.implausible {
+            implausible.skip();
         }
         self.missed = self.missed.saturating_add(1);
         let error = if self.missed > TOLERATED_MISSES { SENSOR_POSITION_ERROR } else { 0 };
@@ -316,14 +317,14 @@ impl Input {
     #[inline(never)]
     fn begin(&mut self, word: u32, scale: &Scale) {
         let (turn, bits) = (scale.turn(), self.sensor.bits());
-        let total = match self.left {
-            Some(left) if self.sensor.kind.is_absolute() => {
+        let total = match self.last {
+            Some(last) if self.sensor.kind.is_absolute() => {
                 // From the retained position, the shorter way to the present reading.
-                let then = low_word(left.total.wrapping_sub(self.offset.into()));
-                let moved = Tracker::new(turn, bits, then, left.total).distance(word);
-                left.total.saturating_add(moved.into())
+                let then = low_word(last.total.wrapping_sub(self.offset.into()));
+                let moved = Tracker::new(turn, bits, then, last.total).distance(word);
+                last.total.saturating_add(moved.into())
             }
-            Some(left) => left.total,
+            Some(last) => last.total,
             None if self.sensor.kind.is_absolute() => i64::from(word) + i64::from(self.offset),
             None => self.offset.into(),
         };

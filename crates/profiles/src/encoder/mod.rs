@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! timer count, index ─┐
-//!                     ├─ Input ─ Tracker ─ Shaft ─ Position (Scale, offset) ─ 6004h ─┬─ CamChannel 6300h
-//! SSI frame ── Format ┘             │                                                └─ area 6400h
+//!                     ├─ Input ─ Tracker ─ ShaftPosition ─ Position (Scale, offset) ─ 6004h ─┬─ CamChannel 6300h
+//! SSI frame ── Format ┘             │                                                        └─ area 6400h
 //!                                   └─ Speedometer ─ 6030h
 //! ```
 //!
@@ -43,18 +43,18 @@ mod chain;
 mod channel;
 mod commissioning;
 mod fraction;
+mod implausible;
 mod input;
-mod kept;
 mod parameters;
 mod position;
 mod reference;
+mod retained_state;
 mod scale;
 mod sensor;
-mod shaft;
 mod speed;
 mod ssi;
-mod stray;
 mod supervision;
+mod tracker;
 
 pub mod objects;
 
@@ -67,19 +67,19 @@ pub use input::{
     SENSOR_ALARM, SENSOR_HELD, SENSOR_IMPLAUSIBLE, SENSOR_INDEX, SENSOR_NO_SIGNAL, SENSOR_PARITY,
     SENSOR_POSITION_ERROR, SENSOR_TOO_FAST, SENSOR_UNREFERENCED,
 };
-pub use kept::{Kept, KeptChannel, Lasting, OperatingTime, Start};
 pub use objects::{FAULTS, Objects, ROWS, fields, handles};
 pub use parameters::{
     AUTOMATIC, CODE_SEQUENCE, COMMISSIONING, ChannelParameters, Command, DIRECTION, HIGHEST_RATE,
     HIGHEST_SPEED, Parameters, SCALING,
 };
 pub use position::Position;
+pub use retained_state::{OperatingTime, PositionRecord, RetainedChannel, RetainedState, Start};
 pub use scale::{Native, Scale, Settings};
 pub use sensor::{Sensor, SensorType};
-pub use shaft::{Shaft, Tracker};
 pub use speed::{STANDSTILL, Speedometer, speed_value};
 pub use ssi::{Coding, Fault, Format, Parity, Reading};
 pub use supervision::{
     ALARM_COMMISSIONING, ALARM_POSITION, Conditions, Limits, SUPPORTED_ALARMS, SUPPORTED_WARNINGS,
     WARNING_BATTERY, WARNING_FREQUENCY, WARNING_OPERATING_TIME, WARNING_REFERENCE, WARNING_WATCHDOG,
 };
+pub use tracker::{ShaftPosition, Tracker};

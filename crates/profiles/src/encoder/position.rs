@@ -1,6 +1,6 @@
 //! The position value with its offset: objects 6003h, 6004h and 6509h.
 
-use super::{Scale, Shaft};
+use super::{Scale, ShaftPosition};
 
 /// A scale, the offset, and the position at which the present turn starts.
 ///
@@ -44,8 +44,8 @@ impl Position {
     }
 
     /// The position value (6004h).
-    pub fn value(&mut self, shaft: Shaft) -> u32 {
-        let Shaft { turns, step } = self.scale.seen(shaft);
+    pub fn value(&mut self, shaft: ShaftPosition) -> u32 {
+        let ShaftPosition { turns, step } = self.scale.seen(shaft);
         self.start = match turns.wrapping_sub(self.turns) {
             0 => self.start,
             1 => self.scale.add(self.start, self.per_turn),
@@ -58,7 +58,7 @@ impl Position {
 
     /// Makes the value `preset` at the present place of the shaft. A value outside of the range changes nothing.
     #[inline(never)]
-    pub fn preset(&mut self, preset: u32, shaft: Shaft) {
+    pub fn preset(&mut self, preset: u32, shaft: ShaftPosition) {
         if let Some(offset) = self.scale.offset_for(preset, shaft) {
             *self = Position::new(self.scale, offset);
         }
@@ -67,7 +67,7 @@ impl Position {
     /// Takes another scale. A change of direction alone keeps the value. In other units the offset has lost its
     /// meaning: it is 0 until the units of the last preset come back. CiA 406 is silent about both.
     #[inline(never)]
-    pub fn rescale(&mut self, scale: Scale, shaft: Shaft) {
+    pub fn rescale(&mut self, scale: Scale, shaft: ShaftPosition) {
         if scale == self.scale {
             return;
         }

@@ -87,13 +87,20 @@ pub(super) struct Reference {
     /// Bits of the sensor state that result.
     state: u8,
     /// Bits of [`Trust`] to be retained for the next start.
-    kept: u8,
+    retained: u8,
 }
 
 impl Reference {
     pub(super) fn new(marks: Marks, trust: Trust) -> Reference {
-        let mut new =
-            Reference { marks, trust, index: Index::Right, since: 0, too_many: u32::MAX, state: 0, kept: 0 };
+        let mut new = Reference {
+            marks,
+            trust,
+            index: Index::Right,
+            since: 0,
+            too_many: u32::MAX,
+            state: 0,
+            retained: 0,
+        };
         new.settle();
         new
     }
@@ -116,7 +123,7 @@ impl Reference {
 
     /// Bits of [`Trust`] to be retained for the next start.
     pub(super) fn trust(&self) -> u8 {
-        self.kept
+        self.retained
     }
 
     /// Takes note of a movement.
@@ -150,7 +157,7 @@ impl Reference {
     #[inline]
     pub(super) fn index(&mut self, error: i64, since: i32) -> i64 {
         let is_right = error.unsigned_abs() <= TOLERANCE;
-        if is_right && self.kept == Trust::REFERENCED && self.index == Index::Right {
+        if is_right && self.retained == Trust::REFERENCED && self.index == Index::Right {
             self.since = since;
             return 0;
         }
@@ -218,7 +225,7 @@ impl Reference {
             | bit(lost, SENSOR_UNREFERENCED | SENSOR_POSITION_ERROR)
             | bit(doubted, SENSOR_POSITION_ERROR)
             | bit(is_wrong, SENSOR_INDEX | SENSOR_POSITION_ERROR);
-        self.kept = Trust { doubted: doubted || is_wrong, ..self.trust }.bits();
+        self.retained = Trust { doubted: doubted || is_wrong, ..self.trust }.bits();
         // A missing index stays missing until it comes.
         let is_due = self.marks.is_used && referenced && self.index != Index::Missing;
         let turn = self.marks.turn.filter(|_| is_due).map_or(u32::MAX, NonZeroU32::get);

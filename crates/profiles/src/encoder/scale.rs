@@ -2,7 +2,7 @@
 
 use core::num::{NonZeroU32, NonZeroU64};
 
-use super::Shaft;
+use super::ShaftPosition;
 use super::fraction::Fraction;
 
 /// Number of different values of an UNSIGNED32: more positions cannot be told apart.
@@ -70,7 +70,7 @@ pub struct Settings {
 /// Turns a mechanical position into a position value. Only usable scales can be built.
 ///
 /// The position repeats after `range` units, whatever the ratio of the range to the units per turn. It continues
-/// without a jump in both directions for ever, because turns are counted without end (see [`Shaft`]).
+/// without a jump in both directions for ever, because turns are counted without end (see [`ShaftPosition`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
     turn: NonZeroU32,
@@ -161,12 +161,12 @@ impl Scale {
 
     /// The position of the shaft in counting direction: unchanged, or as seen from the other end of the shaft.
     #[must_use]
-    pub fn seen(&self, shaft: Shaft) -> Shaft {
+    pub fn seen(&self, shaft: ShaftPosition) -> ShaftPosition {
         if !self.reversed {
             return shaft;
         }
         let step = (self.turn.get() - 1).saturating_sub(shaft.step);
-        Shaft { turns: (-1_i64).saturating_sub(shaft.turns), step }
+        ShaftPosition { turns: (-1_i64).saturating_sub(shaft.turns), step }
     }
 
     /// Units from the start of a turn to a step within the turn, modulo the range.
@@ -205,7 +205,7 @@ impl Scale {
     /// The position value, computed with two divisions; [`Position`](super::Position) computes it faster for every
     /// sample.
     #[must_use]
-    pub fn value(&self, shaft: Shaft, offset: i32) -> u32 {
+    pub fn value(&self, shaft: ShaftPosition, offset: i32) -> u32 {
         let seen = self.seen(shaft);
         self.add(self.start(seen.turns, offset), self.within(seen.step))
     }
@@ -213,7 +213,7 @@ impl Scale {
     /// The offset (6509h) that makes the position value `preset` at this place of the shaft; of the possible offsets,
     /// the one nearest to zero. `None` for a preset outside of the range.
     #[must_use]
-    pub fn offset_for(&self, preset: u32, shaft: Shaft) -> Option<i32> {
+    pub fn offset_for(&self, preset: u32, shaft: ShaftPosition) -> Option<i32> {
         let range = self.range.get();
         let offset =
             u64::from(preset).lt(&range).then(|| u64::from(self.subtract(preset, self.value(shaft, 0))))?;

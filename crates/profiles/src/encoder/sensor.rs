@@ -79,13 +79,13 @@ impl SensorType {
     /// retained memory tells its position.
     #[must_use]
     pub fn is_counted(self) -> bool {
-        self.is_kept() && self != SensorType::MultiTurn
+        self.is_retained() && self != SensorType::MultiTurn
     }
 
     /// Whether the type continues from its last position after a loss of power. A multi-turn encoder does too: the
     /// range (6002h) need not divide the number of its positions, so the number of wraps matters.
     #[must_use]
-    pub fn is_kept(self) -> bool {
+    pub fn is_retained(self) -> bool {
         matches!(
             self,
             SensorType::MultiTurn

@@ -81,19 +81,19 @@ pub struct Conditions {
 
 /// A condition that must last before it counts.
 #[derive(Clone, Copy, Debug, Default)]
-struct Lasting {
+struct Debounced {
     is_set: bool,
     other: u8,
 }
 
-impl Lasting {
+impl Debounced {
     fn update(&mut self, now: bool) -> bool {
         if now == self.is_set {
             self.other = 0;
         } else if self.other < DEBOUNCE - 1 {
             self.other += 1;
         } else {
-            *self = Lasting { is_set: now, other: 0 };
+            *self = Debounced { is_set: now, other: 0 };
         }
         self.is_set
     }
@@ -105,11 +105,11 @@ const SHOWN: u8 = 100;
 
 /// A condition that is reported for a while.
 #[derive(Clone, Copy, Debug, Default)]
-struct Held {
+struct Stretched {
     left: u8,
 }
 
-impl Held {
+impl Stretched {
     fn update(&mut self, now: bool) -> bool {
         self.left = if now { SHOWN } else { self.left.saturating_sub(1) };
         self.left > 0
@@ -120,10 +120,10 @@ impl Held {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Supervision {
     alarms: u16,
-    current: Lasting,
-    voltage: Lasting,
-    battery: Lasting,
-    position: Held,
+    current: Debounced,
+    voltage: Debounced,
+    battery: Debounced,
+    position: Stretched,
     is_damaged: bool,
     /// The operating time has reached its limit for the first time since power-on, and the limit has not been raised
     /// since.

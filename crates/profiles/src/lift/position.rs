@@ -14,7 +14,7 @@ use crate::profile::Chain;
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::encoder::{
-    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Kept, Module, SENSOR_HELD,
+    self, Area, ChannelParameters, ChannelValues, Conditions, Encoder, Module, RetainedState, SENSOR_HELD,
     SENSOR_NO_SIGNAL, SENSOR_PARITY, SENSOR_POSITION_ERROR, Sensor, Start, area_state,
 };
 
@@ -319,7 +319,7 @@ impl PositionUnits {
 
     /// The state to be retained through a loss of power.
     #[must_use]
-    pub fn kept(&self) -> Kept {
-        self.encoder.kept()
+    pub fn retained_state(&self) -> RetainedState {
+        self.encoder.retained_state()
     }
 }

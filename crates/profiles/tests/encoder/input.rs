@@ -120,12 +120,12 @@ fn an_offset_is_known_before_the_first_reading() {
     bench.go(5000);
     bench.preset(0, 100);
     assert_eq!(bench.first().offset, -4900);
-    let kept = bench.encoder.kept();
+    let retained = bench.encoder.retained_state();
     let mut words = [0; profiles::board::RETAINED_WORDS];
     assert!(bench.encoder.retain(&mut words));
-    assert_eq!(words, kept.to_words());
+    assert_eq!(words, retained.to_words());
     bench.parameters.channels[0].offset = -4900;
-    let mut bench = Bench::started(bench.parameters, Start::Kept(kept), 5000);
+    let mut bench = Bench::started(bench.parameters, Start::Retained(retained), 5000);
     assert_eq!(bench.receive(None).channels[0].offset, -4900);
     assert_eq!(bench.first().position, 100);
 }

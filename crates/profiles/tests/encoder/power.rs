@@ -2,8 +2,8 @@
 
 use profiles::board::Retained;
 use profiles::encoder::{
-    ALARM_POSITION, CODE_SEQUENCE, Encoder, Kept, Lasting, SENSOR_POSITION_ERROR, SENSOR_UNREFERENCED,
-    SensorType, Start,
+    ALARM_POSITION, CODE_SEQUENCE, Encoder, PositionRecord, RetainedState, SENSOR_POSITION_ERROR,
+    SENSOR_UNREFERENCED, SensorType, Start,
 };
 use profiles::profile::Chain;
 
@@ -11,13 +11,13 @@ use crate::bench::{Bench, one, two};
 
 /// Loses the power, moves the sensor to `total`, and restores the power.
 fn after_power_loss(bench: &Bench, total: i64) -> Bench {
-    let kept = Kept::from_words(&bench.encoder.kept().to_words());
-    Bench::started(bench.parameters, Start::Kept(kept), total)
+    let retained = RetainedState::from_words(&bench.encoder.retained_state().to_words());
+    Bench::started(bench.parameters, Start::Retained(retained), total)
 }
 
 /// The same with an empty battery: only the parameter store has data for the start.
 fn after_loss_of_memory(bench: &Bench, total: i64) -> Bench {
-    let stored = Lasting::of(&bench.encoder.kept().to_words()).to_words();
+    let stored = PositionRecord::of(&bench.encoder.retained_state().to_words()).to_words();
     Bench::started(bench.parameters, Start::of(Retained::Nothing, Some(stored)), total)
 }
 
@@ -183,18 +183,18 @@ fn what_was_kept_is_still_there_before_the_first_sample() {
     let mut bench = Bench::new(one(SensorType::IncrementalCounted));
     bench.stay();
     bench.go(5000);
-    let kept = bench.encoder.kept();
-    let mut encoder = Encoder::new(Start::Kept(kept));
-    assert_eq!(encoder.kept(), kept, "before there are parameters");
+    let retained = bench.encoder.retained_state();
+    let mut encoder = Encoder::new(Start::Retained(retained));
+    assert_eq!(encoder.retained_state(), retained, "before there are parameters");
     encoder.apply(&bench.parameters);
-    assert_eq!(encoder.kept(), kept, "before there is a sample");
+    assert_eq!(encoder.retained_state(), retained, "before there is a sample");
 }
 
 #[test]
 fn damage_is_a_memory_error_and_an_alarm_where_a_position_is_lost() {
     for (kind, alarms) in [(SensorType::IncrementalCounted, ALARM_POSITION), (SensorType::SingleTurn, 0)] {
-        let lasting = Lasting::from_words([0, 0]);
-        let mut bench = Bench::started(one(kind), Start::Damaged(lasting), 0);
+        let record = PositionRecord::from_words([0, 0]);
+        let mut bench = Bench::started(one(kind), Start::Damaged(record), 0);
         let snapshot = bench.stay();
         assert_eq!((snapshot.alarms, snapshot.conditions.memory), (alarms, true));
     }

@@ -194,7 +194,7 @@ fn the_operating_time_warns_once_in_a_life_with_power() {
     assert_eq!(bench.stay().warnings, 0);
     bench.change(|parameters| parameters.limits.operating_time = 1);
     assert_eq!(bench.stay().warnings, 0, "only after power-on again");
-    let start = profiles::encoder::Start::Kept(bench.encoder.kept());
+    let start = profiles::encoder::Start::Retained(bench.encoder.retained_state());
     assert_eq!(Bench::started(bench.parameters, start, 0).stay().warnings, WARNING_OPERATING_TIME);
 }
 

@@ -2,7 +2,7 @@
 
 use crate::model::{Changes, as_changes, set, start};
 use storage::mock::MockFlash;
-use storage::{Group, MAX_VALUE, Pages};
+use storage::{MAX_VALUE, Pages, ParameterGroup};
 
 const PAGE: usize = 16 * 1024;
 const PAGES: Pages = Pages::new(0, 16 * 1024);
@@ -16,7 +16,7 @@ fn blank() -> MockFlash<PAGE> {
 }
 
 /// Groups and sizes of the values that are saved at once.
-type Sizes = [(Group, usize)];
+type Sizes = [(ParameterGroup, usize)];
 
 /// The changes of save `number`: every value differs from that of the save before.
 fn changes(sizes: &Sizes, number: usize) -> Changes {
@@ -48,12 +48,12 @@ fn words_of_saves(sizes: &Sizes, count: usize) -> Vec<u32> {
 
 #[test]
 fn saves_until_a_restart_and_until_worn_out() {
-    let largest = Group::ALL.map(|group| (group, MAX_VALUE));
+    let largest = ParameterGroup::ALL.map(|group| (group, MAX_VALUE));
     let sets: [(&str, &Sizes, usize); 3] = [
-        ("application group, 212 B", &[(Group::Application, 212)], 136),
+        ("application group, 212 B", &[(ParameterGroup::Application, 212)], 136),
         (
             "communication and application groups, 1405 B",
-            &[(Group::Communication, 1193), (Group::Application, 212)],
+            &[(ParameterGroup::Communication, 1193), (ParameterGroup::Application, 212)],
             22,
         ),
         ("all four groups at their most, 8192 B", &largest, 2),

@@ -3,10 +3,10 @@
 //! The objects of the device profile (CiA 406, 6000h to 67FFh) and the manufacturer-specific objects (21xxh) that it
 //! needs.
 
+mod device_profile;
 mod faults;
 mod manufacturer;
 mod pdos;
-mod profile;
 mod rules;
 mod sensors;
 mod values;
@@ -30,7 +30,8 @@ use crate::profile::Profile;
 pub(crate) const DEFAULT_TYPE: u8 = 5;
 
 /// Objects of the device profile.
-pub(crate) static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
+pub(crate) static PROFILE: [Object; dictionary::count(device_profile::PARTS)] =
+    dictionary::gather(device_profile::PARTS);
 
 /// The rows of a stand-alone encoder, without the rows that all devices have.
 pub const ROWS: &[&[Object]] = &[

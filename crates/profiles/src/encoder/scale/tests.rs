@@ -45,8 +45,8 @@ pub(in crate::encoder) fn any_scale() -> impl Strategy<Value = Scale> {
     any_settings().prop_map(|(native, settings)| Scale::new(&native, &settings).unwrap())
 }
 
-pub(in crate::encoder) fn shaft_at(total: i64, scale: &Scale) -> Shaft {
-    Shaft::at(total, scale.turn())
+pub(in crate::encoder) fn shaft_at(total: i64, scale: &Scale) -> ShaftPosition {
+    ShaftPosition::at(total, scale.turn())
 }
 
 /// Units per native step as a fraction, from the definitions.
@@ -118,8 +118,8 @@ fn refuses_what_the_sensor_cannot_resolve() {
 #[test]
 fn refuses_a_preset_outside_of_the_range() {
     let scale = Scale::new(&rotary(4096, 16), &scaled(360, 3600)).unwrap();
-    assert_eq!(scale.offset_for(3600, Shaft::default()), None);
-    assert_eq!(scale.offset_for(3599, Shaft::default()), Some(-1));
+    assert_eq!(scale.offset_for(3600, ShaftPosition::default()), None);
+    assert_eq!(scale.offset_for(3599, ShaftPosition::default()), Some(-1));
 }
 
 #[test]

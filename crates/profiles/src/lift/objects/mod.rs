@@ -3,11 +3,11 @@
 //! The pre-defined PDOs (CiA 417-3-1), the objects of the application profile (6000h to 64FFh), and the
 //! manufacturer-specific objects that they need (21xxh to 23xxh).
 
+mod application_profile;
 mod choice;
 mod manufacturer;
 mod panel;
 pub mod pdos;
-mod profile;
 mod rules;
 mod sensors;
 mod values;
@@ -26,7 +26,8 @@ use crate::fault::Fault;
 use crate::pressure;
 use crate::profile::Profile;
 
-static PROFILE: [Object; dictionary::count(profile::PARTS)] = dictionary::gather(profile::PARTS);
+static PROFILE: [Object; dictionary::count(application_profile::PARTS)] =
+    dictionary::gather(application_profile::PARTS);
 
 /// Error behaviour: no change of the NMT state. Other devices of the lift depend on the PDOs, which also report the
 /// fault, so a fault must not stop them.

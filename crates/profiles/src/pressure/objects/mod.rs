@@ -1,18 +1,18 @@
 //! Objects of the transmitter, and the transfer of measured values and parameters between them and the measurement.
 
 pub(crate) mod calibration;
+mod device_profile;
 mod faults;
 mod manufacturer;
 mod pdos;
-mod profile;
 mod rules;
 mod values;
 
 pub(crate) use calibration::{CALIBRATION, Places};
+pub(crate) use device_profile::{INTEGER, REAL};
 pub use faults::FAULTS;
 pub(crate) use faults::SENSOR_BREAK;
 pub(crate) use manufacturer::{STATUS_AND_USER, STATUS_REGISTER};
-pub(crate) use profile::{INTEGER, REAL};
 pub use values::Fields;
 
 use canopen::dictionary::{self, Dictionary, Entry, Object};

@@ -6,19 +6,19 @@ use core::num::{NonZeroU32, NonZeroU64};
 ///
 /// A turn is a revolution of a rotary encoder; for a linear encoder, see [`Scale::turn`](super::Scale::turn).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Shaft {
+pub struct ShaftPosition {
     /// Whole turns, negative below the origin.
     pub turns: i64,
     /// Native step within the turn, below the steps per turn.
     pub step: u32,
 }
 
-impl Shaft {
+impl ShaftPosition {
     /// The shaft at `total` steps from its origin.
     #[must_use]
-    pub fn at(total: i64, turn: NonZeroU32) -> Shaft {
+    pub fn at(total: i64, turn: NonZeroU32) -> ShaftPosition {
         let turns = div_floor(total, turn);
-        Shaft { turns, step: remainder(total, turns, turn) }
+        ShaftPosition { turns, step: remainder(total, turns, turn) }
     }
 
     /// Steps from the origin, modulo 2^64.
@@ -38,7 +38,7 @@ pub struct Tracker {
     /// Number of bits of a word that the counter does not use.
     unused: u32,
     word: u32,
-    shaft: Shaft,
+    shaft: ShaftPosition,
     count: u32,
 }
 
@@ -46,7 +46,13 @@ impl Tracker {
     /// A counter of `bits` bits, 1 to 32, that reads `word` while the shaft is `total` steps from its origin.
     #[must_use]
     pub fn new(turn: NonZeroU32, bits: u32, word: u32, total: i64) -> Tracker {
-        Tracker { turn, unused: 32 - bits.clamp(1, 32), word, shaft: Shaft::at(total, turn), count: 0 }
+        Tracker {
+            turn,
+            unused: 32 - bits.clamp(1, 32),
+            word,
+            shaft: ShaftPosition::at(total, turn),
+            count: 0,
+        }
     }
 
     /// Steps from the last reading to this one, the shorter way.
@@ -81,14 +87,14 @@ impl Tracker {
     /// Counts in turns of another length from now on.
     pub fn set_turn(&mut self, turn: NonZeroU32) {
         if turn != self.turn {
-            self.shaft = Shaft::at(self.total(), turn);
+            self.shaft = ShaftPosition::at(self.total(), turn);
             self.turn = turn;
         }
     }
 
     /// Position of the shaft at the last reading.
     #[must_use]
-    pub fn shaft(&self) -> Shaft {
+    pub fn shaft(&self) -> ShaftPosition {
         self.shaft
     }
 
@@ -101,7 +107,7 @@ impl Tracker {
     /// The step within a turn of this length. No division is needed if the tracker counts in that length.
     #[must_use]
     pub fn step_in(&self, turn: NonZeroU32) -> u32 {
-        if turn == self.turn { self.shaft.step } else { Shaft::at(self.total(), turn).step }
+        if turn == self.turn { self.shaft.step } else { ShaftPosition::at(self.total(), turn).step }
     }
 
     /// The last reading.
@@ -145,10 +151,10 @@ mod tests {
         for (total, turns, step) in
             [(0, 0, 0), (9, 0, 9), (10, 1, 0), (-1, -1, 9), (-10, -1, 0), (-11, -2, 9), (-20, -2, 0)]
         {
-            assert_eq!(Shaft::at(total, TEN), Shaft { turns, step }, "{total}");
+            assert_eq!(ShaftPosition::at(total, TEN), ShaftPosition { turns, step }, "{total}");
             let mut tracker = Tracker::new(TEN, 16, 0, 0);
             tracker.correct(total);
-            assert_eq!(tracker.shaft(), Shaft { turns, step }, "{total}");
+            assert_eq!(tracker.shaft(), ShaftPosition { turns, step }, "{total}");
         }
     }
 
@@ -205,9 +211,9 @@ mod tests {
         let turn = NonZeroU32::new(4096).unwrap();
         let mut tracker = Tracker::new(turn, 32, u32::MAX, 5 * 4096 + 4095);
         assert_eq!(tracker.follow(0), 1);
-        assert_eq!(tracker.shaft(), Shaft { turns: 6, step: 0 });
+        assert_eq!(tracker.shaft(), ShaftPosition { turns: 6, step: 0 });
         assert_eq!(tracker.follow(u32::MAX - 1), -2);
-        assert_eq!(tracker.shaft(), Shaft { turns: 5, step: 4094 });
+        assert_eq!(tracker.shaft(), ShaftPosition { turns: 5, step: 4094 });
     }
 
     #[test]
@@ -216,7 +222,7 @@ mod tests {
         let mut tracker = Tracker::new(turn, 16, 0, 0);
         tracker.follow(30);
         tracker.correct(-40);
-        assert_eq!((tracker.shaft(), tracker.count()), (Shaft { turns: -1, step: 90 }, 30));
+        assert_eq!((tracker.shaft(), tracker.count()), (ShaftPosition { turns: -1, step: 90 }, 30));
         tracker.follow(35);
         assert_eq!(tracker.total(), -5);
     }

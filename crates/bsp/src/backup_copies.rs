@@ -31,11 +31,11 @@ pub type Slots = [Slot; 2];
 
 /// Content of the memory at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum BackupState {
     /// Neither copy exists: nothing was ever written, or the battery was empty.
     Nothing,
     /// The record that was written last.
-    Kept(Content),
+    Intact(Content),
     /// At least one copy exists, but none is valid.
     Damaged,
 }
@@ -51,16 +51,16 @@ pub trait Checksum {
 }
 
 /// Writes the two copies alternately.
-pub struct Keeper<'a, C> {
+pub struct BackupCopies<'a, C> {
     slots: &'a Slots,
     checksum: C,
     /// The sequence number of the newer copy. Even numbers belong to the first place, odd numbers to the second.
     sequence: u32,
 }
 
-impl<'a, C: Checksum> Keeper<'a, C> {
+impl<'a, C: Checksum> BackupCopies<'a, C> {
     /// Finds the newer of the valid copies. The next write overwrites the other one.
-    pub fn open(slots: &'a Slots, mut checksum: C) -> (Keeper<'a, C>, Found) {
+    pub fn open(slots: &'a Slots, mut checksum: C) -> (BackupCopies<'a, C>, BackupState) {
         let [first, second] = slots.each_ref().map(|slot| slot.read(&mut checksum));
         let good = [first.filter(|copy| copy.0 % 2 == 0), second.filter(|copy| copy.0 % 2 == 1)];
         let newer = match good {
@@ -69,10 +69,10 @@ impl<'a, C: Checksum> Keeper<'a, C> {
         };
         let had_one = slots.iter().any(Slot::has_mark);
         let (sequence, found) = match newer {
-            Some((sequence, content)) => (sequence, Found::Kept(content)),
-            None => (0, if had_one { Found::Damaged } else { Found::Nothing }),
+            Some((sequence, content)) => (sequence, BackupState::Intact(content)),
+            None => (0, if had_one { BackupState::Damaged } else { BackupState::Nothing }),
         };
-        (Keeper { slots, checksum, sequence }, found)
+        (BackupCopies { slots, checksum, sequence }, found)
     }
 
     /// Overwrites the older copy. False if the memory has not taken the words: the next write goes to the same place,
@@ -183,11 +183,11 @@ mod tests {
         core::array::from_fn(|_| Slot::filled(word))
     }
 
-    fn open(slots: &Slots) -> (Keeper<'_, Software>, Found) {
-        Keeper::open(slots, Software(CRC.digest()))
+    fn open(slots: &Slots) -> (BackupCopies<'_, Software>, BackupState) {
+        BackupCopies::open(slots, Software(CRC.digest()))
     }
 
-    fn found(slots: &Slots) -> Found {
+    fn found(slots: &Slots) -> BackupState {
         open(slots).1
     }
 
@@ -198,15 +198,15 @@ mod tests {
 
     fn written(writes: u32) -> Slots {
         let slots = memory(0xA5A5_A5A5);
-        let mut keeper = open(&slots).0;
-        (1..=writes).for_each(|number| assert!(keeper.write(&content(number))));
+        let mut copies = open(&slots).0;
+        (1..=writes).for_each(|number| assert!(copies.write(&content(number))));
         slots
     }
 
     #[test]
     fn memory_that_was_never_written_has_nothing() {
         for word in [0, u32::MAX, 0xA5A5_A5A5] {
-            assert_eq!(found(&memory(word)), Found::Nothing);
+            assert_eq!(found(&memory(word)), BackupState::Nothing);
         }
     }
 
@@ -214,20 +214,21 @@ mod tests {
     fn the_latest_is_found_and_goes_on() {
         for writes in 1..=5 {
             let slots = written(writes);
-            let (mut keeper, found) = open(&slots);
-            assert_eq!(found, Found::Kept(content(writes)));
-            keeper.write(&content(100));
-            assert_eq!(open(&slots).1, Found::Kept(content(100)));
+            let (mut copies, found) = open(&slots);
+            assert_eq!(found, BackupState::Intact(content(writes)));
+            copies.write(&content(100));
+            assert_eq!(open(&slots).1, BackupState::Intact(content(100)));
         }
     }
 
     #[test]
     fn the_sequence_may_wrap() {
         let slots = memory(0);
-        let mut keeper = Keeper { slots: &slots, checksum: Software(CRC.digest()), sequence: u32::MAX - 3 };
+        let mut copies =
+            BackupCopies { slots: &slots, checksum: Software(CRC.digest()), sequence: u32::MAX - 3 };
         for number in 0..8 {
-            keeper.write(&content(number));
-            assert_eq!(found(&slots), Found::Kept(content(number)));
+            copies.write(&content(number));
+            assert_eq!(found(&slots), BackupState::Intact(content(number)));
         }
     }
 
@@ -242,10 +243,11 @@ mod tests {
                 for (to, from) in slots[target].words().zip(next[target].words()).take(done) {
                     to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
                 }
-                let expected = if writes == 0 { Found::Nothing } else { Found::Kept(content(writes)) };
+                let expected =
+                    if writes == 0 { BackupState::Nothing } else { BackupState::Intact(content(writes)) };
                 // From the second round on the mark is already there, so the write is complete without it.
                 let is_whole = writes >= 2 && done == WORDS - 1;
-                let expected = if is_whole { Found::Kept(content(writes + 1)) } else { expected };
+                let expected = if is_whole { BackupState::Intact(content(writes + 1)) } else { expected };
                 assert_eq!(found(&slots), expected, "{writes} writes and {done} words");
             }
         }
@@ -259,7 +261,7 @@ mod tests {
             for slot in &slots {
                 slot.words().nth(bit / 32).unwrap().fetch_xor(1 << (bit % 32), Ordering::Relaxed);
             }
-            assert_eq!(found(&slots), Found::Damaged, "bit {bit}");
+            assert_eq!(found(&slots), BackupState::Damaged, "bit {bit}");
         }
     }
 }

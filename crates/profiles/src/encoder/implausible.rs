@@ -8,7 +8,7 @@
 
 /// State while readings are rejected.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stray {
+pub(super) struct ImplausibleReadings {
     /// Number of bits of a reading that the code does not use.
     unused: u32,
     /// The last reading.
@@ -23,13 +23,20 @@ pub(super) struct Stray {
     readings: u32,
 }
 
-impl Stray {
+impl ImplausibleReadings {
     /// Starts with the reading `word` after the good one `last`, when the sensor moved `step` in a millisecond.
-    pub(super) fn new(bits: u32, last: u32, step: i32, word: u32, fastest: u32) -> Stray {
+    pub(super) fn new(bits: u32, last: u32, step: i32, word: u32, fastest: u32) -> ImplausibleReadings {
         let unused = 32 - bits.clamp(1, 32);
         let expected = last.wrapping_add_signed(step);
         let away = between(expected, word, unused);
-        Stray { unused, word, expected, step, has_jumped: away.unsigned_abs() > fastest, readings: 1 }
+        ImplausibleReadings {
+            unused,
+            word,
+            expected,
+            step,
+            has_jumped: away.unsigned_abs() > fastest,
+            readings: 1,
+        }
     }
 
     /// The last reading.
@@ -71,23 +78,23 @@ mod tests {
 
     const FASTEST: u32 = 1000;
 
-    fn jumped(step: i32) -> Stray {
-        Stray::new(25, 0, step, 4096, FASTEST)
+    fn jumped(step: i32) -> ImplausibleReadings {
+        ImplausibleReadings::new(25, 0, step, 4096, FASTEST)
     }
 
     #[test]
     fn a_code_that_stays_away_is_never_believed() {
-        let mut stray = jumped(0);
-        assert!((0..100_000).all(|_| !stray.is_back(4096, FASTEST)));
+        let mut implausible = jumped(0);
+        assert!((0..100_000).all(|_| !implausible.is_back(4096, FASTEST)));
     }
 
     #[test]
     fn a_code_that_moves_on_in_the_wrong_place_is_not_believed() {
         for step in [1, -7, 900, -900] {
-            let (mut stray, mut word) = (jumped(step), 4096_u32);
+            let (mut implausible, mut word) = (jumped(step), 4096_u32);
             for _ in 0..10_000 {
                 word = word.wrapping_add_signed(step);
-                assert!(!stray.is_back(word & 0x1FF_FFFF, FASTEST), "{word} at {step}");
+                assert!(!implausible.is_back(word & 0x1FF_FFFF, FASTEST), "{word} at {step}");
             }
         }
     }
@@ -95,18 +102,18 @@ mod tests {
     #[test]
     fn a_code_that_jumps_back_is_believed_though_the_shaft_has_turned_on() {
         for step in [0, 1, -7, 900, -900] {
-            let (mut stray, mut shaft) = (jumped(step), step);
+            let (mut implausible, mut shaft) = (jumped(step), step);
             for _ in 0..50 {
                 shaft += step;
-                assert!(!stray.is_back((shaft + 4096).cast_unsigned() & 0x1FF_FFFF, FASTEST));
+                assert!(!implausible.is_back((shaft + 4096).cast_unsigned() & 0x1FF_FFFF, FASTEST));
             }
-            assert!(stray.is_back((shaft + step).cast_unsigned() & 0x1FF_FFFF, FASTEST), "{step}");
+            assert!(implausible.is_back((shaft + step).cast_unsigned() & 0x1FF_FFFF, FASTEST), "{step}");
         }
     }
 
     #[test]
     fn what_was_only_too_fast_does_not_come_back_by_itself() {
-        let mut stray = Stray::new(25, 0, 900, 1001, FASTEST);
-        assert!((2..100).all(|n| !stray.is_back(1001 * n, FASTEST)));
+        let mut implausible = ImplausibleReadings::new(25, 0, 900, 1001, FASTEST);
+        assert!((2..100).all(|n| !implausible.is_back(1001 * n, FASTEST)));
     }
 }

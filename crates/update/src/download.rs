@@ -8,7 +8,7 @@ use crate::target::{Target, image_len};
 
 /// A download in progress.
 #[derive(Debug)]
-pub(crate) struct Receiver {
+pub(crate) struct Download {
     /// Number of bytes in flash.
     programmed: u32,
     /// Bytes of the incomplete chunk.
@@ -18,9 +18,9 @@ pub(crate) struct Receiver {
     expected: Option<u32>,
 }
 
-impl Receiver {
-    pub(crate) fn new() -> Receiver {
-        Receiver { programmed: 0, held: [0xFF; CHUNK], count: 0, expected: None }
+impl Download {
+    pub(crate) fn new() -> Download {
+        Download { programmed: 0, held: [0xFF; CHUNK], count: 0, expected: None }
     }
 
     /// Number of bytes so far.
