@@ -7,7 +7,7 @@
 //! ```
 //! use update::{Decision, Flash, Header, Next, Start, Status, Stay, Target, Updater, boot};
 //!
-//! /// What a bootloader does at a start: the application to be started, or what 1F57h reads while it stays.
+//! /// The decision at a start: the application to be started, or the value of 1F57h while the bootloader stays.
 //! fn decide<F: Flash>(flash: &mut F, target: Target, start: Start) -> Result<Header, Status> {
 //!     let decision = boot(flash, &target, start);
 //!     if matches!(decision, Decision::Copy | Decision::Revert) {

@@ -17,7 +17,6 @@
 //! * Type 255: without an event timer, a PDO is sent on entering Operational and on each change; with an event timer,
 //!   only on entering Operational and when the timer elapses. CiA 301 leaves the event to the profile; `canopen`
 //!   implements this rule for type 255.
-//!   leaves the event to the profile, so this is what `canopen` does for that type.
 
 /// One pre-defined PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -59,7 +59,7 @@ fn a_wrong_crc_is_told_from_a_wrong_content() {
     });
 }
 
-/// Any accepted bytes, with a valid CRC over random content, are what the parsed value encodes to.
+/// Any accepted bytes, with a valid CRC over random content, equal the encoding of the parsed value.
 #[test]
 fn what_is_parsed_encodes_to_the_same_bytes() {
     let words = prop::collection::vec((0..HEADER_LEN / 4 - 1, any::<[u8; 4]>()), 0..3);
